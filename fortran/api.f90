@@ -1,0 +1,65 @@
+! The only file that f2py reads: explicit shapes, known kinds, a status code, no logic.
+
+subroutine run_program(program, flags, by_moments, body, omega, masses, forces, torque_constant, &
+                       torque_rate, torque_varies, n_sines, sines, n_cosines, cosines, &
+                       step_size, n_steps, lipschitz, may_stop, rows, ier_rows, n_rows, status, &
+                       evaluations, stop_variable, stop_quotient)
+  ! One of the three programs of the appendix on one scene.
+  !f2py threadsafe
+  use deck, only: deck_t, stop_t
+  use listing_flags, only: listing_from_bits
+  use programs, only: run
+  implicit none
+  integer(4), intent(in) :: program        ! 1 two-term, 2 four-term, 3 runge-kutta
+  integer(4), intent(in) :: flags          ! active defects and readings, bits of listing_flags
+  integer(4), intent(in) :: by_moments     ! 1: body is I1, I2, I3; 0: A, B, C
+  real(8), intent(in) :: body(3)
+  real(8), intent(in) :: omega(3)          ! rad/s at time 0
+  real(8), intent(in) :: masses(3)
+  real(8), intent(in) :: forces(3)
+  real(8), intent(in) :: torque_constant(3)
+  real(8), intent(in) :: torque_rate(3)
+  integer(4), intent(in) :: torque_varies  ! 0: only the constant acts
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), frequency in rad/s
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in) :: step_size
+  integer(4), intent(in) :: n_steps
+  real(8), intent(in) :: lipschitz
+  integer(4), intent(in) :: may_stop
+  real(8), intent(out) :: rows(8, n_steps)        ! n h, TIME, U1-U3, V1-V3; the first n_rows hold a result
+  integer(4), intent(out) :: ier_rows(n_steps)    ! IER as printed, 0 for runge-kutta
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status               ! 0 complete, 1 stopped, 2 overflow
+  integer(4), intent(out) :: evaluations          ! right-hand sides
+  integer(4), intent(out) :: stop_variable        ! 0 none, 1-3 U, 4-6 V, 7 norm of U, 8 of U and V
+  real(8), intent(out) :: stop_quotient           ! change of K over change of U
+  type(deck_t) :: scene
+  type(stop_t) :: stop_at
+
+  scene = deck_t(by_moments /= 0, body, omega, masses, forces, torque_constant, torque_rate, &
+                 torque_varies /= 0, sines, cosines, step_size, n_steps, lipschitz, may_stop /= 0)
+  call run(program, scene, listing_from_bits(flags), rows, ier_rows, n_rows, status, evaluations, &
+           stop_at)
+  stop_variable = stop_at%variable
+  stop_quotient = stop_at%quotient
+end subroutine run_program
+
+subroutine solve_linear(n, m, a, b, factors, x, ier)
+  ! The stand-in for LEQT1F by itself: A X = B, so that it can be tested alone.
+  !f2py threadsafe
+  use linear_solver, only: leqt1f
+  implicit none
+  integer(4), intent(in) :: n
+  integer(4), intent(in) :: m
+  real(8), intent(in) :: a(n, n)
+  real(8), intent(in) :: b(n, m)
+  real(8), intent(out) :: factors(n, n)
+  real(8), intent(out) :: x(n, m)
+  integer(4), intent(out) :: ier
+
+  factors = a
+  x = b
+  call leqt1f(factors, m, n, x, ier)
+end subroutine solve_linear

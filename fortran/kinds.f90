@@ -1,0 +1,7 @@
+module kinds
+  !! The one real kind of the project: IEEE binary64.
+  implicit none
+  private
+
+  integer, parameter, public :: dp = kind(1.0d0)
+end module kinds

@@ -1,0 +1,21 @@
+"""Run f2py on api.f90 and fail where it guesses a kind: it maps what it does not know to C float."""
+
+import subprocess
+import sys
+
+
+def main(source: str, module: str, folder: str) -> int:
+    """Write the wrapper of `source` for extension `module` into `folder`."""
+    command = [sys.executable, "-m", "numpy.f2py", source, "-m", module, "--lower"]
+    command += ["--build-dir", folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    output = done.stdout + done.stderr
+    guesses = [line for line in output.splitlines() if "is mapped to C" in line]
+    if done.returncode or guesses:
+        sys.stderr.write(output if done.returncode else "\n".join(guesses) + "\n")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

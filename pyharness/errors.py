@@ -1,0 +1,35 @@
+"""What can go wrong by a user's hand, each with one line: what, where, what is allowed."""
+
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """A user's mistake: exit code 2 on the command line."""
+
+
+class NotBuiltError(RuntimeError):
+    """The compiled extension is missing: exit code 3 on the command line."""
+
+
+def unknown(what: str, name: str, allowed: Iterable[str], where: str = "") -> InputError:
+    """Return the error for a name that is not among those allowed, with the nearest one.
+
+    Parameters
+    ----------
+    what : str
+        What the name should name, for instance ``"case"``.
+    name : str
+        What was given.
+    allowed : iterable of str
+        What would have been right.
+    where : str
+        Where it was given, for instance ``"--fix"``.
+    """
+    import difflib
+
+    names = [str(each) for each in allowed]
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    place = f"{where}: " if where else ""
+    shown = name if len(name) <= 60 else name[:57] + "..."
+    return InputError(f"{place}unknown {what} '{shown}'; {hint}allowed: {', '.join(names)}")

@@ -1,0 +1,1 @@
+"""The twins: the three programs of the appendix again, in plain Python."""

@@ -1,0 +1,71 @@
+"""What the three twins share: right-hand sides, and the record of a run."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.scene import Scene
+from pyharness.trajectory import Stop, Trajectory
+
+Vector = Sequence[float]
+
+
+def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
+    """Return F, G, H of equations 16-18 at the angular velocity `u` (rad/s2)."""
+    a, b, c = coefficients
+    return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
+
+
+def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
+    """Return F/m - omega x V in body axes (m/s2)."""
+    return [
+        acceleration[0] + v[1] * u[2] - v[2] * u[1],
+        acceleration[1] + v[2] * u[0] - v[0] * u[2],
+        acceleration[2] + v[0] * u[1] - v[1] * u[0],
+    ]
+
+
+def accelerations(scene: Scene) -> list[float]:
+    """Return force over mass along each axis (m/s2)."""
+    return [force / mass for force, mass in zip(scene.forces, scene.masses, strict=True)]
+
+
+def all_finite(values: Vector) -> bool:
+    """Whether no value is NaN or infinite."""
+    return all(map(math.isfinite, values))
+
+
+class Record:
+    """The rows of a run as they come, and the trajectory that they make."""
+
+    def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
+        """Start with no rows; every step evaluates as many right-hand sides."""
+        self._step_size = scene.step_size
+        self._per_step = evaluations_per_step
+        self._rows: list[list[float]] = []
+        self._ier: list[int] = []
+
+    def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
+        """Add the row of the next step."""
+        true_time = (len(self._rows) + 1) * self._step_size
+        self._rows.append([true_time, recorded_time, *omega, *velocity])
+        self._ier.append(ier)
+
+    def trajectory(
+        self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
+    ) -> Trajectory:
+        """Return what was run; an overflow's own step is evaluated but leaves no row."""
+        rows = np.array(self._rows).reshape(-1, 8)
+        steps = len(self._rows)
+        return Trajectory(
+            time=rows[:, 0],
+            recorded_time=rows[:, 1],
+            omega=rows[:, 2:5],
+            velocity=rows[:, 5:8],
+            steps=steps,
+            evaluations=self._per_step * (steps + (ended == "overflow")),
+            ended=ended,
+            stop=stop,
+            ier=np.array(self._ier, dtype=np.int32) if prints_ier else None,
+        )

@@ -1,0 +1,88 @@
+"""Stands for LEQT1F of the IMSL library: A X = B for several right-hand sides.
+
+LU factors in Crout's order with implicit row scaling and partial pivoting.
+"""
+
+SINGULAR = 129
+
+
+def leqt1f(
+    matrix: list[list[float]], right_hand_sides: list[list[float]]
+) -> tuple[list[list[float]], int]:
+    """Solve A x = b for every b.
+
+    Parameters
+    ----------
+    matrix : list of n rows of n floats
+        A; not changed.
+    right_hand_sides : list of m lists of n floats
+        Each b; not changed.
+
+    Returns
+    -------
+    solutions : list of m lists of n floats
+        Each x; where A is algorithmically singular, each b as it was.
+    ier : int
+        0, or 129 where A is algorithmically singular.
+    """
+    factors = [list(row) for row in matrix]
+    pivots = _factor(factors)
+    if pivots is None:
+        return [list(b) for b in right_hand_sides], SINGULAR
+    return [_substitute(factors, pivots, b) for b in right_hand_sides], 0
+
+
+def _factor(a: list[list[float]]) -> list[int] | None:
+    """Overwrite `a` by its factors; return the row exchanged at each column, None if singular."""
+    n = len(a)
+    pivots = []
+    scale = []
+    for row in a:
+        biggest = max(abs(element) for element in row)
+        if biggest == 0.0:
+            return None
+        scale.append(1.0 / biggest)
+
+    for j in range(n):
+        for i in range(n):
+            total = a[i][j]
+            for k in range(min(i, j)):
+                total = total - a[i][k] * a[k][j]
+            a[i][j] = total
+
+        # On and below the diagonal these are candidates for the pivot; the first maximum wins.
+        biggest = 0.0
+        pivot = j
+        for i in range(j, n):
+            scaled = scale[i] * abs(a[i][j])
+            if scaled > biggest:
+                biggest = scaled
+                pivot = i
+        if n + biggest == n:
+            return None
+
+        if pivot != j:
+            a[j], a[pivot] = a[pivot], a[j]
+            scale[pivot] = scale[j]
+        pivots.append(pivot)
+        for i in range(j + 1, n):
+            a[i][j] = a[i][j] / a[j][j]
+    return pivots
+
+
+def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list[float]:
+    """Forward through L, then backward through U."""
+    n = len(a)
+    x = list(b)
+    for i in range(n):
+        x[i], x[pivots[i]] = x[pivots[i]], x[i]
+        total = x[i]
+        for k in range(i):
+            total = total - a[i][k] * x[k]
+        x[i] = total
+    for i in reversed(range(n)):
+        total = x[i]
+        for k in range(i + 1, n):
+            total = total - a[i][k] * x[k]
+        x[i] = total / a[i][i]
+    return x

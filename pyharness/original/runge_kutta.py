@@ -1,0 +1,128 @@
+"""Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
+
+The stop test is the thesis's use of the Lipschitz condition (eq. 19): a run ends when the
+right-hand sides change by more than the constant times the change of the unknowns.
+"""
+
+import math
+
+from pyharness.listing import Listing
+from pyharness.original.equations import (
+    Record,
+    Vector,
+    accelerations,
+    all_finite,
+    velocity_rate,
+)
+from pyharness.scene import Scene
+from pyharness.trajectory import STOP_VARIABLES, Stop, Trajectory
+
+
+def run(
+    scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
+) -> Trajectory:
+    """Run the program; `lipschitz` in 1/s, without `may_stop` the test is passed over."""
+    a, b, c = scene.euler_coefficients
+    acceleration = accelerations(scene)
+    dt = scene.step_size
+    time = 0.0
+    base = [*scene.omega, 0.0, 0.0, 0.0]
+    # Stage i is evaluated, and stored, under the index that the program gives it: 1, 2, 3, 4.
+    zero = [0.0] * 6
+    point = {1: base, 2: zero, 3: zero, 4: zero}
+    slope = {1: zero, 2: zero, 3: zero, 4: zero}
+    third = 4 if listing.has("do-variable") else 3
+    record = Record(scene, evaluations_per_step=4)
+
+    for step in range(scene.steps):
+        begin = step * dt
+        time = time + dt
+        if listing.has("torque-held"):
+            torque = dict.fromkeys((1, 2, 3, 4), scene.normalized_torque(time))
+        else:
+            middle = scene.normalized_torque(begin + 0.5 * dt)
+            torque = {
+                1: scene.normalized_torque(begin),
+                2: middle,
+                3: middle,
+                4: scene.normalized_torque(begin + dt),
+            }
+        first_point = point[1]
+
+        def evaluate(stage: int, at: int, torque: dict[int, Vector] = torque) -> None:
+            u, v = point[at][:3], point[at][3:]
+            r1, r2, r3 = torque[stage]
+            omega_rates = [r1 + a * u[1] * u[2], r2 + b * u[2] * u[0], r3 + c * u[0] * u[1]]
+            slope[stage] = omega_rates + velocity_rate(acceleration, u, v)
+
+        def store(stage: int, before: int, length: float, base: list[float] = base) -> None:
+            start = point[before] if listing.has("stage-base") else base
+            point[stage] = [x + length * k for x, k in zip(start, slope[stage], strict=True)]
+
+        evaluate(1, at=1)
+        store(1, before=1, length=0.5 * dt)
+        evaluate(2, at=1)
+        store(2, before=1, length=0.5 * dt)
+        evaluate(third, at=2)
+        store(third, before=2, length=dt)
+        evaluate(4, at=3)
+        result = [
+            x + (dt / 6.0) * (k1 + 2.0 * (k2 + k3) + k4)
+            for x, k1, k2, k3, k4 in zip(
+                base, slope[1], slope[2], slope[3], slope[4], strict=True
+            )
+        ]
+        if not all_finite(result[:3]):
+            return record.trajectory("overflow", prints_ier=False)
+        record.add(time, result[:3], result[3:])
+
+        if listing.has("lipschitz-mismatched-pairs"):
+            change_u = _distances(result, base)
+        else:
+            change_u = _distances(point[3], first_point)
+        change_k = _distances(slope[4], slope[1])
+        if may_stop:
+            found = lipschitz_test(listing, change_k, change_u, lipschitz)
+            if found is not None:
+                stop = Stop(step + 1, *found)
+                return record.trajectory("stopped", stop, prints_ier=False)
+
+        point[4] = result
+        base = result
+        if not listing.has("base-not-restored"):
+            point[1] = result
+    return record.trajectory(prints_ier=False)
+
+
+def lipschitz_test(
+    listing: Listing, change_k: Vector, change_u: Vector, lipschitz: float
+) -> tuple[str, float] | None:
+    """Return the variable that breaks the condition of eq. 19 and its quotient, or None."""
+    velocity_counts = listing.has("lipschitz-tests-velocity")
+    if listing.has("lipschitz-per-component"):
+        order = [3, 4, 5, 0, 1, 2] if velocity_counts else [0, 1, 2]
+        for index in order:
+            if change_k[index] > change_u[index] * lipschitz:
+                return STOP_VARIABLES[index], _quotient(change_k[index], change_u[index])
+        return None
+    last = 6 if velocity_counts else 3
+    norm_k = _norm(change_k[:last])
+    norm_u = _norm(change_u[:last])
+    if norm_k > norm_u * lipschitz:
+        return ("UV" if velocity_counts else "U"), _quotient(norm_k, norm_u)
+    return None
+
+
+def _distances(x: Vector, y: Vector) -> list[float]:
+    return [abs(p - q) for p, q in zip(x, y, strict=True)]
+
+
+def _norm(x: Vector) -> float:
+    total = 0.0
+    for each in x:
+        total = total + each * each
+    return math.sqrt(total)
+
+
+def _quotient(change_k: float, change_u: float) -> float:
+    return change_k / change_u if change_u else math.inf

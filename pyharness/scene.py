@@ -1,0 +1,177 @@
+"""Scenes: body, torque law, initial angular velocity, step size and steps, checked once."""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from pyharness.errors import InputError
+from pyharness.facts import facts
+
+Triple = tuple[float, float, float]
+Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
+
+# A result row in binary64 with IER, once in the kernel and once in the trajectory.
+_BYTES_PER_STEP = 2 * (8 * 8 + 4)
+# The kernels count steps and right-hand sides, five a step at the most, in 32 bits.
+_COUNTABLE_STEPS = 400_000_000
+
+
+@dataclass(frozen=True)
+class TorqueLaw:
+    """N(t) = constant + rate t + sum of amplitude sin(frequency t) + the same with cos.
+
+    N m for a body of moments; 1/s2, torque over moment, for one of coefficients.
+    """
+
+    constant: Triple = (0.0, 0.0, 0.0)
+    rate: Triple = (0.0, 0.0, 0.0)
+    sines: tuple[Wave, ...] = ()
+    cosines: tuple[Wave, ...] = ()
+
+    @property
+    def varies(self) -> bool:
+        """Whether N depends on time."""
+        waves = self.sines + self.cosines
+        return any(self.rate) or any(any(amplitude) for amplitude, _ in waves)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether N is zero at all times."""
+        return not (self.varies or any(self.constant))
+
+    def at(self, time: float) -> Triple:
+        """Return N at `time` (s), the terms added in the order of the definition."""
+        torque = list(self.constant)
+        if self.varies:
+            for axis in range(3):
+                torque[axis] += self.rate[axis] * time
+                for amplitude, frequency in self.sines:
+                    torque[axis] += amplitude[axis] * _wave(math.sin, frequency * time)
+                for amplitude, frequency in self.cosines:
+                    torque[axis] += amplitude[axis] * _wave(math.cos, frequency * time)
+        return torque[0], torque[1], torque[2]
+
+
+def _wave(function: Callable[[float], float], angle: float) -> float:
+    # Python raises for an infinite angle where Fortran, like IEEE 754, answers NaN.
+    return function(angle) if math.isfinite(angle) else math.nan
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One problem: what moves, under what, from where, in which steps.
+
+    Exactly one of `moments` (kg m2) and `coefficients` (A, B, C of equations 13-15) is given.
+
+    Raises
+    ------
+    InputError
+        Where a value is missing, not finite, out of range, or the run does not fit in memory.
+    """
+
+    name: str
+    omega: Triple
+    moments: Triple | None = None
+    coefficients: Triple | None = None
+    torque: TorqueLaw = field(default_factory=TorqueLaw)
+    step_size: float = 0.01
+    steps: int = 100
+    masses: Triple = field(default_factory=lambda: _triple(facts("cases")["deck"]["masses"]))
+    forces: Triple = field(default_factory=lambda: _triple(facts("cases")["deck"]["forces"]))
+    case: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what no method can run."""
+        if (self.moments is None) == (self.coefficients is None):
+            raise InputError("[body]: give either moments or coefficients, three numbers")
+        if self.moments is not None:
+            for axis, moment in enumerate(self.moments, 1):
+                if not (math.isfinite(moment) and moment > 0.0):
+                    raise InputError(
+                        f"[body] moments: I{axis} is {moment:g}; allowed: a finite number above 0"
+                    )
+        _check_finite("[body] coefficients", self.coefficients or ())
+        _check_finite("[initial] omega", self.omega)
+        _check_finite("[torque] constant", self.torque.constant)
+        _check_finite("[torque] rate", self.torque.rate)
+        for kind, waves in (("sines", self.torque.sines), ("cosines", self.torque.cosines)):
+            for amplitude, frequency in waves:
+                _check_finite(f"[torque] {kind}", (*amplitude, frequency))
+        if not (math.isfinite(self.step_size) and self.step_size > 0.0):
+            raise InputError(
+                f"step size is {self.step_size:g}; allowed: a finite number above 0, in seconds"
+            )
+        limit = most_steps()
+        if not 1 <= self.steps <= limit:
+            size = f" (it would need {self.steps * _BYTES_PER_STEP / 1e9:.3g} GB)"
+            raise InputError(
+                f"steps is {self.steps}{size if self.steps > limit else ''}; "
+                f"allowed: 1 to {limit}, what fits in this machine's memory"
+            )
+        if not math.isfinite(self.step_size * self.steps):
+            raise InputError("step size times steps is not finite; take fewer or smaller steps")
+
+    @property
+    def euler_coefficients(self) -> Triple:
+        """A, B, C of equations 13-15, without unit."""
+        if self.coefficients is not None:
+            return self.coefficients
+        assert self.moments is not None
+        first, second, third = self.moments
+        return (second - third) / first, (third - first) / second, (first - second) / third
+
+    @property
+    def is_impossible(self) -> bool:
+        """Whether the moments break the triangle inequality, so that no body has them."""
+        if self.moments is None:
+            return False
+        low, middle, high = sorted(self.moments)
+        return high > low + middle
+
+    def times(self) -> list[float]:
+        """Return the true times of the results, n h for n = 1 ... steps (s)."""
+        return [n * self.step_size for n in range(1, self.steps + 1)]
+
+    def normalized_torque(self, time: float) -> Triple:
+        """Return M = N / I at `time` (1/s2)."""
+        first, second, third = self.torque.at(time)
+        if self.moments is None:
+            return first, second, third
+        return first / self.moments[0], second / self.moments[1], third / self.moments[2]
+
+    def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
+        """Return f(t, omega) of equations 16-18: rad/s2, three plain floats."""
+        a, b, c = self.euler_coefficients
+        if self.torque.varies:
+
+            def varying(time: float, omega: Sequence[float]) -> list[float]:
+                x, y, z = omega
+                m1, m2, m3 = self.normalized_torque(time)
+                return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
+
+            return varying
+        m1, m2, m3 = self.normalized_torque(0.0)
+
+        def constant(time: float, omega: Sequence[float]) -> list[float]:
+            x, y, z = omega
+            return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
+
+        return constant
+
+
+def most_steps() -> int:
+    """Return the largest number of steps whose rows fit in half of this machine's memory."""
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
+
+
+def _triple(values: Sequence[float]) -> Triple:
+    first, second, third = values
+    return float(first), float(second), float(third)
+
+
+def _check_finite(where: str, values: Sequence[float]) -> None:
+    for value in values:
+        if not math.isfinite(value):
+            raise InputError(f"{where}: {value:g} is not finite; allowed: finite numbers")

@@ -1,0 +1,160 @@
+"""Where scenes come from: Table 1 by number, or a TOML file of the form in the README."""
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pyharness.errors import InputError, unknown
+from pyharness.facts import facts
+from pyharness.scene import Scene, TorqueLaw, Triple, Wave
+
+_LARGEST_FILE = 1_000_000
+_TABLES = {
+    "body": ("moments", "coefficients"),
+    "initial": ("omega",),
+    "torque": ("constant", "rate", "sines", "cosines"),
+    "run": ("step_size", "steps"),
+}
+
+
+def case_numbers() -> list[int]:
+    """Return the numbers of the cases of Table 1."""
+    return [entry["number"] for entry in facts("cases")["case"]]
+
+
+def case_scene(number: int) -> Scene:
+    """Return the scene of a case of Table 1; InputError where there is no such case."""
+    for entry in facts("cases")["case"]:
+        if entry["number"] == number:
+            deck = facts("cases")["deck"]
+            return Scene(
+                name=entry["title"],
+                omega=_numbers("omega", entry["omega"]),
+                moments=_numbers("moments", entry["moments"]),
+                torque=_torque(entry.get("torque", {}), "torque"),
+                step_size=deck["step_size"],
+                steps=deck["steps"],
+                case=number,
+            )
+    raise unknown("case", str(number), map(str, case_numbers()), "--case")
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Return the scene of a TOML file.
+
+    Raises
+    ------
+    InputError
+        Where the file can't be read, is not TOML, has an unknown key, or lacks a value.
+    """
+    where = f"scene file '{path}'"
+    try:
+        with open(path, "rb") as file:
+            content = file.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{where}: {reason}; give a TOML file that can be read") from None
+    if len(content) > _LARGEST_FILE:
+        raise InputError(f"{where}: larger than {_LARGEST_FILE} bytes; a scene is a few lines")
+    try:
+        data = tomllib.loads(content.decode("utf-8"))
+    except UnicodeDecodeError:
+        raise InputError(f"{where}: not UTF-8 text; TOML files are") from None
+    except RecursionError:
+        raise InputError(f"{where}: nested too deeply; a scene has two levels") from None
+    except ValueError as error:
+        raise InputError(f"{where}: not TOML: {' '.join(str(error).split())}") from None
+    try:
+        return _scene(data, Path(path).stem)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _scene(data: dict[str, Any], default_name: str) -> Scene:
+    _check_keys(data, ("name", *_TABLES), "top level")
+    tables: dict[str, dict[str, Any]] = {}
+    for table, keys in _TABLES.items():
+        tables[table] = data.get(table, {})
+        if not isinstance(tables[table], dict):
+            raise InputError(f"{table} is {_kind(tables[table])}; it must be a table [{table}]")
+        if table != "torque":
+            _check_keys(tables[table], keys, f"[{table}]")
+    name = data.get("name", default_name)
+    if not isinstance(name, str):
+        raise InputError(f"name is {_kind(name)}; it must be text")
+    body, initial, run = tables["body"], tables["initial"], tables["run"]
+    if "omega" not in initial:
+        raise InputError("[initial] omega is missing; give three numbers in rad/s")
+    steps = run.get("steps", 100)
+    if isinstance(steps, bool) or not isinstance(steps, int):
+        raise InputError(f"[run] steps is {_kind(steps)}; it must be a whole number")
+    return Scene(
+        name=" ".join(name.split())[:60],
+        omega=_numbers("[initial] omega", initial["omega"]),
+        moments=_optional("[body] moments", body.get("moments")),
+        coefficients=_optional("[body] coefficients", body.get("coefficients")),
+        torque=_torque(tables["torque"], "[torque]"),
+        step_size=_number("[run] step_size", run.get("step_size", 0.01)),
+        steps=steps,
+    )
+
+
+def _torque(table: dict[str, Any], where: str) -> TorqueLaw:
+    _check_keys(table, _TABLES["torque"], where)
+    zero = [0.0, 0.0, 0.0]
+    return TorqueLaw(
+        constant=_numbers(f"{where} constant", table.get("constant", zero)),
+        rate=_numbers(f"{where} rate", table.get("rate", zero)),
+        sines=_waves(f"{where} sines", table.get("sines", [])),
+        cosines=_waves(f"{where} cosines", table.get("cosines", [])),
+    )
+
+
+def _waves(where: str, entries: object) -> tuple[Wave, ...]:
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"{where} must be a list of {{ amplitude = [..], frequency = .. }}")
+    waves = []
+    for entry in entries:
+        _check_keys(entry, ("amplitude", "frequency"), where)
+        for key in ("amplitude", "frequency"):
+            if key not in entry:
+                raise InputError(f"{where}: {key} is missing")
+        waves.append(
+            (
+                _numbers(f"{where} amplitude", entry["amplitude"]),
+                _number(f"{where} frequency", entry["frequency"]),
+            )
+        )
+    return tuple(waves)
+
+
+def _check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
+    for key in table:
+        if key not in allowed:
+            raise unknown("key", key, allowed, where)
+
+
+def _optional(where: str, value: object) -> Triple | None:
+    return None if value is None else _numbers(where, value)
+
+
+def _numbers(where: str, value: object) -> Triple:
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(f"{where} must be a list of three numbers")
+    first, second, third = (_number(where, each) for each in value)
+    return first, second, third
+
+
+def _number(where: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"{where}: {_kind(value)} where a number belongs")
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(f"{where}: a number too large for binary64") from None
+
+
+def _kind(value: object) -> str:
+    names = {str: "text", bool: "true or false", list: "a list", dict: "a table"}
+    return names.get(type(value), f"a {type(value).__name__}")

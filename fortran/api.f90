@@ -28,7 +28,7 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   integer(4), intent(in) :: n_steps
   real(8), intent(in) :: lipschitz
   integer(4), intent(in) :: may_stop
-  real(8), intent(out) :: rows(8, n_steps)        ! n h, TIME, U1-U3, V1-V3; the first n_rows hold a result
+  real(8), intent(out) :: rows(8, n_steps)  ! n h, TIME, U1-U3, V1-V3 for n_rows results
   integer(4), intent(out) :: ier_rows(n_steps)    ! IER as printed, 0 for runge-kutta
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status               ! 0 complete, 1 stopped, 2 overflow

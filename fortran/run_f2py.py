@@ -1,4 +1,4 @@
-"""Run f2py on api.f90 and fail where it guesses a kind: it maps what it does not know to C float."""
+"""Run f2py on api.f90, and fail where it guesses a kind: what it does not know becomes C float."""
 
 import subprocess
 import sys

@@ -1,0 +1,46 @@
+"""Three 1982 FORTRAN programs for Euler's rigid body equations: as punched, mended, checked."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pyharness.errors import InputError, NotBuiltError
+    from pyharness.listing import Listing, corrected, original, subset
+    from pyharness.scene import Scene, TorqueLaw
+    from pyharness.scene_file import case_scene, read_scene
+    from pyharness.trajectory import Stop, Trajectory
+
+__all__ = [
+    "InputError",
+    "Listing",
+    "NotBuiltError",
+    "Scene",
+    "Stop",
+    "TorqueLaw",
+    "Trajectory",
+    "case_scene",
+    "corrected",
+    "original",
+    "read_scene",
+    "subset",
+]
+
+# Names load their room when they are first asked for: a program that needs one pays for one.
+_ROOMS = {
+    "errors": ("InputError", "NotBuiltError"),
+    "listing": ("Listing", "corrected", "original", "subset"),
+    "scene": ("Scene", "TorqueLaw"),
+    "scene_file": ("case_scene", "read_scene"),
+    "trajectory": ("Stop", "Trajectory"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for room, names in _ROOMS.items():
+        if name in names:
+            return getattr(import_module(f"pyharness.{room}"), name)
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("pyharness")
+    raise AttributeError(f"module 'pyharness' has no attribute '{name}'")

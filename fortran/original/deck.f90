@@ -2,7 +2,7 @@ module deck
   !! What the three decks share: the data cards, equations 13-15 normalised, Case 7's torque.
   !! Two-term cards 200-320, 390-420, 440-470, 500-660; the other decks say the same.
   use kinds, only: dp
-  implicit none
+  implicit none(type, external)
   private
 
   integer, parameter, public :: COMPLETE = 0 !! all steps were run

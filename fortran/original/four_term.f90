@@ -7,7 +7,7 @@ module four_term_program
                   COMPLETE, OVERFLOW
   use linear_solver, only: leqt1f
   use listing_flags, only: listing_t
-  implicit none
+  implicit none(type, external)
   private
 
   public :: four_term

@@ -3,7 +3,7 @@ module linear_solver
   !! Crout's order, implicit row scaling, partial pivoting; what is known of it and what
   !! is assumed stands in docs/reconstruction.md.
   use kinds, only: dp
-  implicit none
+  implicit none(type, external)
   private
 
   integer, parameter, public :: SINGULAR = 129 !! IER: the matrix is algorithmically singular

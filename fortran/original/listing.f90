@@ -1,7 +1,7 @@
 module listing_flags
   !! Which defects and readings of the appendix are active, one bit each.
   !! The bits are those of `flag` in pyharness/data/apparatus.toml.
-  implicit none
+  implicit none(type, external)
   private
 
   type, public :: listing_t

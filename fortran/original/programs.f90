@@ -6,7 +6,7 @@ module programs
   use listing_flags, only: listing_t
   use runge_kutta_program, only: runge_kutta
   use two_term_program, only: two_term
-  implicit none
+  implicit none(type, external)
   private
 
   public :: run

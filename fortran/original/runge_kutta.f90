@@ -6,7 +6,7 @@ module runge_kutta_program
   use deck, only: deck_t, stop_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
                   COMPLETE, STOPPED, OVERFLOW
   use listing_flags, only: listing_t
-  implicit none
+  implicit none(type, external)
   private
 
   public :: runge_kutta

@@ -1,13 +1,13 @@
 module two_term_program
   !! Two-term collocation, Jacobs 1982, IV.2 and the program FEM1 of the appendix (159 cards).
-  !! In each interval omega = omega(0) + c1 t + c2 t**2 (eq. 34), residual zero at T1 and T2 (eq. 36).
+  !! omega = omega(0) + c1 t + c2 t**2 (eq. 34), residual zero at T1 and T2 (eq. 36).
   !! Faithful in every operation and its order; the margin names the card.
   use kinds, only: dp
   use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
                   COMPLETE, OVERFLOW
   use linear_solver, only: leqt1f
   use listing_flags, only: listing_t
-  implicit none
+  implicit none(type, external)
   private
 
   public :: two_term

@@ -46,9 +46,7 @@ def interval(
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
     """Return the coefficients c1, c2, ... of every unknown whose derivative meets `rates`."""
-    matrix = [
-        [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t)][: len(points)] for t in points
-    ]
+    matrix = [[1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t)][: len(points)] for t in points]
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(matrix, by_unknown)
 

@@ -3,6 +3,8 @@
 Residual zero at .2, .4, .6 and .8 of the interval.
 """
 
+from collections.abc import Sequence
+
 from pyharness.listing import Listing
 from pyharness.original.collocation import interval
 from pyharness.original.equations import (
@@ -38,7 +40,7 @@ def run(
         else:
             torques = [scene.normalized_torque(begin + t) for t in (0.0, *points)]
 
-        def rates(k: int, x: Vector, torques: list[Vector] = torques) -> list[float]:
+        def rates(k: int, x: Vector, torques: Sequence[Vector] = torques) -> list[float]:
             u, v = x[:3], x[3:]
             return omega_rate(coefficients, torques[k], u) + velocity_rate(acceleration, u, v)
 

@@ -5,6 +5,7 @@ right-hand sides change by more than the constant times the change of the unknow
 """
 
 import math
+from collections.abc import Mapping
 
 from pyharness.listing import Listing
 from pyharness.original.equations import (
@@ -49,7 +50,7 @@ def run(
             }
         first_point = point[1]
 
-        def evaluate(stage: int, at: int, torque: dict[int, Vector] = torque) -> None:
+        def evaluate(stage: int, at: int, torque: Mapping[int, Vector] = torque) -> None:
             u, v = point[at][:3], point[at][3:]
             r1, r2, r3 = torque[stage]
             omega_rates = [r1 + a * u[1] * u[2], r2 + b * u[2] * u[0], r3 + c * u[0] * u[1]]
@@ -68,9 +69,7 @@ def run(
         evaluate(4, at=3)
         result = [
             x + (dt / 6.0) * (k1 + 2.0 * (k2 + k3) + k4)
-            for x, k1, k2, k3, k4 in zip(
-                base, slope[1], slope[2], slope[3], slope[4], strict=True
-            )
+            for x, k1, k2, k3, k4 in zip(base, slope[1], slope[2], slope[3], slope[4], strict=True)
         ]
         if not all_finite(result[:3]):
             return record.trajectory("overflow", prints_ier=False)

@@ -3,6 +3,8 @@
 Residual zero at one third and two thirds of the interval.
 """
 
+from collections.abc import Sequence
+
 from pyharness.listing import Listing
 from pyharness.original.collocation import interval
 from pyharness.original.equations import (
@@ -39,7 +41,7 @@ def run(
         else:
             torques = [scene.normalized_torque(begin + t) for t in (0.0, *points)]
 
-        def rates(k: int, x: Vector, torques: list[Vector] = torques) -> list[float]:
+        def rates(k: int, x: Vector, torques: Sequence[Vector] = torques) -> list[float]:
             coefficients = (a, b, c)
             forces = acceleration
             if k == 0 and listing.has("c1-for-c"):

@@ -1,0 +1,58 @@
+# make compare [CASE=5] [ARGS="--listing corrected"], make test, make wheel: all set up what they need.
+# PYTHON= and FC= choose the interpreter and the Fortran compiler; INSTALL=no forbids apt, dnf, brew.
+
+PYTHON ?= python3
+ifeq ($(origin FC),default)
+FC := gfortran
+endif
+INSTALL ?= yes
+export INSTALL
+CASE ?= 3
+ARGS ?=
+
+BIN := .venv/bin
+FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
+# What the tests and the linters need beyond what the project itself does.
+TEST_PACKAGES := $(shell sed -n '/^test = \[/,/^\]/s/^ *"\(.*\)",/\1/p' pyproject.toml)
+
+.PHONY: compare test wheel lint format clean FORCE
+
+compare: .venv/ready
+	@$(BIN)/python -m pyharness compare --case $(CASE) $(ARGS)
+
+test: .venv/ready-to-test
+	@$(BIN)/python -m pytest -q $(ARGS)
+
+wheel: .venv/ready
+	@PATH="$(CURDIR)/$(BIN):$$PATH" FC=$(FC) $(BIN)/python -m pip wheel --quiet \
+	  --disable-pip-version-check --no-build-isolation --no-deps --wheel-dir dist .
+	@ls dist/*.whl
+
+lint: .venv/ready-to-test
+	@$(BIN)/ruff format --check --quiet
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/python -m mypy
+	@test -z "$$($(BIN)/fprettify --diff $(FORTRAN))" || { echo "fprettify: make format"; exit 1; }
+	@$(BIN)/fortitude --quiet check fortran
+
+format: .venv/ready-to-test
+	@$(BIN)/ruff format --quiet
+	@$(BIN)/ruff check --quiet --fix
+	@$(BIN)/fprettify $(FORTRAN)
+
+clean:
+	rm -rf .venv build dist
+
+# The environment is made anew when its ingredients change, or other tools are asked for.
+.venv/ready: pyproject.toml meson.build .ci/setup .venv/tools
+	@.ci/setup "$(PYTHON)" "$(FC)"
+	@echo "$(PYTHON) $(FC)" > .venv/tools
+	@touch $@
+
+.venv/ready-to-test: .venv/ready
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check $(patsubst %,'%',$(TEST_PACKAGES))
+	@touch $@
+
+.venv/tools: FORCE
+	@mkdir -p .venv
+	@echo "$(PYTHON) $(FC)" | cmp -s - $@ || echo "$(PYTHON) $(FC)" > $@

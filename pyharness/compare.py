@@ -1,0 +1,354 @@
+"""Original against corrected, Fortran against twin, everything against the reference.
+
+Two notions of agreement, never mixed: bits between languages (in units in the last place), and
+error against the truth (in rad/s, never below what the reference itself may be wrong by).
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.errors import InputError, unknown
+from pyharness.listing import PROGRAMS, Listing, names_of, subset
+from pyharness.methods import PROGRAM_REGISTRY, SCIPY_METHODS, Program, solve
+from pyharness.reference import Reference, reference
+from pyharness.scene import Scene
+from pyharness.trajectory import Array, Trajectory
+
+# The order is measured where halving the step moves the result by less than this (relative to
+# the largest |omega|), and must come within half an order of the program's own.
+_SMALL_CHANGE = 1e-3
+_MOST_HALVINGS = 8
+_ORDER_SLACK = 0.5
+# Rounding: so many units in the last place of the largest |omega| per step.
+_ROUNDING = 8.0 * 2.0**-53
+_TIMING_BATCHES = 3
+_TIMING_SECONDS = 3e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """How far a trajectory is from the truth.
+
+    Attributes
+    ----------
+    omega : tuple of float
+        Largest error of each component (rad/s).
+    velocity : float or None
+        Largest error of any component of V (m/s).
+    energy, momentum : float or None
+        Largest drift of energy and of momentum squared, relative to the start; None where a
+        torque acts or the moments are not known.
+    error : ndarray, shape (n,)
+        Largest error of any component of omega at each result (rad/s).
+    """
+
+    omega: tuple[float, float, float]
+    velocity: float | None
+    energy: float | None
+    momentum: float | None
+    error: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramFinding:
+    """One program with one listing."""
+
+    listing: Listing
+    trajectory: Trajectory
+    accuracy: Accuracy
+    ulps: float
+    differences: tuple[str, ...]
+    order: float | None
+    misses_order: bool
+    seconds_per_step: float
+
+
+@dataclass(frozen=True, eq=False)
+class MethodFinding:
+    """One method of `solve_ivp`; `failure` says why there is no trajectory."""
+
+    method: str
+    tolerance: float
+    trajectory: Trajectory | None
+    accuracy: Accuracy | None
+    seconds: float
+    failure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """All that was found about one scene."""
+
+    scene: Scene
+    lipschitz: float
+    reference: Reference
+    programs: tuple[ProgramFinding, ...]
+    methods: tuple[MethodFinding, ...]
+
+    @property
+    def unexpected(self) -> tuple[str, ...]:
+        """What is not as it should be, one sentence each; empty if all is well."""
+        found = []
+        for each in self.programs:
+            who = f"{each.listing.program} {each.listing.label}"
+            if each.differences:
+                found.append(f"{who}: Fortran and twin differ in {', '.join(each.differences)}")
+            if each.misses_order:
+                order = PROGRAM_REGISTRY[each.listing.program].order
+                seen = "none" if each.order is None else f"{each.order:.1f}"
+                found.append(f"{who}: misses the reference, order {seen} where {order} belongs")
+        return tuple(found)
+
+
+def compare(
+    scene: Scene,
+    listings: Sequence[Listing],
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    tolerance: float = 1e-8,
+) -> Comparison:
+    """Compare programs and methods on one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to integrate.
+    listings : sequence of Listing
+        The programs to run, each with its active defects (see `listings_for`).
+    lipschitz : float
+        Constant of the stop test (1/s).
+    may_stop : bool
+        Whether the stop test may end a run.
+    tolerance : float
+        What `solve_ivp` is asked for, relative to the largest angular velocity.
+
+    Returns
+    -------
+    Comparison
+        `unexpected` is empty where all is as it should be.
+
+    Raises
+    ------
+    NotBuiltError
+        Where the extension is not built.
+    InputError
+        Where the reference would need too many steps.
+    """
+    truth = reference(scene, scene.times(), velocity=True)
+    programs = []
+    for listing in listings:
+        program = PROGRAM_REGISTRY[listing.program]
+        compiled = program.run(scene, listing, "fortran", lipschitz, may_stop)
+        twin = program.run(scene, listing, "python", lipschitz, may_stop)
+        judged = not listing.defects and not listing.readings
+        order, misses = measured_order(scene, program, listing, truth) if judged else (None, False)
+        programs.append(
+            ProgramFinding(
+                listing=listing,
+                trajectory=compiled,
+                accuracy=accuracy(scene, compiled, truth),
+                ulps=distance(compiled, twin),
+                differences=tuple(differences(compiled, twin)),
+                order=order,
+                misses_order=misses,
+                seconds_per_step=_seconds(
+                    partial(program.run, scene, listing, "fortran", lipschitz, may_stop)
+                )
+                / max(compiled.steps, 1),
+            )
+        )
+    import scipy.integrate  # noqa: F401  (not to be timed with the first method)
+
+    methods = [_method(scene, name, tolerance, truth) for name in SCIPY_METHODS]
+    return Comparison(scene, lipschitz, truth, tuple(programs), tuple(methods))
+
+
+def listings_for(
+    programs: Iterable[str] = PROGRAMS,
+    base: str | None = None,
+    fix: Sequence[str] = (),
+    keep: Sequence[str] = (),
+    readings: Sequence[str] = (),
+) -> list[Listing]:
+    """Return what to compare: original and corrected, and the subset asked for between them.
+
+    A defect or reading applies to the programs that have it; one that no program has is a
+    mistake. With `base` and nothing else, only that listing is shown.
+    """
+    chosen = list(programs)
+    for option, kind, names in (
+        ("--fix", "defect", fix),
+        ("--keep", "defect", keep),
+        ("--reading", "reading", readings),
+    ):
+        allowed = {name for program in chosen for name in names_of(kind, program)}
+        for name in names:
+            if name not in allowed:
+                raise unknown(kind, name, sorted(allowed), option)
+    for name in sorted(set(fix) & set(keep)):
+        raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
+    result = []
+    for program in chosen:
+        defects, own_readings = names_of("defect", program), names_of("reading", program)
+        mended = [name for name in fix if name in defects]
+        kept = [name for name in keep if name in defects]
+        selected = [name for name in readings if name in own_readings]
+        bases = [base] if base and not (fix or keep) else ["original", "corrected"]
+        rows = [subset(program, each, readings=selected) for each in bases]
+        if mended or kept:
+            rows.insert(1, subset(program, base, mended, kept, selected))
+        result += rows
+    return result
+
+
+def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
+    """Hold a trajectory against the truth at the times that both have."""
+    n = min(len(trajectory.time), len(truth.time))
+    with np.errstate(all="ignore"):
+        errors = np.abs(trajectory.omega[:n] - truth.omega[:n])
+        first, second, third = (float(e) for e in errors.max(axis=0, initial=0.0))
+        speed = None
+        if trajectory.velocity is not None and truth.velocity is not None:
+            speed = float(np.abs(trajectory.velocity[:n] - truth.velocity[:n]).max(initial=0.0))
+        energy = momentum = None
+        if scene.moments is not None and scene.torque.is_zero:
+            inertia = np.array(scene.moments)
+            energy = _drift(scene, trajectory, inertia)
+            momentum = _drift(scene, trajectory, inertia * inertia)
+    return Accuracy((first, second, third), speed, energy, momentum, errors.max(axis=1, initial=0))
+
+
+def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
+    start = float(weights @ np.square(scene.omega))
+    if start == 0.0:
+        return 0.0
+    return float(np.abs(np.square(trajectory.omega) @ weights / start - 1.0).max(initial=0.0))
+
+
+def distance(first: Trajectory, second: Trajectory) -> float:
+    """Return the largest distance in units in the last place over TIME, U and V.
+
+    NaN agrees with NaN; a different number of rows is infinitely far.
+    """
+    if len(first.time) != len(second.time):
+        return math.inf
+    return max(
+        ulps(first.recorded_time, second.recorded_time),
+        ulps(first.omega, second.omega),
+        ulps(_velocity(first), _velocity(second)),
+    )
+
+
+def differences(first: Trajectory, second: Trajectory) -> list[str]:
+    """Name all in which two trajectories of a program differ: bits, counters, stop, IER."""
+    found = [
+        name
+        for name, x, y in (
+            ("steps", first.steps, second.steps),
+            ("evaluations", first.evaluations, second.evaluations),
+            ("ending", first.ended, second.ended),
+            ("stop", first.stop, second.stop),
+        )
+        if x != y
+    ]
+    if found:
+        return found
+    for name, x, y in (
+        ("time", first.time, second.time),
+        ("TIME", first.recorded_time, second.recorded_time),
+        ("omega", first.omega, second.omega),
+        ("velocity", _velocity(first), _velocity(second)),
+    ):
+        if ulps(x, y):
+            found.append(name)
+    if not np.array_equal(first.ier, second.ier):  # type: ignore[arg-type]
+        found.append("IER")
+    return found
+
+
+def _velocity(trajectory: Trajectory) -> Array:
+    return np.empty((0, 3)) if trajectory.velocity is None else trajectory.velocity
+
+
+def ulps(x: Array, y: Array) -> float:
+    """Return the largest number of representable values between two arrays of one shape."""
+    both_nan = np.isnan(x) & np.isnan(y)
+    one_nan = np.isnan(x) ^ np.isnan(y)
+    if one_nan.any():
+        return math.inf
+    first, second = np.where(both_nan, 0, _ordinal(x)), np.where(both_nan, 0, _ordinal(y))
+    return float((np.maximum(first, second) - np.minimum(first, second)).max(initial=0))
+
+
+def _ordinal(x: Array) -> NDArray[np.uint64]:
+    """Return the place of each value among all representable ones; -0 comes just before +0."""
+    bits = np.ascontiguousarray(x).view(np.uint64)
+    return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))
+
+
+def measured_order(
+    scene: Scene, program: Program, listing: Listing, truth: Reference
+) -> tuple[float | None, bool]:
+    """Halve the step until it is small, and measure the power with which the error falls.
+
+    Returns
+    -------
+    float or None
+        The order; None where the error is that of rounding from the start, or where the step
+        never becomes small enough.
+    bool
+        Whether the program misses the reference by more than its order allows.
+    """
+    n = len(truth.time)
+    if n < scene.steps:
+        return None, False  # the solution itself leaves every bound
+    scale = float(np.abs(truth.omega).max(initial=max(map(abs, scene.omega))))
+    previous: Array | None = None
+    previous_error = math.inf
+    for halvings in range(_MOST_HALVINGS + 1):
+        parts = 2**halvings
+        try:
+            finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
+        except InputError:
+            return None, False  # does not fit in memory
+        omega = program.run(finer, listing, may_stop=False).omega[parts - 1 :: parts]
+        if len(omega) < n:
+            continue  # overflow: the step is far too large
+        error = float(np.abs(omega - truth.omega).max())
+        if error <= _ROUNDING * scale * finer.steps + truth.error:
+            return None, False
+        if previous is not None and np.abs(omega - previous).max() < _SMALL_CHANGE * scale:
+            order = math.log2(previous_error / error)
+            return order, order < program.order - _ORDER_SLACK
+        previous, previous_error = omega, error
+    return None, False
+
+
+def _method(scene: Scene, name: str, tolerance: float, truth: Reference) -> MethodFinding:
+    start = time.perf_counter()
+    try:
+        trajectory = solve(scene, scene.times(), name, tolerance)
+    except InputError as error:
+        return MethodFinding(name, tolerance, None, None, math.nan, str(error))
+    seconds = time.perf_counter() - start
+    return MethodFinding(name, tolerance, trajectory, accuracy(scene, trajectory, truth), seconds)
+
+
+def _seconds(run: Callable[[], object]) -> float:
+    """Return the median time of a call, over batches long enough for the clock."""
+    start = time.perf_counter()
+    run()
+    calls = max(1, round(_TIMING_SECONDS / max(time.perf_counter() - start, 1e-7)))
+    batches = []
+    for _ in range(_TIMING_BATCHES):
+        start = time.perf_counter()
+        for _ in range(calls):
+            run()
+        batches.append((time.perf_counter() - start) / calls)
+    return sorted(batches)[_TIMING_BATCHES // 2]

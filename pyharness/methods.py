@@ -1,0 +1,276 @@
+"""The one registry: every way to turn a scene into a trajectory, by name."""
+
+import importlib
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.errors import InputError, unknown
+from pyharness.listing import PROGRAMS, Listing
+from pyharness.scene import Scene
+from pyharness.trajectory import Trajectory
+
+IMPLEMENTATIONS = ("fortran", "python")
+
+# SciPy controls the error of a step, a tolerance here is on the error at the times asked for:
+# a thirtieth kept every method within it in all seven cases (tests/test_methods.py).
+_STEP_SHARE = 1.0 / 30.0
+
+# A phase of so many radians has hardly a digit left in binary64. What still grows there is on
+# its way to infinity in finite time, and LSODA would never come back from it.
+_LARGEST_PHASE = 1e13
+_MOST_EVALUATIONS = 2_000_000
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program of the appendix.
+
+    Attributes
+    ----------
+    name : str
+        As in `pyharness.listing.PROGRAMS`.
+    order : int
+        The power of the step with which the error of the mended program falls.
+    source : str
+        Where it stands.
+    """
+
+    name: str
+    order: int
+    source: str
+
+    def run(
+        self,
+        scene: Scene,
+        listing: Listing,
+        implementation: str = "fortran",
+        lipschitz: float = 500.0,
+        may_stop: bool = True,
+    ) -> Trajectory:
+        """Run the program.
+
+        Parameters
+        ----------
+        scene : Scene
+            What to integrate.
+        listing : Listing
+            Its active defects and readings.
+        implementation : {"fortran", "python"}
+            The compiled program or its twin; both give the same bits.
+        lipschitz : float
+            Constant of the stop test (1/s).
+        may_stop : bool
+            Whether the stop test may end the run.
+
+        Raises
+        ------
+        NotBuiltError
+            Where the compiled program is asked for and not built.
+        """
+        if implementation == "fortran":
+            from pyharness import kernels
+
+            return kernels.run(scene, listing, lipschitz, may_stop)
+        twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")
+        trajectory: Trajectory = twin.run(scene, listing, lipschitz, may_stop)
+        return trajectory
+
+
+@dataclass(frozen=True)
+class Method:
+    """Anything else that turns a scene into a trajectory at requested times.
+
+    Attributes
+    ----------
+    name, title, source : str
+        What it is called, what it is, where it comes from.
+    finest : float
+        The smallest tolerance that it claims to meet.
+    solve : callable
+        ``solve(scene, times, tolerance)``; times are checked, and run away from 0.
+    """
+
+    name: str
+    title: str
+    source: str
+    finest: float
+    solve: Callable[[Scene, Sequence[float], float], Trajectory]
+
+
+def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -> Trajectory:
+    """Solve a scene by a method of the registry.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to integrate; its step size plays no part.
+    times : sequence of float, shape (n,)
+        Where the result is wanted (s): strictly monotonic, on one side of 0.
+    method : str
+        A name in `METHODS`.
+    tolerance : float
+        Largest error at `times`, relative to the largest initial angular velocity.
+
+    Returns
+    -------
+    Trajectory
+        One row per time, fewer where the solution overflows.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, times out of order, or a tolerance that the method can't meet.
+    """
+    if method not in METHODS:
+        raise unknown("method", method, METHODS)
+    chosen = METHODS[method]
+    if not chosen.finest <= tolerance <= 1.0:
+        raise InputError(
+            f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
+        )
+    ordered, turned = _outward(times)
+    trajectory = chosen.solve(scene, ordered, tolerance)
+    if not turned:
+        return trajectory
+    return Trajectory(
+        time=trajectory.time[::-1],
+        recorded_time=trajectory.recorded_time[::-1],
+        omega=trajectory.omega[::-1],
+        velocity=None,
+        steps=trajectory.steps,
+        evaluations=trajectory.evaluations,
+        ended=trajectory.ended,
+    )
+
+
+def _outward(times: Sequence[float]) -> tuple[list[float], bool]:
+    """Return the times in the order away from 0, and whether that turned them round."""
+    values = [float(t) for t in times]
+    if not values:
+        raise InputError("times: none given; give at least one")
+    if not all(map(math.isfinite, values)):
+        raise InputError("times: one is not finite; allowed: finite numbers")
+    if min(values) < 0.0 < max(values):
+        raise InputError("times: on both sides of 0; allowed: one side")
+    turned = abs(values[0]) > abs(values[-1])
+    if turned:
+        values.reverse()
+    if not all(abs(t1) < abs(t2) for t1, t2 in itertools.pairwise(values)):
+        raise InputError("times: not strictly monotonic; each must differ from the one before")
+    return values, turned
+
+
+def _solve_ivp(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
+    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        from scipy.integrate import solve_ivp
+
+        if times[-1] == 0.0:
+            return _trajectory(times, np.array([scene.omega]), 0, 0, "complete")
+        largest = max(map(abs, scene.omega))
+        step_tolerance = tolerance * _STEP_SHARE
+        rate = max(map(abs, scene.euler_coefficients))
+        right_hand_side = scene.right_hand_side()
+        evaluations = 0
+
+        def counted(time: float, omega: Sequence[float]) -> list[float]:
+            nonlocal evaluations
+            evaluations += 1
+            if evaluations > _MOST_EVALUATIONS:
+                raise InputError(
+                    f"{name} gave up at t = {time:.6g} s after {_MOST_EVALUATIONS} right-hand "
+                    "sides; take a shorter time or a larger tolerance"
+                )
+            return right_hand_side(time, omega)
+
+        def phase_left(time: float, omega: Sequence[float]) -> float:
+            return _LARGEST_PHASE - rate * abs(time) * max(map(abs, omega))
+
+        phase_left.terminal = True  # type: ignore[attr-defined]
+        with np.errstate(all="ignore"):
+            result = solve_ivp(
+                counted,
+                (0.0, times[-1]),
+                scene.omega,
+                method=name,
+                t_eval=times,
+                events=phase_left,
+                rtol=step_tolerance,
+                atol=step_tolerance * (largest or 1.0),
+            )
+        rows = result.y.T if len(result.t) else np.empty((0, 3))
+        finite = np.isfinite(rows).all(axis=1)
+        count = len(rows) if finite.all() else int(np.argmin(finite))
+        ended = "complete" if count == len(times) else "overflow"
+        # The result does not carry the steps taken; right-hand sides are what it counts.
+        return _trajectory(times[:count], rows[:count], int(result.nfev), len(times), ended)
+
+    return solve
+
+
+def _reference(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    from pyharness.reference import reference
+
+    result = reference(scene, times)
+    ended = "complete" if len(result.time) == len(times) else "overflow"
+    return _trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
+
+
+def _trajectory(
+    times: Sequence[float], omega: np.ndarray, evaluations: int, steps: int, ended: str
+) -> Trajectory:
+    time = np.array(times, dtype=float)
+    return Trajectory(time, time, omega, None, steps, evaluations, ended)
+
+
+PROGRAM_REGISTRY = {
+    "two-term": Program("two-term", 2, "Jacobs 1982, IV.2 and appendix"),
+    "four-term": Program("four-term", 2, "Jacobs 1982, IV.2 and appendix"),
+    "runge-kutta": Program("runge-kutta", 4, "Jacobs 1982, eq. 31, IV.3 and appendix"),
+}
+assert tuple(PROGRAM_REGISTRY) == PROGRAMS
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method(
+            "dop853",
+            "Runge-Kutta 8(5,3)",
+            "scipy.integrate.solve_ivp; Hairer, Norsett and Wanner 1993, II.5",
+            7e-13,
+            _solve_ivp("DOP853"),
+        ),
+        Method(
+            "rk45",
+            "Runge-Kutta 5(4)",
+            "scipy.integrate.solve_ivp; Dormand and Prince 1980",
+            7e-13,
+            _solve_ivp("RK45"),
+        ),
+        Method(
+            "lsoda",
+            "Adams and BDF with switching",
+            "scipy.integrate.solve_ivp; Petzold 1983",
+            7e-13,
+            _solve_ivp("LSODA"),
+        ),
+        Method(
+            "radau",
+            "implicit Runge-Kutta of order 5",
+            "scipy.integrate.solve_ivp; Hairer and Wanner 1996, IV.8",
+            7e-13,
+            _solve_ivp("Radau"),
+        ),
+        Method(
+            "reference",
+            "known solution, or Taylor series in decimal arithmetic",
+            "pyharness.reference",
+            2.0**-52,
+            _reference,
+        ),
+    )
+}
+SCIPY_METHODS = ("dop853", "rk45", "lsoda", "radau")

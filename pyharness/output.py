@@ -1,0 +1,46 @@
+"""Where results go: a file is there whole or not at all."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from pyharness.errors import InputError
+
+
+def check_writable(path: str, option: str) -> None:
+    """Refuse a path that can't be written, before anything is computed for it."""
+    target = Path(path)
+    folder = target.parent
+    try:
+        if target.is_dir():
+            reason = "is a folder"
+        elif not folder.is_dir():
+            reason = f"there is no folder '{folder}'"
+        elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
+            reason = "permission denied"
+        else:
+            return
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+    raise InputError(f"{option} '{path}': {reason}; give a file in a folder that can be written")
+
+
+def write_files(contents: dict[str, bytes], option: str) -> None:
+    """Write all files: each to a temporary name first, then all are renamed."""
+    written: list[tuple[str, str]] = []
+    try:
+        for path, content in contents.items():
+            handle, temporary = tempfile.mkstemp(dir=Path(path).parent, prefix=".pyharness-")
+            written.append((temporary, path))
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            # mkstemp is for the owner alone; a result is an ordinary file.
+            mask = os.umask(0)
+            os.umask(mask)
+            os.chmod(temporary, 0o666 & ~mask)
+        for temporary, path in written:
+            os.replace(temporary, path)
+    except OSError as error:
+        for temporary, _ in written:
+            Path(temporary).unlink(missing_ok=True)
+        raise InputError(f"{option} '{next(iter(contents))}': {error.strerror}") from None

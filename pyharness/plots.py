@@ -1,0 +1,139 @@
+"""Pictures: findings in, picture and its numbers out; nothing is computed here."""
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyharness.compare import Comparison
+from pyharness.errors import InputError
+from pyharness.tables import csv_text
+from pyharness.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMATS = ("png", "svg", "pdf")
+# Told apart without colour: by dash and width.
+_STYLES: dict[str, dict[str, Any]] = {
+    "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
+    "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
+    "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
+}
+_REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
+
+
+def check_picture(path: str) -> None:
+    """Refuse a picture that can't be made, before anything is computed for it."""
+    suffix = Path(path).suffix.lstrip(".").lower()
+    if suffix not in FORMATS:
+        raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise InputError("--plot needs matplotlib: 'pip install matplotlib'") from None
+
+
+def comparison_picture(comparison: Comparison, path: str) -> dict[str, bytes]:
+    """Draw components over time above the error, a column for each program.
+
+    Returns
+    -------
+    dict
+        Content by path: the picture, and beside it the plotted numbers as CSV.
+    """
+    from matplotlib.figure import Figure
+
+    names = list(dict.fromkeys(each.listing.program for each in comparison.programs))
+    figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), layout="constrained")
+    axes = figure.subplots(4, len(names), sharex=True, sharey="row", squeeze=False)
+    truth = comparison.reference
+    for column, name in enumerate(names):
+        axes[0, column].set_title(name)
+        axes[3, column].set_xlabel("time (s)")
+        for row in range(3):
+            axes[row, column].plot(truth.time, truth.omega[:, row], label="reference", **_REFERENCE)
+        for each in comparison.programs:
+            if each.listing.program != name:
+                continue
+            run, label = each.trajectory, each.listing.label
+            style = _STYLES[label]
+            for row in range(3):
+                axes[row, column].plot(run.time, run.omega[:, row], label=label, **style)
+                if run.ended != "complete":
+                    axes[row, column].plot(run.time[-1:], run.omega[-1:, row], "kx")
+            error = each.accuracy.error
+            shown = np.isfinite(error) & (error > 0.0)
+            axes[3, column].plot(run.time[: len(error)][shown], error[shown], label=label, **style)
+    for row in range(3):
+        axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        _frame(axes[row, 0], truth.omega[:, row])
+    axes[3, 0].set_yscale("log")
+    _limit_errors(axes[3, 0])
+    axes[3, 0].axhline(truth.error, color="black", linewidth=0.6)
+    axes[3, 0].set_ylabel("largest error of any $\\omega$ (rad/s)")
+    for column in range(len(names)):
+        axes[3, column].axhline(truth.error, color="black", linewidth=0.6)
+        axes[3, column].grid(visible=True, linewidth=0.3)
+    axes[0, 0].legend(loc="best", handlelength=4)
+    scene = comparison.scene
+    title = f"Case {scene.case}: {scene.name}" if scene.case else scene.name
+    ended = any(each.trajectory.ended != "complete" for each in comparison.programs)
+    note = "\nx: the program stopped or overflowed" if ended else ""
+    figure.suptitle(f"{title}; thin line: error of the reference{note}", fontsize=10)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
+    numbers = str(Path(path).with_suffix(".csv"))
+    return {path: buffer.getvalue(), numbers: _numbers(comparison).encode()}
+
+
+def trajectory_picture(title: str, trajectory: Trajectory, path: str) -> dict[str, bytes]:
+    """Draw the components of one trajectory over time; return content by path, with the CSV."""
+    from matplotlib.figure import Figure
+
+    from pyharness.tables import trajectory_rows
+
+    figure = Figure(figsize=(7.0, 7.0), layout="constrained")
+    axes = figure.subplots(3, 1, sharex=True)
+    for row in range(3):
+        axes[row].plot(trajectory.time, trajectory.omega[:, row], color="black", linewidth=1.2)
+        axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        axes[row].grid(visible=True, linewidth=0.3)
+    axes[2].set_xlabel("time (s)")
+    figure.suptitle(title, fontsize=10)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
+    numbers = csv_text(*trajectory_rows(trajectory))
+    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+
+
+def _frame(axes: "Axes", truth: np.ndarray) -> None:
+    """Keep the frame near the truth: a program that diverges leaves the picture."""
+    if not len(truth):
+        return
+    low, high = float(truth.min()), float(truth.max())
+    margin = max(0.6 * (high - low), 0.05 * max(abs(low), abs(high)), 1e-12)
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, low - margin), min(top, high + margin))
+
+
+def _limit_errors(axes: "Axes") -> None:
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, 1e-17), min(top, 1e4))
+
+
+def _numbers(comparison: Comparison) -> str:
+    head = ["method", "listing", "time", "omega1", "omega2", "omega3", "error"]
+    truth = comparison.reference
+    rows = [
+        ["reference", "", *map(repr, (t, *omega)), repr(truth.error)]
+        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
+    ]
+    for each in comparison.programs:
+        run = each.trajectory
+        errors = each.accuracy.error.tolist()
+        for t, omega, error in zip(run.time.tolist(), run.omega.tolist(), errors, strict=False):
+            rows.append([each.listing.program, each.listing.label])
+            rows[-1] += map(repr, (t, *omega, error))
+    return csv_text(head, rows)

@@ -1,0 +1,343 @@
+"""The reference: the true solution of a scene, with the error that it may have.
+
+Known solutions where there are any (sphere; symmetric body without torque), otherwise the
+Taylor series of equations 13-15 in decimal arithmetic. It shares no code with the methods it
+judges: exact coefficients, other arithmetic, other steps.
+"""
+
+import decimal
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from operator import mul
+
+import numpy as np
+
+from pyharness.errors import InputError
+from pyharness.scene import Scene
+from pyharness.trajectory import Array
+
+DIGITS = 40
+_FIRST = (20, Decimal("1e-19"))  # order, tolerance relative to the solution
+_SECOND = (26, Decimal("1e-25"))
+_MOST_STEPS = 100_000
+_HALF_ULP = 2.0**-53
+
+Row = list[Decimal]
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The true solution in binary64.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        s; where the solution leaves every bound, the rows end before.
+    omega : ndarray, shape (n, 3)
+        rad/s.
+    velocity : ndarray, shape (n, 3), or None
+        m/s, from the deck's masses and forces.
+    source : str
+        What it is.
+    estimate : float
+        Estimated error of any omega before rounding (rad/s).
+    """
+
+    time: Array
+    omega: Array
+    velocity: Array | None
+    source: str
+    estimate: float
+
+    @property
+    def error(self) -> float:
+        """Bound of the error of any omega: the estimate, and half a unit in the last place."""
+        largest = float(np.max(np.abs(self.omega), initial=0.0))
+        return self.estimate + _HALF_ULP * largest
+
+
+def reference(scene: Scene, times: Sequence[float], velocity: bool = False) -> Reference:
+    """Return the true solution of `scene` at `times`.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to solve; its step size plays no part.
+    times : sequence of float, shape (n,)
+        Strictly monotonic from 0 (s), forward or backward; the first may be 0.
+    velocity : bool
+        Whether the velocity is wanted too.
+
+    Returns
+    -------
+    Reference
+        Its `estimate` is the largest difference of two series of different order and step.
+
+    Raises
+    ------
+    InputError
+        Where the times do not lead away from 0, or the series needs too many steps.
+    """
+    away = [abs(t) for t in times]
+    one_side = min(times) >= 0.0 or max(times) <= 0.0
+    if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
+        raise InputError("reference: times must lead away from 0, strictly, on one side")
+    with decimal.localcontext() as context:
+        context.prec = DIGITS
+        context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
+        exact = [Decimal(t) for t in times]
+        known = known_solution(scene, exact)
+        if known is not None and not velocity:
+            return _rounded(times, known, None, "known solution", Decimal(1).scaleb(3 - DIGITS))
+        first = _series(scene, exact, False, *_FIRST)
+        second = _series(scene, exact, velocity, *_SECOND)
+        rows = min(len(first), len(second))
+        omega = [row[:3] for row in second[:rows]]
+        estimate = _largest_difference(first[:rows], omega)
+        speed = [row[3:] for row in second[:rows]] if velocity else None
+        source = f"Taylor series in {DIGITS}-digit arithmetic"
+        if known is not None:
+            estimate = max(estimate, _largest_difference(known[:rows], omega))
+            omega, source = known[:rows], "known solution"
+        return _rounded(times[:rows], omega, speed, source, estimate)
+
+
+def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
+    """Return the closed form of a sphere, or of a symmetric body without torque; else None."""
+    coefficients = _coefficients(scene)
+    if not any(coefficients):
+        return [_sphere(scene, t) for t in times]
+    if not scene.torque.is_zero:
+        return None
+    for axis in range(3):
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        # The coefficients of the other two axes are opposite: they turn in a circle.
+        if coefficients[axis] == 0 and coefficients[j] == -coefficients[k]:
+            omega = [Decimal(w) for w in scene.omega]
+            rate = coefficients[j] * omega[axis]
+            rows = []
+            for t in times:
+                sine, cosine = _sine_cosine(rate * t)
+                row = list(omega)
+                row[j] = omega[j] * cosine + omega[k] * sine
+                row[k] = omega[k] * cosine - omega[j] * sine
+                rows.append(row)
+            return rows
+    return None
+
+
+def _sphere(scene: Scene, t: Decimal) -> Row:
+    """Return omega(0) and the integral of the normalized torque."""
+    torque = scene.torque
+    row = []
+    for axis in range(3):
+        moment = Decimal(1) if scene.moments is None else Decimal(scene.moments[axis])
+        total = Decimal(torque.constant[axis]) * t + Decimal(torque.rate[axis]) * t * t / 2
+        for amplitude, frequency in torque.sines:
+            if frequency:
+                _, cosine = _sine_cosine(Decimal(frequency) * t)
+                total += Decimal(amplitude[axis]) * (1 - cosine) / Decimal(frequency)
+        for amplitude, frequency in torque.cosines:
+            sine, _ = _sine_cosine(Decimal(frequency) * t)
+            rate = Decimal(frequency)
+            total += Decimal(amplitude[axis]) * (sine / rate if frequency else t)
+        row.append(Decimal(scene.omega[axis]) + total / moment)
+    return row
+
+
+def _series(
+    scene: Scene, times: Sequence[Decimal], velocity: bool, order: int, tolerance: Decimal
+) -> list[Row]:
+    """Return omega (and velocity) at `times` by Taylor steps; fewer rows where it blows up."""
+    equations = _Equations(scene, velocity)
+    state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
+    begin = Decimal(0)
+    rows: list[Row] = []
+    for step in range(_MOST_STEPS):
+        coefficients = equations.expand(begin, state, order)
+        scale = max(map(abs, state[:3])) or Decimal(1)
+        rest = abs(times[-1] - begin)
+        length = _step(coefficients, scale * tolerance, rest).copy_sign(times[-1])
+        if begin + length == begin and rest:
+            return rows
+        if step == 0 and rest > 10 * _MOST_STEPS * abs(length):
+            break
+        while len(rows) < len(times) and abs(times[len(rows)]) <= abs(begin + length):
+            rows.append(_evaluate(coefficients, times[len(rows)] - begin))
+        if len(rows) == len(times):
+            return rows
+        state = _evaluate(coefficients, length)
+        begin += length
+    raise InputError(
+        f"reference: more than {_MOST_STEPS} Taylor steps would be needed; "
+        "take a shorter time, slower motion or slower torques"
+    )
+
+
+def _step(coefficients: list[Row], allowed: Decimal, rest: Decimal) -> Decimal:
+    """Return the step for which the last two terms of every series stay below `allowed`."""
+    order = len(coefficients[0]) - 1
+    length = rest
+    for k in (order - 1, order):
+        size = max(abs(series[k]) for series in coefficients)
+        if size:
+            # The root needs few digits; the exponent range is Decimal's.
+            step = ((allowed / size).ln() / k).exp()
+            length = min(length, step)
+    return length
+
+
+def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
+    values = []
+    for series in coefficients:
+        total = Decimal(0)
+        for coefficient in reversed(series):
+            total = total * t + coefficient
+        values.append(total)
+    return values
+
+
+class _Equations:
+    """Equations 13-15, and dV/dt = F/m - omega x V, as recurrences of Taylor coefficients."""
+
+    def __init__(self, scene: Scene, velocity: bool) -> None:
+        self._abc = _coefficients(scene)
+        self._torque = scene.torque
+        self._moments = [Decimal(i) for i in scene.moments or (1, 1, 1)]
+        self._velocity = velocity
+        self._acceleration = [
+            Decimal(f) / Decimal(m) for f, m in zip(scene.forces, scene.masses, strict=True)
+        ]
+
+    def expand(self, time: Decimal, state: Row, order: int) -> list[Row]:
+        """Return the Taylor coefficients 0 ... order of every unknown around `time`."""
+        series = [[x] for x in state]
+        torque = self._torque_series(time, order)
+        for k in range(order):
+            # Cauchy products of the coefficients 0 ... k.
+            backward = [list(reversed(each)) for each in series]
+            rates = [
+                self._abc[i] * _product(series[(i + 1) % 3], backward[(i + 2) % 3]) + torque[i][k]
+                for i in range(3)
+            ]
+            if self._velocity:
+                for i in range(3):
+                    j, m = (i + 1) % 3, (i + 2) % 3
+                    rate = _product(series[3 + j], backward[m])
+                    rate -= _product(series[3 + m], backward[j])
+                    rates.append(rate + (self._acceleration[i] if k == 0 else 0))
+            for each, rate in zip(series, rates, strict=True):
+                each.append(rate / (k + 1))
+        return series
+
+    def _torque_series(self, time: Decimal, order: int) -> list[Row]:
+        """Return the Taylor coefficients of the normalized torque around `time`."""
+        series = [[Decimal(0)] * order for _ in range(3)]
+        law = self._torque
+        for axis in range(3):
+            series[axis][0] += Decimal(law.constant[axis]) + Decimal(law.rate[axis]) * time
+            series[axis][1] += Decimal(law.rate[axis])
+        waves = [(wave, 0) for wave in law.sines] + [(wave, 1) for wave in law.cosines]
+        for (amplitude, frequency), quarter in waves:
+            rate = Decimal(frequency)
+            sine, cosine = _sine_cosine(rate * time)
+            # Derivatives of sin run sin, cos, -sin, -cos; those of cos start one later.
+            cycle = [sine, cosine, -sine, -cosine]
+            factor = Decimal(1)
+            for k in range(order):
+                term = cycle[(k + quarter) % 4] * factor
+                for axis in range(3):
+                    series[axis][k] += Decimal(amplitude[axis]) * term
+                factor = factor * rate / (k + 1)
+        for axis, moment in enumerate(self._moments):
+            series[axis] = [each / moment for each in series[axis]]
+        return series
+
+
+def _product(x: Row, reversed_y: Row) -> Decimal:
+    return sum(map(mul, x, reversed_y), Decimal(0))
+
+
+def _coefficients(scene: Scene) -> Row:
+    """Return A, B, C, exact to the digits of the arithmetic."""
+    if scene.coefficients is not None:
+        return [Decimal(x) for x in scene.coefficients]
+    assert scene.moments is not None
+    i1, i2, i3 = (Decimal(x) for x in scene.moments)
+    return [(i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3]
+
+
+def _sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
+    """Return sin and cos of any angle, by halving it and the addition theorem."""
+    with decimal.localcontext() as context:
+        context.prec += 12 + max(0, angle.adjusted())
+        angle = angle.remainder_near(2 * _pi(context.prec))
+        halvings = 8
+        x = angle / 2**halvings
+        square = x * x
+        sine, term, n = x, x, 1
+        while abs(term) > Decimal(1).scaleb(-context.prec):
+            n += 2
+            term = -term * square / (n * (n - 1))
+            sine += term
+        # versine 1 - cos keeps its digits where cos is near 1
+        versine, term, n = square / 2, square / 2, 2
+        while abs(term) > Decimal(1).scaleb(-context.prec):
+            n += 2
+            term = -term * square / (n * (n - 1))
+            versine += term
+        for _ in range(halvings):
+            sine, versine = 2 * sine * (1 - versine), 2 * versine * (2 - versine)
+        cosine = 1 - versine
+    return +sine, +cosine
+
+
+_PI: dict[int, Decimal] = {}
+
+
+def _pi(digits: int) -> Decimal:
+    """Return pi by Machin's formula."""
+    if digits not in _PI:
+        with decimal.localcontext() as context:
+            context.prec = digits + 5
+            _PI[digits] = 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)
+    return _PI[digits]
+
+
+def _arctan_inverse(n: int) -> Decimal:
+    power = Decimal(1) / n
+    total, k = power, 1
+    while abs(power) > Decimal(1).scaleb(-decimal.getcontext().prec):
+        power = -power / (n * n)
+        k += 2
+        total += power / k
+    return total
+
+
+def _largest_difference(first: Sequence[Row], second: Sequence[Row]) -> Decimal:
+    return max(
+        (abs(x - y) for p, q in zip(first, second, strict=True) for x, y in zip(p, q, strict=True)),
+        default=Decimal(0),
+    )
+
+
+def _rounded(
+    times: Sequence[float],
+    omega: Sequence[Row],
+    velocity: Sequence[Row] | None,
+    source: str,
+    estimate: Decimal,
+) -> Reference:
+    def array(rows: Sequence[Row]) -> Array:
+        return np.array([[float(x) for x in row] for row in rows]).reshape(-1, 3)
+
+    return Reference(
+        time=np.array(times, dtype=float),
+        omega=array(omega),
+        velocity=None if velocity is None else array(velocity),
+        source=source,
+        estimate=float(estimate) if estimate < Decimal(math.inf) else math.inf,
+    )

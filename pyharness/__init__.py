@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pyharness.errors import InputError, NotBuiltError
-    from pyharness.listing import Listing, corrected, original, subset
+    from pyharness.listing import Listing, subset
     from pyharness.scene import Scene, TorqueLaw
     from pyharness.scene_file import case_scene, read_scene
     from pyharness.trajectory import Stop, Trajectory
@@ -19,8 +19,6 @@ __all__ = [
     "TorqueLaw",
     "Trajectory",
     "case_scene",
-    "corrected",
-    "original",
     "read_scene",
     "subset",
 ]
@@ -28,7 +26,7 @@ __all__ = [
 # Names load their room when they are first asked for: a program that needs one pays for one.
 _ROOMS = {
     "errors": ("InputError", "NotBuiltError"),
-    "listing": ("Listing", "corrected", "original", "subset"),
+    "listing": ("Listing", "subset"),
     "scene": ("Scene", "TorqueLaw"),
     "scene_file": ("case_scene", "read_scene"),
     "trajectory": ("Stop", "Trajectory"),

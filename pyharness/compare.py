@@ -101,8 +101,10 @@ class Comparison:
                 found.append(f"{who}: Fortran and twin differ in {', '.join(each.differences)}")
             if each.misses_order:
                 order = PROGRAM_REGISTRY[each.listing.program].order
-                seen = "none" if each.order is None else f"{each.order:.1f}"
-                found.append(f"{who}: misses the reference, order {seen} where {order} belongs")
+                seen = "does not settle" if each.order is None else f"order {each.order:.1f}"
+                found.append(
+                    f"{who}: misses the reference as the step is halved: {seen}, due {order}"
+                )
         return tuple(found)
 
 
@@ -300,8 +302,8 @@ def measured_order(
     Returns
     -------
     float or None
-        The order; None where the error is that of rounding from the start, or where the step
-        never becomes small enough.
+        The order; None where the error is that of rounding from the start, or where the
+        program does not settle however small the step.
     bool
         Whether the program misses the reference by more than its order allows.
     """
@@ -327,7 +329,7 @@ def measured_order(
             order = math.log2(previous_error / error)
             return order, order < program.order - _ORDER_SLACK
         previous, previous_error = omega, error
-    return None, False
+    return None, True
 
 
 def _method(scene: Scene, name: str, tolerance: float, truth: Reference) -> MethodFinding:

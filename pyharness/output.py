@@ -12,7 +12,9 @@ def check_writable(path: str, option: str) -> None:
     target = Path(path)
     folder = target.parent
     try:
-        if target.is_dir():
+        if "\0" in path:
+            reason = "a path has no null character"
+        elif target.is_dir():
             reason = "is a folder"
         elif not folder.is_dir():
             reason = f"there is no folder '{folder}'"
@@ -26,10 +28,16 @@ def check_writable(path: str, option: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write all files: each to a temporary name first, then all are renamed."""
+    """Write all files: each to a temporary name first, then all are renamed.
+
+    What exists and is no ordinary file (a device, a pipe) is written to, never replaced.
+    """
     written: list[tuple[str, str]] = []
     try:
         for path, content in contents.items():
+            if Path(path).exists() and not Path(path).is_file():
+                Path(path).write_bytes(content)
+                continue
             handle, temporary = tempfile.mkstemp(dir=Path(path).parent, prefix=".pyharness-")
             written.append((temporary, path))
             with os.fdopen(handle, "wb") as file:
@@ -39,7 +47,8 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
             os.umask(mask)
             os.chmod(temporary, 0o666 & ~mask)
         for temporary, path in written:
-            os.replace(temporary, path)
+            # Through a link to what it names, as an ordinary write would go.
+            os.replace(temporary, os.path.realpath(path))
     except OSError as error:
         for temporary, _ in written:
             Path(temporary).unlink(missing_ok=True)

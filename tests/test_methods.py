@@ -1,0 +1,84 @@
+"""The registry: every method meets the tolerance that it was given, or says that it can't."""
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, case_scene
+from pyharness.methods import METHODS, SCIPY_METHODS, solve
+from pyharness.reference import reference
+
+
+@pytest.mark.parametrize("case", range(1, 8))
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_tolerance_is_on_the_error_at_the_times(method: str, case: int) -> None:
+    scene = case_scene(case)
+    times = [0.1, 0.55, 1.0]
+    truth = reference(scene, times)
+    for tolerance in (1e-4, 1e-7, 1e-10) if method != "radau" else (1e-4, 1e-7):
+        found = solve(scene, times, method, tolerance)
+        assert found.ended == "complete"
+        error = np.abs(found.omega - truth.omega).max() / np.abs(truth.omega).max()
+        assert error <= tolerance + 1e-14
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_times_may_run_either_way_on_either_side(method: str) -> None:
+    scene = case_scene(3)
+    forth = solve(scene, [0.25, 0.5], method, 1e-9)
+    back = solve(scene, [0.5, 0.25], method, 1e-9)
+    np.testing.assert_array_equal(forth.omega, back.omega[::-1])
+    np.testing.assert_array_equal(back.time, [0.5, 0.25])
+    past = solve(scene, [-0.5, -0.25, 0.0], method, 1e-9)
+    np.testing.assert_array_equal(past.omega[-1], scene.omega)
+    # Torque-free and omega1(0) = 0: reversing time only turns the sign of omega1.
+    np.testing.assert_allclose(
+        past.omega[:2], back.omega * np.array([-1.0, 1.0, 1.0]), rtol=0, atol=1e-7
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_solution_that_blows_up_returns_the_rows_until_then(method: str) -> None:
+    scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    found = solve(scene, [0.5, 0.9, 2.0], method, 1e-6)
+    assert found.ended == "overflow"
+    np.testing.assert_allclose(found.omega, [[2.0] * 3, [10.0] * 3], rtol=1e-5)
+
+
+@pytest.mark.parametrize("method", ["dop853", "reference"])
+def test_hopeless_scale_gives_up(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing hangs: the number of right-hand sides and of Taylor steps is bounded."""
+    monkeypatch.setattr("pyharness.methods._MOST_EVALUATIONS", 10_000)
+    scene = Scene("", (1e100, 1e100, 1e100), coefficients=(1.0, -1.0, 1.0))
+    with pytest.raises(InputError, match=r"gave up|Taylor steps"):
+        solve(scene, [2.0], method, 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ([], "none given"),
+        ([1.0, float("nan")], "not finite"),
+        ([-1.0, 1.0], "both sides"),
+        ([1.0, 1.0], "monotonic"),
+        ([1.0, 3.0, 2.0], "monotonic"),
+    ],
+)
+def test_times_are_checked(times: list[float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        solve(case_scene(3), times, "dop853", 1e-6)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-17, 2.0, float("nan")])
+def test_tolerance_is_checked(tolerance: float) -> None:
+    with pytest.raises(InputError, match="tolerance"):
+        solve(case_scene(3), [1.0], "dop853", tolerance)
+
+
+def test_unknown_method_names_the_nearest() -> None:
+    with pytest.raises(InputError, match="did you mean 'dop853'"):
+        solve(case_scene(3), [1.0], "dop835", 1e-6)
+
+
+def test_right_hand_sides_are_counted() -> None:
+    counts = [solve(case_scene(3), [1.0], "dop853", e).evaluations for e in (1e-4, 1e-8, 1e-12)]
+    assert 0 < counts[0] < counts[1] < counts[2]

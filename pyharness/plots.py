@@ -70,12 +70,11 @@ def comparison_picture(comparison: Comparison, path: str) -> dict[str, bytes]:
         axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         _frame(axes[row, 0], truth.omega[:, row])
     axes[3, 0].set_yscale("log")
-    _limit_errors(axes[3, 0])
-    axes[3, 0].axhline(truth.error, color="black", linewidth=0.6)
-    axes[3, 0].set_ylabel("largest error of any $\\omega$ (rad/s)")
+    axes[3, 0].set_ylabel("error of any $\\omega$ (rad/s)")
     for column in range(len(names)):
-        axes[3, column].axhline(truth.error, color="black", linewidth=0.6)
+        axes[3, column].axhline(truth.error, color="black", linewidth=0.8)
         axes[3, column].grid(visible=True, linewidth=0.3)
+    _limit_errors(axes[3, 0])
     axes[0, 0].legend(loc="best", handlelength=4)
     scene = comparison.scene
     title = f"Case {scene.case}: {scene.name}" if scene.case else scene.name

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from pyharness.compare import Accuracy, Comparison
+from pyharness.agreement import Accuracy
+from pyharness.compare import Comparison
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.tables import aligned, heading, markdown_text, short, wrapped
 from pyharness.trajectory import Stop, Trajectory

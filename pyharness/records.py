@@ -5,8 +5,9 @@ import math
 from dataclasses import asdict
 from typing import Any
 
+from pyharness.agreement import Accuracy
 from pyharness.build import Build
-from pyharness.compare import Accuracy, Comparison
+from pyharness.compare import Comparison
 from pyharness.listing import Listing
 from pyharness.scene import Scene, Wave
 from pyharness.trajectory import Trajectory

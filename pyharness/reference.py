@@ -15,6 +15,7 @@ from operator import mul
 
 import numpy as np
 
+from pyharness.decimal_functions import sine_cosine
 from pyharness.errors import InputError
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
@@ -120,7 +121,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
             rate = coefficients[j] * omega[axis]
             rows = []
             for t in times:
-                sine, cosine = _sine_cosine(rate * t)
+                sine, cosine = sine_cosine(rate * t)
                 row = list(omega)
                 row[j] = omega[j] * cosine + omega[k] * sine
                 row[k] = omega[k] * cosine - omega[j] * sine
@@ -138,10 +139,10 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
         total = Decimal(torque.constant[axis]) * t + Decimal(torque.rate[axis]) * t * t / 2
         for amplitude, frequency in torque.sines:
             if frequency:
-                _, cosine = _sine_cosine(Decimal(frequency) * t)
+                _, cosine = sine_cosine(Decimal(frequency) * t)
                 total += Decimal(amplitude[axis]) * (1 - cosine) / Decimal(frequency)
         for amplitude, frequency in torque.cosines:
-            sine, _ = _sine_cosine(Decimal(frequency) * t)
+            sine, _ = sine_cosine(Decimal(frequency) * t)
             rate = Decimal(frequency)
             total += Decimal(amplitude[axis]) * (sine / rate if frequency else t)
         row.append(Decimal(scene.omega[axis]) + total / moment)
@@ -243,7 +244,7 @@ class _Equations:
         waves = [(wave, 0) for wave in law.sines] + [(wave, 1) for wave in law.cosines]
         for (amplitude, frequency), quarter in waves:
             rate = Decimal(frequency)
-            sine, cosine = _sine_cosine(rate * time)
+            sine, cosine = sine_cosine(rate * time)
             # Derivatives of sin run sin, cos, -sin, -cos; those of cos start one later.
             cycle = [sine, cosine, -sine, -cosine]
             factor = Decimal(1)
@@ -268,53 +269,6 @@ def _coefficients(scene: Scene) -> Row:
     assert scene.moments is not None
     i1, i2, i3 = (Decimal(x) for x in scene.moments)
     return [(i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3]
-
-
-def _sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
-    """Return sin and cos of any angle, by halving it and the addition theorem."""
-    with decimal.localcontext() as context:
-        context.prec += 12 + max(0, angle.adjusted())
-        angle = angle.remainder_near(2 * _pi(context.prec))
-        halvings = 8
-        x = angle / 2**halvings
-        square = x * x
-        sine, term, n = x, x, 1
-        while abs(term) > Decimal(1).scaleb(-context.prec):
-            n += 2
-            term = -term * square / (n * (n - 1))
-            sine += term
-        # versine 1 - cos keeps its digits where cos is near 1
-        versine, term, n = square / 2, square / 2, 2
-        while abs(term) > Decimal(1).scaleb(-context.prec):
-            n += 2
-            term = -term * square / (n * (n - 1))
-            versine += term
-        for _ in range(halvings):
-            sine, versine = 2 * sine * (1 - versine), 2 * versine * (2 - versine)
-        cosine = 1 - versine
-    return +sine, +cosine
-
-
-_PI: dict[int, Decimal] = {}
-
-
-def _pi(digits: int) -> Decimal:
-    """Return pi by Machin's formula."""
-    if digits not in _PI:
-        with decimal.localcontext() as context:
-            context.prec = digits + 5
-            _PI[digits] = 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)
-    return _PI[digits]
-
-
-def _arctan_inverse(n: int) -> Decimal:
-    power = Decimal(1) / n
-    total, k = power, 1
-    while abs(power) > Decimal(1).scaleb(-decimal.getcontext().prec):
-        power = -power / (n * n)
-        k += 2
-        total += power / k
-    return total
 
 
 def _largest_difference(first: Sequence[Row], second: Sequence[Row]) -> Decimal:

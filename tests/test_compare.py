@@ -12,8 +12,9 @@ import pytest
 
 from pyharness import InputError, case_scene
 from pyharness import compare as room
+from pyharness.agreement import accuracy, ulps
 from pyharness.build import build
-from pyharness.compare import accuracy, compare, listings_for, ulps
+from pyharness.compare import compare, listings_for
 from pyharness.comparison_tables import (
     comparison_markdown,
     comparison_rows,

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from pyharness import kernels
-from pyharness.compare import differences, measured_order
+from pyharness.agreement import differences
+from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.reference import reference
 from pyharness.scene_file import case_scene

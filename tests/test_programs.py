@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pyharness import kernels
-from pyharness.compare import differences, distance, measured_order
+from pyharness.agreement import differences, distance
+from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, corrected, names_of, original, subset
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.reference import reference

@@ -1,0 +1,51 @@
+"""Sine and cosine in the decimal arithmetic of the reference, to all its digits."""
+
+import decimal
+from decimal import Decimal
+
+
+def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
+    """Return sin and cos of any angle, by halving it and the addition theorem."""
+    with decimal.localcontext() as context:
+        context.prec += 12 + max(0, angle.adjusted())
+        angle = angle.remainder_near(2 * _pi(context.prec))
+        halvings = 8
+        x = angle / 2**halvings
+        square = x * x
+        sine, term, n = x, x, 1
+        while abs(term) > Decimal(1).scaleb(-context.prec):
+            n += 2
+            term = -term * square / (n * (n - 1))
+            sine += term
+        # versine 1 - cos keeps its digits where cos is near 1
+        versine, term, n = square / 2, square / 2, 2
+        while abs(term) > Decimal(1).scaleb(-context.prec):
+            n += 2
+            term = -term * square / (n * (n - 1))
+            versine += term
+        for _ in range(halvings):
+            sine, versine = 2 * sine * (1 - versine), 2 * versine * (2 - versine)
+        cosine = 1 - versine
+    return +sine, +cosine
+
+
+_PI: dict[int, Decimal] = {}
+
+
+def _pi(digits: int) -> Decimal:
+    """Return pi by Machin's formula."""
+    if digits not in _PI:
+        with decimal.localcontext() as context:
+            context.prec = digits + 5
+            _PI[digits] = 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)
+    return _PI[digits]
+
+
+def _arctan_inverse(n: int) -> Decimal:
+    power = Decimal(1) / n
+    total, k = power, 1
+    while abs(power) > Decimal(1).scaleb(-decimal.getcontext().prec):
+        power = -power / (n * n)
+        k += 2
+        total += power / k
+    return total

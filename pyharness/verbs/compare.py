@@ -1,0 +1,62 @@
+"""`compare`: original against corrected, Fortran against Python, all against the truth."""
+
+import argparse
+
+from pyharness import comparison_tables as views
+from pyharness import options as shared
+from pyharness.compare import compare, listings_for
+from pyharness.errors import InputError, unknown
+from pyharness.listing import PROGRAMS
+from pyharness.methods import METHODS, SCIPY_METHODS
+
+
+def declare(parser: shared.Parser) -> None:
+    """Declare the options."""
+    shared.add_scene_options(parser)
+    shared.add_listing_options(parser)
+    parser.add_argument("--program", metavar="P", help="this program only")
+    parser.add_argument("--tolerance", metavar="E", help="asked of solve_ivp (default 1e-8)")
+    shared.add_output_options(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare and show; 1 where something is not as it should be."""
+    scene = shared.chosen_scene(options)
+    if options.program is not None and options.program not in PROGRAMS:
+        raise unknown("program", options.program, PROGRAMS, "--program")
+    form = shared.chosen_format(options, shared.FORMATS)
+    shared.check_base(options)
+    tolerance = shared.positive(options.tolerance, "--tolerance", 1e-8)
+    finest = max(METHODS[name].finest for name in SCIPY_METHODS)
+    if not finest <= tolerance <= 1.0:
+        raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:g} to 1")
+    lipschitz = shared.positive(options.lipschitz, "--lipschitz", shared.default_lipschitz())
+    listings = listings_for(
+        PROGRAMS if options.program is None else (options.program,),
+        options.listing,
+        shared.names(options.fix),
+        shared.names(options.keep),
+        shared.names(options.reading),
+    )
+    shared.check_outputs(options)
+    found = compare(scene, listings, lipschitz, not options.no_stop, tolerance)
+
+    if form == "json":
+        from pyharness.build import build
+        from pyharness.records import comparison_record, json_text
+
+        text = json_text(comparison_record(found, build()))
+    elif form == "csv":
+        from pyharness.tables import csv_text
+
+        text = csv_text(*views.comparison_rows(found))
+    elif form == "markdown":
+        text = views.comparison_markdown(found)
+    else:
+        text = views.comparison_table(found)
+    if options.plot is not None:
+        from pyharness.plots import comparison_picture
+
+        shared.write(comparison_picture(found, options.plot), "--plot")
+    shared.emit(text, options.out)
+    return 1 if found.unexpected else 0

@@ -12,6 +12,8 @@ from pyharness.errors import InputError, NotBuiltError, unknown
 VERBS = {
     "compare": "original against corrected, Fortran against Python, all against the truth",
     "run": "one trajectory: a program of the appendix, or a method",
+    "defects": "the apparatus: every defect and reading, the evidence, and its effect",
+    "limits": "what the programs as punched tend to as the step goes to zero",
     "doctor": "what is built, with what, and what is missing",
 }
 

@@ -2,8 +2,9 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pyharness.agreement import Accuracy
 from pyharness.build import Build
@@ -11,6 +12,9 @@ from pyharness.compare import Comparison
 from pyharness.listing import Listing
 from pyharness.scene import Scene, Wave
 from pyharness.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from pyharness.ablation import CaseEffects, Effect
 
 SCHEMA = 1
 
@@ -72,6 +76,33 @@ def comparison_record(comparison: Comparison, build: Build) -> dict[str, Any]:
         ],
         "unexpected": list(comparison.unexpected),
         "build": asdict(build),
+    }
+
+
+def effects_record(effects: Sequence["CaseEffects"]) -> list[dict[str, Any]]:
+    """Return what a defect does, by program and case."""
+    return [
+        {
+            "program": each.program,
+            "case": each.case,
+            "punched": effect_record(each.punched),
+            "mended_alone": effect_record(each.mended_alone),
+            "kept_alone": effect_record(each.kept_alone),
+            "mended": effect_record(each.mended),
+        }
+        for each in effects
+    ]
+
+
+def effect_record(effect: "Effect") -> dict[str, Any]:
+    """Return what one listing makes of a scene."""
+    return {
+        "listing": listing_record(effect.listing),
+        "error": effect.omega,
+        "velocity_error": effect.velocity,
+        "steps": effect.steps,
+        "ended": effect.ended,
+        "stop": None if effect.stop is None else asdict(effect.stop),
     }
 
 

@@ -6,8 +6,9 @@ from pyharness import comparison_tables as views
 from pyharness import options as shared
 from pyharness.compare import compare, listings_for
 from pyharness.errors import InputError, unknown
-from pyharness.listing import PROGRAMS
+from pyharness.listing import PROGRAMS, names_of
 from pyharness.methods import METHODS, SCIPY_METHODS
+from pyharness.scene import Scene
 
 
 def declare(parser: shared.Parser) -> None:
@@ -16,6 +17,9 @@ def declare(parser: shared.Parser) -> None:
     shared.add_listing_options(parser)
     parser.add_argument("--program", metavar="P", help="this program only")
     parser.add_argument("--tolerance", metavar="E", help="asked of solve_ivp (default 1e-8)")
+    parser.add_argument(
+        "--ablate", action="store_true", help="every subset of the defects, sorted by effect"
+    )
     shared.add_output_options(parser)
 
 
@@ -30,6 +34,8 @@ def run(options: argparse.Namespace) -> int:
     finest = max(METHODS[name].finest for name in SCIPY_METHODS)
     if not finest <= tolerance <= 1.0:
         raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:g} to 1")
+    if options.ablate:
+        return _ablate(options, scene, form)
     lipschitz = shared.positive(options.lipschitz, "--lipschitz", shared.default_lipschitz())
     listings = listings_for(
         PROGRAMS if options.program is None else (options.program,),
@@ -60,3 +66,38 @@ def run(options: argparse.Namespace) -> int:
         shared.write(comparison_picture(found, options.plot), "--plot")
     shared.emit(text, options.out)
     return 1 if found.unexpected else 0
+
+
+def _ablate(options: argparse.Namespace, scene: Scene, form: str) -> int:
+    meaningless = ("listing", "fix", "keep", "lipschitz", "no_stop", "tolerance", "plot")
+    shared.refuse(options, "--ablate", meaningless)
+    programs = PROGRAMS if options.program is None else (options.program,)
+    readings = shared.names(options.reading)
+    for name in readings:
+        allowed = [known for program in programs for known in names_of("reading", program)]
+        if name not in allowed:
+            raise unknown("reading", name, allowed, "--reading")
+    shared.check_outputs(options)
+
+    from pyharness.ablation import lattice
+    from pyharness.apparatus_tables import lattice_rows, lattice_table
+    from pyharness.records import SCHEMA, effect_record, json_text, scene_record
+    from pyharness.tables import csv_text, markdown_text
+
+    found = {}
+    for program in programs:
+        own = tuple(name for name in readings if name in names_of("reading", program))
+        found[program] = lattice(scene, program, own)
+    if form == "table":
+        parts = [lattice_table(scene, program, effects) for program, effects in found.items()]
+        text = "\n".join(parts)
+    elif form == "json":
+        effects = {name: [effect_record(e) for e in each] for name, each in found.items()}
+        record = {"schema": SCHEMA, "scene": scene_record(scene), "lattice": effects}
+        text = json_text(record)
+    else:
+        tables = [lattice_rows(program, effects) for program, effects in found.items()]
+        rows = [row for _, part in tables for row in part]
+        text = (csv_text if form == "csv" else markdown_text)(tables[0][0], rows)
+    shared.emit(text, options.out)
+    return 0

@@ -78,9 +78,9 @@ def add_listing_options(parser: Parser) -> None:
     )
 
 
-def add_output_options(parser: Parser) -> None:
+def add_output_options(parser: Parser, formats: Sequence[str] = FORMATS) -> None:
     """Declare where results go, and in what form."""
-    parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
+    parser.add_argument("--format", metavar="F", help=", ".join(formats))
     parser.add_argument("--plot", metavar="FILE", help="draw a picture, with its numbers as CSV")
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
 
@@ -225,9 +225,11 @@ def write(contents: dict[str, bytes], option: str) -> None:
     write_files(contents, option)
 
 
-def emit(text: str, out: str | None) -> None:
+def emit(content: str | bytes, out: str | None) -> None:
     """Write to the terminal, or to the file asked for."""
-    if out is None:
-        sys.stdout.write(text)
+    if out is not None:
+        write({out: content if isinstance(content, bytes) else content.encode()}, "--out")
+    elif isinstance(content, bytes):
+        sys.stdout.buffer.write(content)
     else:
-        write({out: text.encode()}, "--out")
+        sys.stdout.write(content)

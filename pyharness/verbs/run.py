@@ -1,6 +1,7 @@
 """`run`: one trajectory, of a program of the appendix or of a method."""
 
 import argparse
+import sys
 
 from pyharness import methods, tables
 from pyharness import options as shared
@@ -9,6 +10,9 @@ from pyharness.listing import PROGRAMS, Listing
 from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
 
+# What only a program wrote: its printer page, and its tape.
+PROGRAM_FORMATS = ("printer", "tape5")
+FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 
 def declare(parser: shared.Parser) -> None:
     """Declare the options."""
@@ -23,25 +27,36 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--tolerance", metavar="E", help="error at these times over the largest |omega| (methods)"
     )
-    shared.add_output_options(parser)
+    shared.add_output_options(parser, FORMATS)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run and show."""
     scene = shared.chosen_scene(options)
-    form = shared.chosen_format(options, shared.FORMATS)
+    form = shared.chosen_format(options, FORMATS)
     if (options.program is None) == (options.method is None):
         raise InputError(
             f"run: give either --program ({', '.join(PROGRAMS)}) "
             f"or --method ({', '.join(methods.METHODS)})"
         )
+    if form in PROGRAM_FORMATS:
+        _check_program_format(options, scene, form)
     listing: Listing | None = None
     if options.program is not None:
         name, listing, title, trajectory = _program(options, scene)
     else:
         name, title, trajectory = _method(options, scene)
 
-    if form == "json":
+    text: str | bytes
+    if form == "printer":
+        from pyharness.printer import page
+
+        text = page(scene, name, trajectory)
+    elif form == "tape5":
+        from pyharness.tape5 import records
+
+        text = records(trajectory)
+    elif form == "json":
         from pyharness.build import build
         from pyharness.records import json_text, run_record
 
@@ -59,6 +74,21 @@ def run(options: argparse.Namespace) -> int:
         shared.write(picture, "--plot")
     shared.emit(text, options.out)
     return 0
+
+
+def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
+    """Refuse a page or a tape that no program could have written, or no one could read."""
+    if options.program is None:
+        raise InputError(
+            f"--format {form} has no meaning with --method; allowed: {', '.join(shared.FORMATS)}"
+        )
+    if form == "printer" and scene.moments is None:
+        raise InputError(
+            "--format printer: the page begins with the moments, and this scene has only "
+            f"coefficients; give moments, or one of {', '.join(shared.FORMATS)}"
+        )
+    if form == "tape5" and options.out is None and sys.stdout.isatty():
+        raise InputError("--format tape5 is binary; give --out FILE, or a pipe")
 
 
 def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, str, Trajectory]:

@@ -14,6 +14,7 @@ from pyharness.trajectory import Trajectory
 PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 
+
 def declare(parser: shared.Parser) -> None:
     """Declare the options."""
     shared.add_scene_options(parser)

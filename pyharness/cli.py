@@ -14,6 +14,7 @@ VERBS = {
     "run": "one trajectory: a program of the appendix, or a method",
     "defects": "the apparatus: every defect and reading, the evidence, and its effect",
     "limits": "what the programs as punched tend to as the step goes to zero",
+    "figures": "Figures 6 to 12 of the thesis, as punched and mended: SVG, PNG, CSV",
     "doctor": "what is built, with what, and what is missing",
 }
 

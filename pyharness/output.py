@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 from pyharness.errors import InputError
@@ -53,3 +54,34 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
         for temporary, _ in written:
             Path(temporary).unlink(missing_ok=True)
         raise InputError(f"{option} '{next(iter(contents))}': {error.strerror}") from None
+
+
+def check_folder(path: str, names: Iterable[str], option: str) -> None:
+    """Refuse a folder in which `names` can't be written, before anything is computed for it."""
+    folder = Path(path)
+    if not path or "\0" in path or os.path.lexists(folder):
+        if not path or "\0" in path or not folder.is_dir():
+            raise InputError(f"{option} '{path}': is not a folder; give one, or a new name")
+        for name in names:
+            check_writable(str(folder / name), option)
+    elif not folder.parent.is_dir() or not os.access(folder.parent, os.W_OK):
+        raise InputError(
+            f"{option} '{path}': can't be made in '{folder.parent}'; "
+            "give a folder, or a new name in a folder that can be written"
+        )
+
+
+def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
+    """Write all files into a folder, which is made if it is missing; all or nothing."""
+    folder = Path(path)
+    made = not folder.is_dir()
+    try:
+        if made:
+            folder.mkdir()
+        write_files({str(folder / name): content for name, content in contents.items()}, option)
+    except OSError as error:
+        raise InputError(f"{option} '{path}': {error.strerror}") from None
+    except InputError:
+        if made:
+            folder.rmdir()
+        raise

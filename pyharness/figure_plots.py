@@ -25,15 +25,15 @@ _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth":
 _STYLES: dict[str, dict[str, Any]] = {
     "two-term": {
         "color": "#1040a0", "linestyle": (0, (6, 2)), "linewidth": 1.3,
-        "marker": "o", "markevery": (4, 15),
+        "marker": "o", "markevery": (2, 15),
     },
     "four-term": {
         "color": "#000000", "linestyle": (0, (1, 1.3)), "linewidth": 1.9,
-        "marker": "s", "markevery": (9, 15),
+        "marker": "s", "markevery": (7, 15),
     },
     "runge-kutta": {
         "color": "#b02018", "linestyle": "-", "linewidth": 0.9,
-        "marker": "^", "markevery": (14, 15),
+        "marker": "^", "markevery": (12, 15),
     },
 }  # fmt: skip
 _MARKERS: dict[str, Any] = {"markersize": 5.5, "markerfacecolor": "white", "markeredgewidth": 1.1}
@@ -70,6 +70,7 @@ def files(finding: Finding) -> dict[str, bytes]:
             _draw(axes[row], curve, row, bottom, top)
         axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         axes[row].grid(visible=True, linewidth=0.3)
+        axes[row].ticklabel_format(useOffset=False)
     axes[2].set_xlabel("time (s)")
     axes[2].set_xlim(0.0, finding.scene.steps * finding.scene.step_size)
     handles, labels = axes[0].get_legend_handles_labels()
@@ -114,52 +115,60 @@ def ending(curve: Curve) -> str:
     return f"overflow after step {run.steps}" if run.ended != "complete" else ""
 
 
+def _label(curve: Curve) -> str:
+    name, end = curve.listing.program, ending(curve)
+    return f"{name} ({end})" if end else name
+
+
 def _heading(finding: Finding) -> str:
     plan, scene = finding.plan, finding.scene
     title = f"{plan.title}. Case {scene.case}: {scene.name}; {_SETS[plan.set]}"
     note = f"Reference: {finding.reference.source}."
     if any(ending(curve) for curve in finding.curves):
         note += " Cross: the program ends."
-    return "\n".join([title, *textwrap.wrap(f"{plan.caption} {note}", 92)])
+    return "\n".join([title, *textwrap.wrap(plan.caption, 96), note])
 
 
 def _draw(axes: "Axes", curve: Curve, row: int, bottom: float, top: float) -> None:
     run = curve.trajectory
-    name, end = curve.listing.program, ending(curve)
+    name = curve.listing.program
     height = top - bottom
     # Far outside the frame a renderer loses its way: there the curve may be anywhere.
     shown = np.clip(run.omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
-    label = f"{name} ({end})" if end else name
-    axes.plot(run.time, shown, label=label, zorder=3, **_STYLES[name], **_MARKERS)
-    if end and len(run.time):
+    axes.plot(run.time, shown, label=_label(curve), zorder=3, **_STYLES[name], **_MARKERS)
+    if ending(curve) and len(run.time):
         axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
 
 
 def _frame(finding: Finding, row: int) -> tuple[float, float]:
-    """Return the frame: all that stays near the reference; what diverges leaves it."""
-    truth: Array = finding.reference.omega[:, row]
-    low, high = float(truth.min()), float(truth.max())
-    room = max(0.6 * (high - low), 0.01 * max(abs(low), abs(high)), 1e-12)
+    """Return the frame: all of what stays near the reference; what diverges leaves it."""
+    truth: Array = finding.reference.omega
+    least, largest = float(truth[:, row].min()), float(truth[:, row].max())
+    # A curve further off than the fastest turn of the body is on its way out of every picture.
+    far = float(np.abs(truth).max())
+    near = max(0.6 * (largest - least), 0.01 * far)
+    low, high = least, largest
     for curve in finding.curves:
         omega = curve.trajectory.omega[:, row]
-        if len(omega):
-            low = min(low, max(float(omega.min()), float(truth.min()) - room))
-            high = max(high, min(float(omega.max()), float(truth.max()) + room))
-    margin = max(0.06 * (high - low), 0.005 * max(abs(low), abs(high)), 1e-12)
+        bottom, top = float(omega.min(initial=least)), float(omega.max(initial=largest))
+        low = min(low, bottom if bottom > least - far else least - near)
+        high = max(high, top if top < largest + far else largest + near)
+    margin = max(0.06 * (high - low), 0.001 * far, 1e-12)
     return low - margin, high + margin
 
 
 def figures_table(findings: Sequence[Finding]) -> str:
     """Return the list of files, a line for each figure."""
     endings = ",".join(ENDINGS)
-    rows = []
-    for finding in findings:
-        ends = [f"{each.listing.program} {ending(each)}" for each in finding.curves if ending(each)]
-        curves = ", ".join(finding.plan.programs)
-        rows.append([f"{finding.plan.stem}.{{{endings}}}", str(finding.plan.case), curves])
-        rows[-1].append("; ".join(ends) or "-")
-    head = ("files", "case", "programs", "ends early")
-    return "\n".join(aligned(head, rows, left=4)) + "\n"
+    rows = [
+        [
+            f"{finding.plan.stem}.{{{endings}}}",
+            str(finding.plan.case),
+            ", ".join(_label(curve) for curve in finding.curves),
+        ]
+        for finding in findings
+    ]
+    return "\n".join(aligned(("files", "case", "curves"), rows, left=3)) + "\n"
 
 
 def figures_record(findings: Sequence[Finding], build: "Build") -> dict[str, Any]:

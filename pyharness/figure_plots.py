@@ -73,6 +73,7 @@ def files(finding: Finding) -> dict[str, bytes]:
         axes[row].ticklabel_format(useOffset=False)
     axes[2].set_xlabel("time (s)")
     axes[2].set_xlim(0.0, finding.scene.steps * finding.scene.step_size)
+    figure.align_ylabels()
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside lower center", ncols=2, handlelength=5.0, frameon=False
@@ -126,7 +127,7 @@ def _heading(finding: Finding) -> str:
     note = f"Reference: {finding.reference.source}."
     if any(ending(curve) for curve in finding.curves):
         note += " Cross: the program ends."
-    return "\n".join([title, *textwrap.wrap(plan.caption, 96), note])
+    return "\n".join([title, *textwrap.wrap(plan.caption, 98), note])
 
 
 def _draw(axes: "Axes", curve: Curve, row: int, bottom: float, top: float) -> None:

@@ -15,6 +15,7 @@ VERBS = {
     "defects": "the apparatus: every defect and reading, the evidence, and its effect",
     "limits": "what the programs as punched tend to as the step goes to zero",
     "figures": "Figures 6 to 12 of the thesis, as punched and mended: SVG, PNG, CSV",
+    "claims": "every statement of the thesis about results, judged",
     "doctor": "what is built, with what, and what is missing",
 }
 

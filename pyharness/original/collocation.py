@@ -1,4 +1,4 @@
-"""One interval of the collocation of IV.2, for any number of terms.
+"""One interval of the collocation of IV.2, for up to five terms.
 
 Every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34) whose derivative meets the
 right-hand side at as many points as there are terms (eq. 36). The right-hand side needs the
@@ -46,7 +46,10 @@ def interval(
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
     """Return the coefficients c1, c2, ... of every unknown whose derivative meets `rates`."""
-    matrix = [[1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t)][: len(points)] for t in points]
+    matrix = [
+        [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]
+        for t in points
+    ]
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(matrix, by_unknown)
 
@@ -54,7 +57,7 @@ def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[flo
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
     """Return x(0) + c1 t + c2 t**2 + ... for every unknown, added in this order."""
     t2 = t * t
-    powers = [t, t2, t2 * t, t2 * t2]
+    powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]
     result = []
     for x, unknown in zip(start, coefficients, strict=True):
         total = x

@@ -16,6 +16,7 @@ VERBS = {
     "limits": "what the programs as punched tend to as the step goes to zero",
     "figures": "Figures 6 to 12 of the thesis, as punched and mended: SVG, PNG, CSV",
     "claims": "every statement of the thesis about results, judged",
+    "family": "the weighted residual methods: orders derived, and orders measured",
     "doctor": "what is built, with what, and what is missing",
 }
 

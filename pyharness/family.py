@@ -5,21 +5,18 @@ omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, as it is a
 each correction takes f along the estimate before it and chooses the c's so that the integrals of
 W (omega' - f) vanish (eq. 26). The thesis does one correction.
 
-With f known along the step the conditions are linear, and the derivative that they give is a
-projection of f on the polynomials of degree n - 1. Done once on the unit interval s = t / h, with
-Legendre polynomials as basis, the projection becomes a few well conditioned numbers that do not
-depend on the step: the `Tableau`. The c's themselves are never formed.
+What a correction does is the same in every step: see `pyharness.family_tableau`.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from numpy.polynomial import legendre
+from numpy.polynomial import Polynomial
 
 from pyharness.errors import InputError, unknown
+from pyharness.family_tableau import basis, grid, tableau
 from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
@@ -90,7 +87,7 @@ class Member:
                 raise InputError(f"points: {point:g}; allowed: 0 to 1, in parts of the step")
         if len(set(points)) < len(points):
             raise InputError("points: one is given twice; allowed: different points")
-        if np.linalg.cond(_basis(np.array(points), self.terms)) > _WORST_CONDITION:
+        if np.linalg.cond(basis(np.array(points), self.terms)) > _WORST_CONDITION:
             raise InputError("points: too close together for binary64; take them further apart")
 
     @property
@@ -103,93 +100,6 @@ class Member:
         return ",".join(f"{point:g}" for point in self.points)
 
 
-@dataclass(frozen=True, eq=False)
-class Tableau:
-    """What a correction does on the unit interval; in form it is a Runge-Kutta scheme.
-
-    Attributes
-    ----------
-    nodes : ndarray, shape (m,)
-        Where f is wanted, in parts of the step: the points of collocation, or those of the
-        quadrature of the weighted integrals.
-    matrix : ndarray, shape (m, m)
-        The next estimate at the nodes is omega(0) + h matrix f.
-    weights : ndarray, shape (m,)
-        The result of the step is omega(0) + h weights f.
-    """
-
-    nodes: Array
-    matrix: Array
-    weights: Array
-
-
-@cache
-def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
-    """Solve the weighted residual conditions on the unit interval.
-
-    Parameters
-    ----------
-    weighting, terms, points
-        As in `Member`.
-
-    Returns
-    -------
-    Tableau
-        The quadrature is exact for polynomials: along a trial function the products of
-        equations 13-15 have degree 2n, the weights have up to n (Galerkin), n - 1 (least
-        squares) or, in each subdomain, 0; m points of Gauss and Legendre integrate degree
-        2m - 1. A torque that varies with time leaves an error of the power 2m of the step or
-        smaller, above every order of the family.
-    """
-    n = terms
-    if weighting == "collocation":
-        nodes = _points(points, n)
-        projection = np.linalg.inv(_basis(nodes, n))
-    else:
-        if weighting == "subdomain":
-            part, quadrature = _gauss(n + 1)
-            nodes = ((np.arange(n)[:, None] + part) / n).ravel()
-            quadrature = np.tile(quadrature / n, n)
-            tests = np.repeat(np.eye(n), n + 1, axis=0)
-        else:
-            degree = 3 * n if weighting == "galerkin" else 3 * n - 1
-            nodes, quadrature = _gauss(degree // 2 + 1)
-            # Polynomials that span the same weights as t ... t**n, or 1 ... t**(n-1).
-            tests = _basis(nodes, n)
-            if weighting == "galerkin":
-                tests = tests * nodes[:, None]
-        weighted = (tests * quadrature[:, None]).T
-        projection = np.linalg.solve(weighted @ _basis(nodes, n), weighted)
-    return Tableau(nodes, _integrals(nodes, n) @ projection, projection[0])
-
-
-def _points(points: str | tuple[float, ...] | None, n: int) -> Array:
-    if points == "gauss":
-        return _gauss(n)[0]
-    if points is None or points == "thesis":
-        return np.arange(1, n + 1) / (n + 1)
-    return np.array(points, dtype=float)
-
-
-def _gauss(m: int) -> tuple[Array, Array]:
-    """Return nodes and weights of Gauss and Legendre on the unit interval."""
-    x, w = legendre.leggauss(m)
-    return (x + 1.0) / 2.0, w / 2.0
-
-
-def _basis(s: Array, n: int) -> Array:
-    """Return the Legendre polynomials 0 ... n - 1 of the unit interval at `s`, shape (m, n)."""
-    values: Array = legendre.legvander(2.0 * s - 1.0, n - 1)
-    return values
-
-
-def _integrals(s: Array, n: int) -> Array:
-    """Return their integrals from 0 to `s`, shape (m, n); to 1 they are 1, 0, 0 ..."""
-    antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
-    values: Array = legendre.legval(2.0 * s - 1.0, antiderivatives).T
-    return values
-
-
 def converged_order(member: Member) -> int:
     """Return the order of a member after ever more corrections (derived in docs/family.md)."""
     n = member.terms
@@ -199,10 +109,10 @@ def converged_order(member: Member) -> int:
         return 2 * n
     if member.weighting == "subdomain":
         return n + 1 + (n % 2 == 0)
-    nodal = np.polynomial.Polynomial.fromroots(_points(member.points, n))
+    nodal = Polynomial.fromroots(grid(member.points, n))
     order = n
     while order < 2 * n:
-        moment = (nodal * np.polynomial.Polynomial([0.0] * (order - n) + [1.0])).integ()
+        moment = (nodal * Polynomial([0.0] * (order - n) + [1.0])).integ()
         if abs(moment(1.0) - moment(0.0)) > 1e-12:
             break
         order += 1

@@ -111,12 +111,15 @@ def multiplied_out(scene: Scene, member: Member, precision: DTypeLike) -> Array:
     Raises
     ------
     InputError
-        Where torques vary with time, or there is not exactly one correction.
+        Where torques vary with time, there is not exactly one correction, or the points are
+        not the thesis's.
     """
     if scene.torque.varies:
         raise InputError("torque varies with time; allowed here: constant torques")
     if member.corrections != 1:
         raise InputError(f"corrections is {member.corrections}; allowed here: 1")
+    if member.points not in (None, "thesis"):
+        raise InputError(f"points are {member.points_label}; allowed here: thesis")
     h = np.array(scene.step_size, precision)
     matrix = conditions(member, float(h), precision, member.terms)
     # The conditions of products, whose powers go up to 2n, and of the constant.

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,10 +29,14 @@ from pyharness.family_rounding import (
     weighting_findings,
 )
 from pyharness.family_tableau import Tableau, tableau
-from pyharness.listing import corrected
+from pyharness.listing import corrected, original
+from pyharness.original.linear_solver import SINGULAR, leqt1f
 from pyharness.reference import reference
+from pyharness.tables import short
 
 Capture = pytest.CaptureFixture[str]
+
+PAGE = Path(__file__).parent.parent / "docs" / "family.md"
 
 # A step rounds by some ten units in the last place of the largest omega, the motions of the cases
 # amplify it less than tenfold: 100 steps stay below 100 * 10 * 10 * 1.1e-16.
@@ -73,7 +78,7 @@ def test_no_order_is_below_the_one_derived(case: int) -> None:
 
 
 def test_derived_orders() -> None:
-    """What docs/family.md states, n = 1 ... 5, after as many corrections as it takes."""
+    """For n = 1 ... 5, after as many corrections as it takes; docs/family.md states the same."""
     wanted = {
         ("collocation", "thesis"): [2, 2, 4, 4, 6],
         ("collocation", "gauss"): [2, 4, 6, 8, 10],
@@ -84,6 +89,8 @@ def test_derived_orders() -> None:
     for weighting, points in SCHEMES:
         found = [converged_order(Member(weighting, n, points, 99)) for n in range(1, 6)]
         assert found == wanted[weighting, points]
+        cells = [weighting, points or "-", *map(str, found)]
+        assert f"| {' | '.join(cells)} |" in PAGE.read_text()
     assert [predicted_order(Member("galerkin", 3, None, k)) for k in range(5)] == [1, 2, 3, 3, 3]
 
 
@@ -230,6 +237,28 @@ def test_rounding_at_small_steps_is_that_of_collocation(case: int) -> None:
         assert each.error < 1e-13
 
 
+@pytest.mark.claims
+def test_singularity_test_fires_only_for_five_terms_at_small_steps() -> None:
+    for weighting in WEIGHTINGS:
+        for terms in (2, 3, 4, 5):
+            for h in (0.01, 0.001):
+                matrix = conditions(Member(weighting, terms), h, np.float64, terms).tolist()
+                _, ier = leqt1f(matrix, [[1.0] * terms])
+                fires = weighting in ("galerkin", "least-squares") and (terms, h) == (5, 0.001)
+                assert ier == (SINGULAR if fires else 0)
+
+
+@pytest.mark.claims
+@pytest.mark.parametrize("case", range(1, 7))
+def test_points_out_of_place_do_not_show_in_four_terms(case: int) -> None:
+    scene = case_scene(case)
+    punched, mended = (kernels.run(scene, f("four-term")).omega for f in (original, corrected))
+    np.testing.assert_allclose(punched, mended, rtol=0, atol=ROUNDING * np.abs(mended).max())
+    punched, mended = (kernels.run(scene, f("two-term")).omega for f in (original, corrected))
+    shows = len(punched) < len(mended) or np.abs(punched - mended).max() > 1e-4
+    assert shows == (case != 1)
+
+
 def test_multiplied_out_products_are_refused_where_they_can_not_be() -> None:
     with pytest.raises(InputError, match="constant torques"):
         multiplied_out(case_scene(7), Member("galerkin"), np.float64)
@@ -237,6 +266,23 @@ def test_multiplied_out_products_are_refused_where_they_can_not_be() -> None:
         multiplied_out(case_scene(5), Member("galerkin", corrections=2), np.float64)
     with pytest.raises(InputError, match="points"):
         multiplied_out(case_scene(5), Member("collocation", points="gauss"), np.float64)
+
+
+@pytest.mark.claims
+def test_numbers_of_the_page_are_current() -> None:
+    """Those of rounding (below 1e-12) may differ by machine and are bounded above."""
+    rows = [
+        [str(each.corrections), *map(short, each.errors)] for each in terms_findings(case_scene(5))
+    ]
+    often = concurrence(case_scene(6), corrections=8)
+    rows.append(["8", *map(short, (*often.differences, *often.errors))])
+    for cells in rows:
+        assert f"| {' | '.join(cells)} |" in PAGE.read_text()
+    once = concurrence(case_scene(6))
+    assert f"| 1 | {short(once.differences[0])} | " in PAGE.read_text()
+    assert f" | {' | '.join(map(short, once.errors))} |" in PAGE.read_text()
+    for each in weighting_findings(case_scene(2)):
+        assert f"| 2 | 2 | {each.member.weighting} | {short(each.error)} |" in PAGE.read_text()
 
 
 # The checks above see a fault.

@@ -66,7 +66,13 @@ TURNS = [
     ("v2-case-6-diverged", REPRODUCED, ["dt-accumulates"], NOT_REPRODUCED),
     ("iv1-higher-powers", NOT_REPRODUCED, ["dt-accumulates"], REPRODUCED),
     ("iv3-constant-500", REPRODUCED, ["lipschitz-per-component"], NOT_REPRODUCED),
-    ("iv3-guard", IN_PART, ["lipschitz-per-component"], REPRODUCED),
+    ("iv3-guard", IN_PART, ["lipschitz-per-component"], FALSE),
+    (
+        "iv3-guard",
+        IN_PART,
+        ["lipschitz-per-component", "stage-base", "base-not-restored"],
+        REPRODUCED,
+    ),
     ("v3-small-step-runge-kutta", REPRODUCED, ["stage-base", "base-not-restored"], NOT_REPRODUCED),
     ("vi-superior", IN_PART, ["stage-base", "base-not-restored"], FALSE),
 ]

@@ -366,7 +366,7 @@ def test_mistake_is_one_line(arguments: list[str], words: str, capsys: Capture) 
 
 def test_solution_that_leaves_every_bound_is_refused() -> None:
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0), step_size=0.3)
-    with pytest.raises(InputError, match="after step 3;"):
+    with pytest.raises(InputError, match=r"leaves every bound after 0\.9"):
         order_table(scene)
 
 
@@ -377,6 +377,14 @@ def test_table_fits_and_says_what_is_so(capsys: Capture) -> None:
     assert max(map(len, captured.out.splitlines())) <= 100
     assert "200 of 200 orders within 0.25 of those derived" in captured.out
     assert captured.out.count("\ncollocation ") == 20
+
+
+def test_long_and_short_scenes_have_orders_too() -> None:
+    for changes in ({"steps": 400}, {"steps": 7}, {"step_size": 0.2}):
+        scene = replace(case_scene(6), **changes)
+        found = measured_order(Member("collocation", 3, "thesis", 2), scene)
+        assert found is not None
+        assert abs(found - 3) <= SLACK
 
 
 def test_one_member_in_every_format(capsys: Capture) -> None:

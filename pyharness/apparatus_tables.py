@@ -3,6 +3,7 @@
 import string
 import textwrap
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 from pyharness.ablation import CaseEffects, Effect
@@ -10,7 +11,7 @@ from pyharness.listing import names_of
 from pyharness.scene import Scene
 from pyharness.tables import WIDTH, aligned, heading, short, wrapped
 
-_FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "punched", "mended", "why")
+_FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "why")
 
 
 def apparatus_table(entries: Sequence[dict[str, Any]]) -> str:
@@ -50,7 +51,20 @@ def entry_text(entry: dict[str, Any]) -> str:
         lines += textwrap.wrap(
             value, WIDTH, initial_indent=f"{field:10s} ", subsequent_indent=" " * 11
         )
+    if "punched" in entry:
+        lines += ["", *_beside("as punched", entry["punched"], "as mended", entry["mended"])]
     return "\n".join(lines) + "\n"
+
+
+def _beside(left_head: str, left: str, right_head: str, right: str) -> list[str]:
+    """Return two texts side by side under their heads."""
+    room = (WIDTH - 3) // 2
+    columns = [
+        [head, "-" * room, *textwrap.wrap(text, room)]
+        for head, text in ((left_head, left), (right_head, right))
+    ]
+    pairs = zip_longest(*columns, fillvalue="")
+    return [f"{a.ljust(room)}   {b}".rstrip() for a, b in pairs]
 
 
 def effects_table(effects: Sequence[CaseEffects], is_reading: bool) -> str:

@@ -21,8 +21,9 @@ from pyharness.scene import Scene
 from pyharness.trajectory import Array
 
 DIGITS = 40
-_FIRST = (20, Decimal("1e-19"))  # order, tolerance relative to the solution
-_SECOND = (26, Decimal("1e-25"))
+# Order and tolerance (relative to the solution, per step) of the two series that are compared.
+_QUICK = ((20, Decimal("1e-19")), (26, Decimal("1e-25")))
+_PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
 _MOST_STEPS = 100_000
 _HALF_ULP = 2.0**-53
 
@@ -60,7 +61,9 @@ class Reference:
         return self.estimate + _HALF_ULP * largest
 
 
-def reference(scene: Scene, times: Sequence[float], velocity: bool = False) -> Reference:
+def reference(
+    scene: Scene, times: Sequence[float], velocity: bool = False, precise: bool = False
+) -> Reference:
     """Return the true solution of `scene` at `times`.
 
     Parameters
@@ -71,6 +74,9 @@ def reference(scene: Scene, times: Sequence[float], velocity: bool = False) -> R
         Strictly monotonic from 0 (s), forward or backward; the first may be 0.
     velocity : bool
         Whether the velocity is wanted too.
+    precise : bool
+        Whether the series should be good to 1e-25 before rounding, where the motion itself
+        allows it, and not only to more digits than binary64 has.
 
     Returns
     -------
@@ -93,8 +99,9 @@ def reference(scene: Scene, times: Sequence[float], velocity: bool = False) -> R
         known = known_solution(scene, exact)
         if known is not None and not velocity:
             return _rounded(times, known, None, "known solution", Decimal(1).scaleb(3 - DIGITS))
-        first = _series(scene, exact, False, *_FIRST)
-        second = _series(scene, exact, velocity, *_SECOND)
+        coarse, fine = _PRECISE if precise else _QUICK
+        first = _series(scene, exact, False, *coarse)
+        second = _series(scene, exact, velocity, *fine)
         rows = min(len(first), len(second))
         omega = [row[:3] for row in second[:rows]]
         estimate = _largest_difference(first[:rows], omega)

@@ -63,3 +63,66 @@ subroutine solve_linear(n, m, a, b, factors, x, ier)
   x = b
   call leqt1f(factors, m, n, x, ier)
 end subroutine solve_linear
+
+subroutine taylor_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                      omega0, t_end, tolerance, omega, status, steps)
+  ! Taylor series: omega at one time.
+  !f2py threadsafe
+  use levels, only: taylor_solve
+  implicit none
+  real(8), intent(in) :: coefficients(3)        ! A, B, C
+  real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
+  real(8), intent(in) :: m_rate(3)              ! 1/s3
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in) :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in) :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in) :: omega0(3)              ! rad/s
+  real(8), intent(in) :: t_end                  ! s
+  real(8), intent(in) :: tolerance              ! of the error at t_end over the largest |omega|
+  real(8), intent(inout) :: omega(3)            ! rad/s; as it was unless status is 0
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
+  integer(4), intent(out) :: steps
+  integer(4) :: n_rows
+  real(8) :: times(1)
+
+  times(1) = t_end
+  call taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                    omega0, tolerance, 1, times, omega, n_rows, status, steps)
+end subroutine taylor_end
+
+subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                       omega0, n_times, times, tolerance, rows, n_rows, status, steps)
+  ! Taylor series: omega at times that lead away from 0 on one side.
+  !f2py threadsafe
+  use levels, only: taylor_solve
+  implicit none
+  real(8), intent(in) :: coefficients(3)        ! A, B, C
+  real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
+  real(8), intent(in) :: m_rate(3)              ! 1/s3
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in) :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in) :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in) :: omega0(3)              ! rad/s
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times)         ! s
+  real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|
+  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
+  integer(4), intent(out) :: steps
+
+  call taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                    omega0, tolerance, n_times, times, rows, n_rows, status, steps)
+end subroutine taylor_rows
+
+subroutine choose_instructions(highest, taken)
+  ! For tests: the kernels of one instruction set. 0 plain, 1 AVX2, 2 AVX-512, or the best below.
+  use levels, only: choose_level
+  implicit none
+  integer(4), intent(in) :: highest
+  integer(4), intent(out) :: taken
+
+  taken = choose_level(highest)
+end subroutine choose_instructions

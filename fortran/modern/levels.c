@@ -1,0 +1,46 @@
+/* The hot modules are compiled once per instruction set; the best that this processor has is
+   chosen when the library is loaded. Plain code runs everywhere. */
+#define ARGUMENTS                                                                              \
+  const double *coefficients, const double *m_constant, const double *m_rate, int n_sines,     \
+      const double *sines, int n_cosines, const double *cosines, const double *omega,          \
+      const double *tolerance, int n_times, const double *times, double *rows, int *n_rows,    \
+      int *status, int *steps
+
+typedef void solver(ARGUMENTS);
+
+solver taylor_solve_plain;
+#ifdef WITH_LEVELS
+solver taylor_solve_avx2, taylor_solve_avx512;
+#endif
+
+static solver *chosen = taylor_solve_plain;
+static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
+
+/* Take a level, or the best below it that the processor has; return the one taken. */
+int choose_level(int highest)
+{
+  chosen = taylor_solve_plain;
+  level = 0;
+#ifdef WITH_LEVELS
+  __builtin_cpu_init();
+  if (highest >= 2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("fma")) {
+    chosen = taylor_solve_avx512;
+    level = 2;
+  } else if (highest >= 1 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    chosen = taylor_solve_avx2;
+    level = 1;
+  }
+#endif
+  return level;
+}
+
+#ifdef WITH_LEVELS
+__attribute__((constructor)) static void choose_best(void) { choose_level(2); }
+#endif
+
+void taylor_solve(ARGUMENTS)
+{
+  chosen(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, tolerance,
+         n_times, times, rows, n_rows, status, steps);
+}

@@ -1,0 +1,333 @@
+module taylor
+  !! Taylor series by recurrence, order and step adapted; unroll.py writes out the marked loops.
+  !! Terms are held with the power of the step in them, so a step ends with a plain sum.
+  use, intrinsic :: iso_c_binding, only: c_double, c_int
+  use, intrinsic :: iso_fortran_env, only: int64
+  use euler_equations, only: COMPLETE, GAVE_UP, MOST_ORDER, OVERFLOW, torque_t, torque_terms
+  use kinds, only: dp
+  implicit none(type, external)
+  private
+
+  integer, parameter :: MOST_STEPS = 10000000
+  integer, parameter :: MOST_TRIES = 60
+  integer :: order_
+  real(dp), parameter :: INVERSE(MOST_ORDER) = &
+    [(1.0_dp/real(order_, dp), order_=1, MOST_ORDER)]
+
+  type :: series_t
+    real(dp) :: x(0:MOST_ORDER)      !! omega1: term k is the coefficient times step**k, rad/s
+    real(dp) :: y(0:MOST_ORDER)      !! omega2
+    real(dp) :: z(0:MOST_ORDER)      !! omega3
+    real(dp) :: k1(MOST_ORDER)       !! A times step over order
+    real(dp) :: k2(MOST_ORDER)       !! B
+    real(dp) :: k3(MOST_ORDER)       !! C
+    real(dp) :: m(MOST_ORDER, 3)     !! what the torque adds to the terms, rad/s
+    real(dp) :: tail(3)              !! sum of the terms from 4, rad/s
+    real(dp) :: last                 !! size of the last two terms, rad/s
+    integer :: order                 !! of the last term
+  end type series_t
+
+  public :: taylor_solve
+
+contains
+
+  subroutine taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                          omega, tolerance, n_times, times, rows, n_rows, status, steps) &
+    bind(c, name="taylor_solve_level")
+    !! Solution at `times`, which lead away from 0 on one side.
+    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
+    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
+    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
+    integer(c_int), intent(in), value :: n_sines
+    real(c_double), intent(in), target :: sines(4, n_sines)     !! amplitude (3), frequency in rad/s
+    integer(c_int), intent(in), value :: n_cosines
+    real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
+    real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
+    real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
+    integer(c_int), intent(in), value :: n_times
+    real(c_double), intent(in) :: times(n_times)        !! s
+    real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
+    integer(c_int), intent(out) :: n_rows
+    integer(c_int), intent(out) :: status               !! 0 complete, 2 overflow, 4 gave up
+    integer(c_int), intent(out) :: steps
+    type(series_t) :: s
+    type(torque_t) :: torque
+    real(dp) :: w(3)          ! omega at the step's beginning, rad/s
+    real(dp) :: w_low(3)      ! what its rounding left out
+    real(dp) :: change(3)     ! of omega in the step
+    real(dp) :: total(3)
+    real(dp) :: back(3)
+    real(dp) :: t             ! the step's beginning, s
+    real(dp) :: t_low         ! what its rounding left out
+    real(dp) :: h             ! step, s
+    real(dp) :: rest          ! time to go, s
+    real(dp) :: next          ! the step after this one, s
+    real(dp) :: scale         ! largest |omega| so far, rad/s
+    real(dp) :: share         ! part of the scale that the last terms may have
+    real(dp) :: allowed       ! the same in rad/s
+    logical :: varies         ! torque with time
+    logical :: at_end
+    integer :: best           ! order aimed at
+    integer :: most           ! order allowed
+    integer :: tries
+
+    n_rows = 0
+    steps = 0
+    status = COMPLETE
+    w = omega
+    w_low = 0.0_dp
+    t = 0.0_dp
+    t_low = 0.0_dp
+    rest = times(n_times)
+    torque%constant = m_constant
+    torque%rate = m_rate
+    torque%sines => sines
+    torque%cosines => cosines
+    varies = n_sines + n_cosines > 0 .or. any(m_rate /= 0.0_dp)
+    if (.not. varies) then
+      s%m(1, :) = 0.0_dp
+    end if
+    scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
+    call plan(coefficients, torque, scale, tolerance, rest, best, most, share, h)
+    tries = 0
+    do
+      ! Equal steps near the end: the last one would be short, and cost as much.
+      at_end = abs(h) >= abs(rest)
+      if (at_end) then
+        h = rest
+      else if (abs(rest) < 4.0_dp*abs(h)) then
+        h = rest/ceiling(rest/h)
+      end if
+      scale = max(scale, abs(w(1)), abs(w(2)), abs(w(3)))
+      allowed = share*scale
+      s%x(0) = w(1)
+      s%y(0) = w(2)
+      s%z(0) = w(3)
+      s%k1 = (coefficients(1)*h)*INVERSE
+      s%k2 = (coefficients(2)*h)*INVERSE
+      s%k3 = (coefficients(3)*h)*INVERSE
+      if (varies) then
+        call torque_terms(torque, t, t_low, h, most, s%m)
+        call expand_varying(s, best - 2, most, allowed)
+      else
+        s%m(1, :) = h*m_constant
+        call expand_constant(s, best - 2, most, allowed)
+      end if
+      next = following(h, s, best, allowed)
+      if (.not. s%last <= allowed .or. (steps == 0 .and. tries == 0)) then
+        ! The first step is a guess, and a later one may be too long: the terms need only a factor.
+        tries = tries + 1
+        if (.not. abs(s%last) <= huge(scale)) then
+          if (tries > MOST_TRIES) then
+            status = OVERFLOW
+            return
+          end if
+          h = h*0.0625_dp
+          cycle
+        end if
+        next = fitting(h, s, allowed)
+        if (abs(next) > abs(rest)) next = rest
+        at_end = abs(next) >= abs(rest)
+        if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) then
+          next = rest/ceiling(rest/next)
+        end if
+        call shorten(s, next/h)
+        h = next
+      end if
+      do while (n_rows < n_times)
+        if (abs(times(n_rows + 1) - t) > abs(h)) exit
+        if (at_end .and. n_rows + 1 == n_times) exit
+        n_rows = n_rows + 1
+        rows(:, n_rows) = w + (w_low + inside(s, ((times(n_rows) - t) - t_low)/h))
+      end do
+      change(1) = ((s%tail(1) + s%x(3)) + s%x(2)) + s%x(1)
+      change(2) = ((s%tail(2) + s%y(3)) + s%y(2)) + s%y(1)
+      change(3) = ((s%tail(3) + s%z(3)) + s%z(2)) + s%z(1)
+      change = change + w_low
+      total = w + change
+      back = total - w
+      w_low = (w - (total - back)) + (change - back)
+      w = total
+      steps = steps + 1
+      if (.not. all(abs(w) <= huge(scale))) then
+        status = OVERFLOW
+        return
+      end if
+      if (at_end) then
+        n_rows = n_times
+        rows(:, n_times) = w + w_low
+        return
+      end if
+      call add_time(t, t_low, h)
+      rest = (times(n_times) - t) - t_low
+      h = next
+      if (steps >= MOST_STEPS .or. abs(rest) > 10.0_dp*MOST_STEPS*abs(h)) then
+        status = merge(GAVE_UP, OVERFLOW, abs(h) > 1.0e-18_dp*abs(t))
+        return
+      end if
+    end do
+  end subroutine taylor_solve
+
+  pure subroutine plan(coefficients, torque, scale, tolerance, time, best, most, share, h)
+    !! Order from the tolerance, the first step from the rates of the problem.
+    real(dp), intent(in) :: coefficients(3) !! A, B, C
+    type(torque_t), intent(in) :: torque
+    real(dp), intent(in) :: scale           !! largest |omega|, rad/s
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(in) :: time            !! to go, s
+    integer, intent(out) :: best            !! order
+    integer, intent(out) :: most            !! order
+    real(dp), intent(out) :: share          !! part of the scale that the last terms may have
+    real(dp), intent(out) :: h              !! s
+    real(dp) :: coupling
+    real(dp) :: push                        ! largest torque over moment, 1/s2
+    real(dp) :: rate                        ! 1/s
+    integer :: n
+
+    coupling = max(abs(coefficients(1)), abs(coefficients(2)), abs(coefficients(3)))
+    push = max(abs(torque%constant(1)), abs(torque%constant(2)), abs(torque%constant(3)))
+    rate = coupling*scale + sqrt(coupling*push)
+    push = max(abs(torque%rate(1)), abs(torque%rate(2)), abs(torque%rate(3)))
+    if (push > 0.0_dp) rate = rate + (coupling*push)**(1.0_dp/3.0_dp)
+    do n = 1, size(torque%sines, 2)
+      rate = rate + abs(torque%sines(4, n))
+    end do
+    do n = 1, size(torque%cosines, 2)
+      rate = rate + abs(torque%cosines(4, n))
+    end do
+    h = time
+    if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
+    share = tolerance/(1.0_dp + 0.1_dp*coupling*scale*abs(time))
+    best = order_for(share)
+    most = min(best + 4, MOST_ORDER)
+  end subroutine plan
+
+  pure integer function order_for(share)
+    !! Even order with the least work: the number of digits and this machine's costs set it.
+    real(dp), intent(in) :: share
+    integer(int64) :: bits  ! of accuracy
+
+    bits = 1023 - ishft(transfer(share, bits), -52)
+    order_for = min(MOST_ORDER - 4, max(8, 2*int(bits/5)))
+  end function order_for
+
+  pure real(dp) function following(h, s, best, allowed)
+    !! The step with which order `best` would just do, from the decay of the terms.
+    !! The bits of a positive number, read as an integer, are its logarithm: 6 % suffice here.
+    real(dp), intent(in) :: h        !! s
+    type(series_t), intent(in) :: s
+    integer, intent(in) :: best      !! order
+    real(dp), intent(in) :: allowed  !! rad/s
+    integer(int64) :: last           ! logarithms
+    integer(int64) :: before
+    integer(int64) :: change
+    real(dp) :: size_before          ! of the two terms before the last two, rad/s
+    integer :: k
+
+    k = s%order
+    size_before = abs(s%x(k - 2)) + abs(s%y(k - 2)) + abs(s%z(k - 2)) &
+                  + abs(s%x(k - 3)) + abs(s%y(k - 3)) + abs(s%z(k - 3))
+    last = transfer(s%last, last)
+    before = transfer(size_before, before)
+    last = last + (best - k)*(last - before)/2
+    change = (transfer(allowed, change) - ishft(1_int64, 51) - last)/best
+    change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), change))
+    following = transfer(transfer(h, change) + change, h)
+  end function following
+
+  pure real(dp) function fitting(h, s, allowed)
+    !! The step with which the terms at hand would just do.
+    real(dp), intent(in) :: h        !! s
+    type(series_t), intent(in) :: s
+    real(dp), intent(in) :: allowed  !! rad/s
+    integer(int64) :: change         ! of the logarithm
+
+    change = (transfer(allowed, change) - ishft(1_int64, 51) - transfer(s%last, change))/s%order
+    change = max(-ishft(40_int64, 52), min(ishft(40_int64, 52), change))
+    fitting = transfer(transfer(h, change) + change, h)
+  end function fitting
+
+  pure subroutine shorten(s, ratio)
+    !! The terms of a step that is `ratio` times as long.
+    type(series_t), intent(inout) :: s
+    real(dp), intent(in) :: ratio
+    real(dp) :: power
+    integer :: k
+
+    power = 1.0_dp
+    s%tail = 0.0_dp
+    do k = 1, s%order
+      power = power*ratio
+      s%x(k) = s%x(k)*power
+      s%y(k) = s%y(k)*power
+      s%z(k) = s%z(k)*power
+      if (k > 3) s%tail = s%tail + [s%x(k), s%y(k), s%z(k)]
+    end do
+  end subroutine shorten
+
+  pure function inside(s, part) result(change)
+    !! Change of omega at a part of the step, rad/s.
+    type(series_t), intent(in) :: s
+    real(dp), intent(in) :: part
+    real(dp) :: change(3)
+    integer :: k
+
+    change = 0.0_dp
+    do k = s%order, 1, -1
+      change = (change + [s%x(k), s%y(k), s%z(k)])*part
+    end do
+  end function inside
+
+  pure subroutine add_time(t, t_low, h)
+    !! t + t_low + h, with what the rounding of t left out in t_low.
+    real(dp), intent(inout) :: t     !! s
+    real(dp), intent(inout) :: t_low !! s
+    real(dp), intent(in) :: h        !! s
+    real(dp) :: step
+    real(dp) :: total
+    real(dp) :: back
+
+    step = h + t_low
+    total = t + step
+    back = total - t
+    t_low = (t - (total - back)) + (step - back)
+    t = total
+  end subroutine add_time
+
+  pure subroutine expand_constant(s, least, most, allowed)
+    !! Terms up to the first even order from `least` whose last two are small; constant torque.
+    type(series_t), intent(inout) :: s
+    integer, intent(in) :: least     !! order
+    integer, intent(in) :: most      !! order
+    real(dp), intent(in) :: allowed  !! rad/s
+
+    ! unroll: m 1
+    call expand_varying(s, least, most, allowed)
+    ! end unroll
+  end subroutine expand_constant
+
+  pure subroutine expand_varying(s, least, most, allowed)
+    !! The same with a torque in every term.
+    type(series_t), intent(inout) :: s
+    integer, intent(in) :: least     !! order
+    integer, intent(in) :: most      !! order
+    real(dp), intent(in) :: allowed  !! rad/s
+    integer :: k
+
+    ! unroll: m MOST_ORDER
+    s%tail = 0.0_dp
+    do k = 1, most
+      s%x(k) = s%k1(k)*dot_product(s%y(0:k - 1), s%z(k - 1:0:-1)) + s%m(k, 1)
+      s%y(k) = s%k2(k)*dot_product(s%x(0:k - 1), s%z(k - 1:0:-1)) + s%m(k, 2)
+      s%z(k) = s%k3(k)*dot_product(s%x(0:k - 1), s%y(k - 1:0:-1)) + s%m(k, 3)
+      if (k > 3) s%tail = s%tail + [s%x(k), s%y(k), s%z(k)]
+      if (k < max(6, least) .or. mod(k, 2) == 1) cycle
+      s%order = k
+      s%last = abs(s%x(k)) + abs(s%y(k)) + abs(s%z(k)) &
+               + abs(s%x(k - 1)) + abs(s%y(k - 1)) + abs(s%z(k - 1))
+      if (s%last <= allowed) exit
+    end do
+    ! end unroll
+  end subroutine expand_varying
+
+end module taylor

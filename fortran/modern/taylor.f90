@@ -10,6 +10,7 @@ module taylor
 
   integer, parameter :: MOST_STEPS = 10000000
   integer, parameter :: MOST_TRIES = 60
+  real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass: orders that vary cost time
   integer :: order_
   real(dp), parameter :: INVERSE(MOST_ORDER) = &
     [(1.0_dp/real(order_, dp), order_=1, MOST_ORDER)]
@@ -67,7 +68,10 @@ contains
     real(dp) :: allowed       ! the same in rad/s
     logical :: varies         ! torque with time
     logical :: at_end
+    integer(int64) :: decay   ! logarithm, of the last terms over two orders
+    integer(int64) :: best_share ! 65536 over the order aimed at
     integer :: best           ! order aimed at
+    integer :: least          ! order from which the step may do
     integer :: most           ! order allowed
     integer :: tries
 
@@ -89,14 +93,19 @@ contains
     end if
     scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
     call plan(coefficients, torque, scale, tolerance, rest, best, most, share, h)
+    best_share = 65536/best
+    decay = 0
     tries = 0
     do
       ! Equal steps near the end: the last one would be short, and cost as much.
+      least = best
       at_end = abs(h) >= abs(rest)
       if (at_end) then
         h = rest
+        least = 6
       else if (abs(rest) < 4.0_dp*abs(h)) then
         h = rest/ceiling(rest/h)
+        least = 6
       end if
       scale = max(scale, abs(w(1)), abs(w(2)), abs(w(3)))
       allowed = share*scale
@@ -108,13 +117,14 @@ contains
       s%k3 = (coefficients(3)*h)*INVERSE
       if (varies) then
         call torque_terms(torque, t, t_low, h, most, s%m)
-        call expand_varying(s, best - 2, most, allowed)
+        call expand_varying(s, least, most, SLACK*allowed)
       else
         s%m(1, :) = h*m_constant
-        call expand_constant(s, best - 2, most, allowed)
+        call expand_constant(s, least, most, SLACK*allowed)
       end if
-      next = following(h, s, best, allowed)
-      if (.not. s%last <= allowed .or. (steps == 0 .and. tries == 0)) then
+      if (steps == 0) call following(h, s, best, best_share, allowed, decay, next)
+      call following(h, s, best, best_share, allowed, decay, next)
+      if ((.not. s%last <= SLACK*allowed) .or. (steps == 0 .and. tries == 0)) then
         ! The first step is a guess, and a later one may be too long: the terms need only a factor.
         tries = tries + 1
         if (.not. abs(s%last) <= huge(scale)) then
@@ -208,32 +218,34 @@ contains
     integer(int64) :: bits  ! of accuracy
 
     bits = 1023 - ishft(transfer(share, bits), -52)
-    order_for = min(MOST_ORDER - 4, max(8, 2*int(bits/5)))
+    order_for = min(MOST_ORDER - 4, 2*int((20 + bits)/6))
   end function order_for
 
-  pure real(dp) function following(h, s, best, allowed)
-    !! The step with which order `best` would just do, from the decay of the terms.
+  pure subroutine following(h, s, best, share, allowed, decay, next)
+    !! The step with which order `best` would just do, from the terms before the last two and the
+    !! decay seen in the step before, so that the processor need not wait for the last terms.
     !! The bits of a positive number, read as an integer, are its logarithm: 6 % suffice here.
-    real(dp), intent(in) :: h        !! s
+    real(dp), intent(in) :: h                !! s
     type(series_t), intent(in) :: s
-    integer, intent(in) :: best      !! order
-    real(dp), intent(in) :: allowed  !! rad/s
-    integer(int64) :: last           ! logarithms
-    integer(int64) :: before
-    integer(int64) :: change
-    real(dp) :: size_before          ! of the two terms before the last two, rad/s
+    integer, intent(in) :: best              !! order
+    integer(int64), intent(in) :: share      !! 65536 over best
+    real(dp), intent(in) :: allowed          !! rad/s
+    integer(int64), intent(inout) :: decay   !! logarithm, over two orders
+    real(dp), intent(out) :: next            !! s
+    integer(int64) :: before                 ! logarithm
+    integer(int64) :: change                 ! logarithm
+    real(dp) :: size_before                  ! of the two terms before the last two, rad/s
     integer :: k
 
     k = s%order
-    size_before = abs(s%x(k - 2)) + abs(s%y(k - 2)) + abs(s%z(k - 2)) &
-                  + abs(s%x(k - 3)) + abs(s%y(k - 3)) + abs(s%z(k - 3))
-    last = transfer(s%last, last)
+    size_before = (abs(s%x(k - 2)) + abs(s%x(k - 3))) + (abs(s%y(k - 2)) + abs(s%y(k - 3))) &
+                  + (abs(s%z(k - 2)) + abs(s%z(k - 3)))
     before = transfer(size_before, before)
-    last = last + (best - k)*(last - before)/2
-    change = (transfer(allowed, change) - ishft(1_int64, 51) - last)/best
-    change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), change))
-    following = transfer(transfer(h, change) + change, h)
-  end function following
+    change = transfer(allowed, change) - before - ((best - k + 2)/2)*decay
+    change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), shifta(change, 16)*share))
+    next = transfer(transfer(h, change) + change, h)
+    decay = transfer(s%last, before) - before
+  end subroutine following
 
   pure real(dp) function fitting(h, s, allowed)
     !! The step with which the terms at hand would just do.
@@ -242,7 +254,7 @@ contains
     real(dp), intent(in) :: allowed  !! rad/s
     integer(int64) :: change         ! of the logarithm
 
-    change = (transfer(allowed, change) - ishft(1_int64, 51) - transfer(s%last, change))/s%order
+    change = (transfer(allowed, change) - transfer(s%last, change))/s%order
     change = max(-ishft(40_int64, 52), min(ishft(40_int64, 52), change))
     fitting = transfer(transfer(h, change) + change, h)
   end function fitting
@@ -314,7 +326,7 @@ contains
     real(dp), intent(in) :: allowed  !! rad/s
     integer :: k
 
-    ! unroll: m MOST_ORDER
+    ! unroll: m 28
     s%tail = 0.0_dp
     do k = 1, most
       s%x(k) = s%k1(k)*dot_product(s%y(0:k - 1), s%z(k - 1:0:-1)) + s%m(k, 1)

@@ -16,7 +16,7 @@ def main(source: str, target: str, level: str) -> None:
     for module in MODULES:
         text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{level}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
-    blocks = re.split(r" *! unroll: m (\d+)\n.*?! end unroll\n", text, flags=re.DOTALL)
+    blocks = re.split(r" *! unroll: m (\w+)\n.*?! end unroll\n", text, flags=re.DOTALL)
     parts = [blocks[0]]
     for orders, rest in zip(blocks[1::2], blocks[2::2], strict=True):
         locals_ = [f"{name}{k}" for k in range(MOST_ORDER + 1) for name in "xyz"]
@@ -28,59 +28,80 @@ def main(source: str, target: str, level: str) -> None:
         file.write("".join(parts))
 
 
-LOCALS = ("p1", "p2", "p3", "q1", "q2", "q3", "tail1", "tail2", "tail3", "last")
+LOCALS = ("p1", "p2", "p3", "q1", "q2", "q3", "pp1", "pp2", "pp3", "qq1", "qq2", "qq3", "tail1", "tail2", "tail3", "last")
 
 
 def series(torque_orders: int) -> Iterator[str]:
     """Yield the statements; the torque has terms in the first `torque_orders` orders."""
     for name in "xyz":
         yield f"{name}0 = s%{name}(0)"
-    for k in range(1, MOST_ORDER + 1):
-        yield from products(k - 1)
-        for axis, name in enumerate("xyz", 1):
-            torque = f" + s%m({k}, {axis})" if k <= torque_orders else ""
-            yield f"{name}{k} = s%k{axis}({k})*p{axis}{torque}"
-            yield f"s%{name}({k}) = {name}{k}"
-            if k == 4:
-                yield f"tail{axis} = {name}{k}"
-            elif k > 4:
-                yield f"tail{axis} = tail{axis} + {name}{k}"
-        if k >= FIRST_CHECK and k % 2 == 0:
-            yield f"if (least <= {k}) then"
-            yield f"  last = (abs(x{k}) + abs(x{k - 1})) + (abs(y{k}) + abs(y{k - 1})) &"
-            yield f"         + (abs(z{k}) + abs(z{k - 1}))"
-            yield f"  if (last <= allowed .or. most <= {k}) then"
-            yield f"    s%order = {k}"
-            yield "    s%last = last"
-            yield "    s%tail(1) = tail1"
-            yield "    s%tail(2) = tail2"
-            yield "    s%tail(3) = tail3"
-            yield "    return"
-            yield "  end if"
-            yield "end if"
+    for n in range(0, MOST_ORDER, 2):
+        yield from known(n)
+        yield from finish(n + 1, "p", torque_orders)
+        yield from finish(n + 2, "q", torque_orders)
+        if n + 2 >= FIRST_CHECK:
+            yield from check(n + 2)
 
 
-def products(n: int) -> Iterator[str]:
-    """Yield p1 ... p3, the Cauchy products of order n: two sums each, the newest terms last."""
-    factors = (("y", "z"), ("x", "z"), ("x", "y"))
+FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
+
+
+def known(n: int) -> Iterator[str]:
+    """Yield p1 ... p3 and q1 ... q3: of the Cauchy products n and n + 1, what is known by now.
+
+    From the middle outwards, so that the newest terms come last; two orders at once, so that a
+    term that is loaded serves twice.
+    """
     begun = set()
-    for low in range(n // 2, -1, -1):
-        for j, total in ((low, "p"), (n - low, "q")) if 2 * low < n else ((low, "p"),):
-            for axis, (u, v) in enumerate(factors, 1):
-                # The newest term joins the sum that is complete.
-                sums = f"{total}{axis}"
-                if low == 0 and n >= 3:
-                    if total == "p":
-                        yield f"p{axis} = (p{axis} + q{axis}) + {u}{j}*{v}{n - j}"
-                    else:
-                        yield f"p{axis} = p{axis} + {u}{j}*{v}{n - j}"
-                elif low == 0 and n and total == "q":
-                    yield f"p{axis} = p{axis} + {u}{j}*{v}{n - j}"
-                elif sums in begun:
-                    yield f"{sums} = {sums} + {u}{j}*{v}{n - j}"
-                else:
-                    yield f"{sums} = {u}{j}*{v}{n - j}"
-                    begun.add(sums)
+    for j in range((n + 1) // 2, 0, -1):
+        for total, i in (("p", n - j), ("q", n + 1 - j)):
+            if i < j or i >= n:
+                continue
+            for low, high in ((j, i), (i, j)) if i > j else ((j, i),):
+                for axis, (u, v) in enumerate(FACTORS, 1):
+                    place = f"{total}{axis}" if low <= high else f"{total}{total}{axis}"
+                    start = f"{place} + " if place in begun else ""
+                    begun.add(place)
+                    yield f"{place} = {start}{u}{low}*{v}{high}"
+    for place in sorted(begun):
+        if len(place) == 3:
+            yield f"{place[1:]} = {place[1:]} + {place}"
+
+
+def finish(k: int, total: str, torque_orders: int) -> Iterator[str]:
+    """Yield term k of the three unknowns from the sums `total` and the newest products."""
+    n = k - 1
+    for axis, (u, v) in enumerate(FACTORS, 1):
+        place = f"{total}{axis}"
+        begun = n == 2 or n > 3
+        pairs = [(1, n - 1), (n - 1, 1)] if total == "q" and n > 2 else []
+        pairs += [(0, n), (n, 0)] if n else [(0, 0)]
+        for low, high in pairs:
+            yield f"{place} = " + (f"{place} + " if begun else "") + f"{u}{low}*{v}{high}"
+            begun = True
+    for axis, name in enumerate("xyz", 1):
+        torque = f" + s%m({k}, {axis})" if k <= torque_orders else ""
+        yield f"{name}{k} = s%k{axis}({k})*{total}{axis}{torque}"
+        yield f"s%{name}({k}) = {name}{k}"
+        if k == 4:
+            yield f"tail{axis} = {name}{k}"
+        elif k > 4:
+            yield f"tail{axis} = tail{axis} + {name}{k}"
+
+
+def check(k: int) -> Iterator[str]:
+    """Yield the end of the series at order k, where its last two terms are small enough."""
+    yield f"if (least <= {k}) then"
+    yield f"  last = (abs(x{k}) + abs(x{k - 1})) + (abs(y{k}) + abs(y{k - 1})) &"
+    yield f"         + (abs(z{k}) + abs(z{k - 1}))"
+    yield f"  if (last <= allowed .or. most <= {k}) then"
+    yield f"    s%order = {k}"
+    yield "    s%last = last"
+    for axis in (1, 2, 3):
+        yield f"    s%tail({axis}) = tail{axis}"
+    yield "    return"
+    yield "  end if"
+    yield "end if"
 
 
 if __name__ == "__main__":

@@ -126,3 +126,55 @@ subroutine choose_instructions(highest, taken)
 
   taken = choose_level(highest)
 end subroutine choose_instructions
+subroutine torque_free_solution(coefficients, omega0, n_times, times, rows, n_rows, status)
+  ! Closed form of a body without torque.
+  !f2py threadsafe
+  use torque_free, only: torque_free_rows
+  implicit none
+  real(8), intent(in) :: coefficients(3)  ! A, B, C
+  real(8), intent(in) :: omega0(3)        ! rad/s at time 0
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times)   ! s
+  real(8), intent(out) :: rows(3, n_times)
+  integer(4), intent(out) :: n_rows       ! rows that hold a result
+  integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 gave up
+
+  call torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
+end subroutine torque_free_solution
+
+subroutine torque_free_at_end(coefficients, omega0, t_end, omega, status)
+  ! The same at one time, into an array that is there already.
+  !f2py threadsafe
+  use torque_free, only: torque_free_end
+  implicit none
+  real(8), intent(in) :: coefficients(3)
+  real(8), intent(in) :: omega0(3)
+  real(8), intent(in) :: t_end
+  real(8), intent(inout) :: omega(3)
+  integer(4), intent(out) :: status
+
+  call torque_free_end(coefficients, omega0, t_end, omega, status)
+end subroutine torque_free_at_end
+
+subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
+                           n_times, times, rows, n_rows, status)
+  ! Closed form of a sphere under the torque law of a scene.
+  !f2py threadsafe
+  use torque_free, only: sphere_rows
+  implicit none
+  real(8), intent(in) :: m_constant(3)        ! all torque over moment
+  real(8), intent(in) :: m_rate(3)
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in) :: sines(4, n_sines)    ! amplitude (3), frequency in rad/s
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in) :: omega0(3)
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times)
+  real(8), intent(out) :: rows(3, n_times)
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status
+
+  call sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, n_times, &
+                   times, rows, n_rows, status)
+end subroutine sphere_solution

@@ -1,0 +1,521 @@
+module torque_free
+  !! Closed forms of equations 13-15: any torque-free body by Jacobi's elliptic functions, and
+  !! the sphere under the torque law of a scene. Cost and error do not depend on the time.
+  !! A symmetric body under constant torque is left to the series: its form needs Fresnel
+  !! integrals of arguments that overflow as M3 -> 0, and is slower than a Taylor step.
+  use kinds, only: dp
+  implicit none(type, external)
+  private
+
+  integer, parameter, public :: COMPLETE = 0 !! every row is a result
+  integer, parameter, public :: OVERFLOW = 2 !! an angular velocity left the range of the numbers
+  integer, parameter, public :: REFUSED = 3  !! the scene has no closed form here
+  integer, parameter, public :: GAVE_UP = 4  !! so large a phase that no digit of it is left
+
+  integer, parameter :: STEADY = 0           ! rates do not change: linear in time
+  integer, parameter :: SEPARATRIX = 1       ! hyperbolic functions
+  integer, parameter :: ELLIPTIC = 2
+  integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
+
+  integer, parameter :: i8 = selected_int_kind(18)
+  integer(i8), parameter :: UPPER_BITS = -134217728_i8 ! all but the last 27 bits
+  real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
+  real(dp), parameter :: FLAT = 4e-9_dp       ! a difference whose square no longer counts
+  real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
+  real(dp), parameter :: SMALL_PHASE = 1e6_dp ! up to it one term corrects sine and cosine
+  real(dp), parameter :: LARGE_PHASE = 1e15_dp
+
+  type :: orbit_t
+    !! One torque-free motion. Axis 2 of the orbit has the coefficient of the odd sign (the
+    !! middle moment), axis 3 is the one about which the motion does not change its direction.
+    integer :: kind
+    integer :: levels
+    integer :: axes(3)               !! of the body, for each of the orbit
+    integer :: time_exponent         !! orbit's time is 2**this times the time, 0 for most
+    integer :: omega_exponent        !! angular velocity is 2**this times the orbit's
+    real(dp) :: omega(3)             !! at time 0
+    real(dp) :: rates(3)             !! A omega2 omega3 and so on, at time 0
+    real(dp) :: frequency            !! phase over time
+    real(dp) :: frequency_low        !! its next 53 bits
+    real(dp) :: amplitude(3)         !! |B C| omega1**2 and so on
+    real(dp) :: modulus              !! of dn at time 0: amplitude(2) + amplitude(3)
+    real(dp) :: half_gap             !! half of amplitude(1) + amplitude(2)
+    real(dp) :: upper(MOST_LEVELS)   !! a(n) a(n-1) of the arithmetic-geometric mean
+    real(dp) :: lower(MOST_LEVELS)   !! a(n) b(n-1)
+  end type orbit_t
+
+  public :: torque_free_rows, torque_free_end, sphere_rows
+
+contains
+
+  pure subroutine torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
+    !! Angular velocity of a torque-free body at each of `times`.
+    real(dp), intent(in) :: coefficients(3)  !! A, B, C; not all of one sign, finite
+    real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
+    integer, intent(in) :: n_times
+    real(dp), intent(in) :: times(n_times)   !! s, in any order, finite
+    real(dp), intent(out) :: rows(3, n_times) !! rad/s
+    integer, intent(out) :: n_rows           !! rows that hold a result
+    integer, intent(out) :: status           !! COMPLETE, OVERFLOW, REFUSED or GAVE_UP
+    type(orbit_t) :: orbit
+    integer :: i
+
+    n_rows = 0
+    call prepare(coefficients, omega0, orbit, status)
+    if (status /= COMPLETE) return
+    do i = 1, n_times
+      call evaluate(orbit, times(i), rows(:, i), status)
+      if (status /= COMPLETE) return
+      n_rows = i
+    end do
+  end subroutine torque_free_rows
+
+  pure subroutine torque_free_end(coefficients, omega0, t_end, omega, status)
+    !! Angular velocity of a torque-free body at one time.
+    real(dp), intent(in) :: coefficients(3)  !! A, B, C; not all of one sign, finite
+    real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
+    real(dp), intent(in) :: t_end            !! s, finite
+    real(dp), intent(out) :: omega(3)        !! rad/s; omega0 where the status is not COMPLETE
+    integer, intent(out) :: status           !! COMPLETE, OVERFLOW, REFUSED or GAVE_UP
+    type(orbit_t) :: orbit
+
+    call prepare(coefficients, omega0, orbit, status)
+    if (status == COMPLETE) call evaluate(orbit, t_end, omega, status)
+    if (status /= COMPLETE) omega = omega0
+  end subroutine torque_free_end
+
+  pure subroutine prepare(coefficients, omega0, orbit, status)
+    !! Everything about a motion that does not depend on the time.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp), intent(in) :: omega0(3)
+    type(orbit_t), intent(out) :: orbit
+    integer, intent(out) :: status           !! COMPLETE or REFUSED
+    real(dp) :: a(3)         ! coefficients along the axes of the orbit
+    real(dp) :: w(3)         ! angular velocity along them
+    real(dp) :: s(3)         ! |a|
+    real(dp) :: y(3)         ! squares of w
+    real(dp) :: y_low(3)
+    real(dp) :: left         ! parts of sums, with their low words
+    real(dp) :: left_low
+    real(dp) :: right
+    real(dp) :: right_low
+    real(dp) :: gap          ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
+    real(dp) :: gap_low
+    real(dp) :: modulus      ! square of the larger start of the mean
+    real(dp) :: modulus_low
+    real(dp) :: comodulus    ! square of the smaller one
+    real(dp) :: comodulus_low
+    real(dp) :: largest
+    integer :: i
+    integer :: j
+
+    a = coefficients
+    w = omega0
+    orbit%time_exponent = 0
+    orbit%omega_exponent = 0
+    largest = max(abs(a(1)), abs(a(2)), abs(a(3)))
+    if (.not. (largest <= LARGE .and. largest*LARGE >= 1.0_dp)) then
+      call bring_near_one(a, orbit%time_exponent)
+    end if
+    largest = max(abs(w(1)), abs(w(2)), abs(w(3)))
+    if (.not. (largest <= LARGE .and. largest*LARGE >= 1.0_dp)) then
+      call bring_near_one(w, orbit%omega_exponent)
+      orbit%time_exponent = orbit%time_exponent + orbit%omega_exponent
+    end if
+
+    ! Which coefficient has the odd sign? A zero goes with either.
+    status = COMPLETE
+    if (a(1)*a(3) >= 0.0_dp .and. a(1)*a(2) <= 0.0_dp .and. a(2)*a(3) <= 0.0_dp) then
+      orbit%axes = [1, 2, 3]
+    else if (a(1)*a(2) >= 0.0_dp .and. a(1)*a(3) <= 0.0_dp .and. a(2)*a(3) <= 0.0_dp) then
+      orbit%axes = [2, 3, 1]
+    else if (a(2)*a(3) >= 0.0_dp .and. a(1)*a(2) <= 0.0_dp .and. a(1)*a(3) <= 0.0_dp) then
+      orbit%axes = [3, 1, 2]
+    else
+      status = REFUSED
+      return
+    end if
+    a = a(orbit%axes)
+    w = w(orbit%axes)
+    s = abs(a)
+    ! Growth without bound: the product of two equal signs, and nothing against it.
+    if (.not. s(2) > 0.0_dp .and. s(1)*s(3) > 0.0_dp) then
+      status = REFUSED
+      return
+    end if
+
+    do i = 1, 3
+      call two_product(w(i), w(i), y(i), y_low(i))
+    end do
+    call scaled(y(3), y_low(3), s(1), left, left_low)
+    call scaled(y(1), y_low(1), s(3), right, right_low)
+    call two_sum(left, -right, gap, gap_low)
+    gap_low = gap_low + (left_low - right_low)
+    if (gap + gap_low < 0.0_dp) then
+      i = orbit%axes(1)
+      orbit%axes(1) = orbit%axes(3)
+      orbit%axes(3) = i
+      a = [a(3), a(2), a(1)]
+      w = [w(3), w(2), w(1)]
+      s = [s(3), s(2), s(1)]
+      y = [y(3), y(2), y(1)]
+      y_low = [y_low(3), y_low(2), y_low(1)]
+      gap = -gap
+      gap_low = -gap_low
+    end if
+    call scaled(gap, gap_low, s(2), comodulus, comodulus_low)
+    call scaled(y(2), y_low(2), s(3), left, left_low)
+    call scaled(y(3), y_low(3), s(2), right, right_low)
+    call two_sum(left, right, gap, gap_low)
+    gap_low = gap_low + (left_low + right_low)
+    call scaled(gap, gap_low, s(1), modulus, modulus_low)
+
+    orbit%omega = w
+    orbit%rates = [a(1)*w(2)*w(3), a(2)*w(3)*w(1), a(3)*w(1)*w(2)]
+    orbit%amplitude = [s(2)*s(3)*y(1), s(1)*s(3)*y(2), s(1)*s(2)*y(3)]
+    orbit%modulus = modulus
+    orbit%half_gap = 0.5_dp*(orbit%amplitude(1) + orbit%amplitude(2))
+    orbit%levels = 0
+    orbit%frequency = 0.0_dp
+    orbit%frequency_low = 0.0_dp
+    if (.not. modulus > 0.0_dp) then
+      orbit%kind = STEADY
+    else if (orbit%amplitude(3) <= FAINT*modulus) then
+      ! About the middle axis, all but exactly.
+      orbit%kind = STEADY
+      do j = 1, 3, 2
+        if (abs(w(j)) > 0.0_dp) status = REFUSED
+      end do
+    else
+      call square_root(modulus, modulus_low, left, left_low)
+      if (comodulus > 0.0_dp) then
+        orbit%kind = ELLIPTIC
+        call square_root(comodulus, comodulus_low, right, right_low)
+        call climb(left, left_low, right, right_low, orbit)
+      else
+        orbit%kind = SEPARATRIX
+        orbit%frequency = left
+        orbit%frequency_low = left_low
+      end if
+    end if
+  end subroutine prepare
+
+  pure subroutine climb(a0, a0_low, b0, b0_low, orbit)
+    !! The arithmetic-geometric mean of a0 >= b0 > 0 to twice the working digits, and what the
+    !! way back needs of each level.
+    real(dp), intent(in) :: a0
+    real(dp), intent(in) :: a0_low
+    real(dp), intent(in) :: b0
+    real(dp), intent(in) :: b0_low
+    type(orbit_t), intent(inout) :: orbit
+    real(dp) :: a
+    real(dp) :: a_low
+    real(dp) :: b
+    real(dp) :: b_low
+    real(dp) :: half_difference
+    real(dp) :: total
+    real(dp) :: mean
+    real(dp) :: product
+    real(dp) :: product_low
+    real(dp) :: square
+    real(dp) :: square_low
+    integer :: n
+
+    a = a0
+    a_low = a0_low
+    b = b0
+    b_low = b0_low
+    do n = 1, MOST_LEVELS
+      half_difference = 0.5_dp*(a - b)
+      total = a + b
+      mean = 0.5_dp*total
+      orbit%levels = n
+      orbit%upper(n) = mean*a
+      orbit%lower(n) = mean*b
+      if (half_difference <= FLAT*mean) exit
+      call two_product(a, b, product, product_low)
+      product_low = product_low + (a*b_low + b*a_low)
+      a_low = 0.5_dp*((b - (total - a)) + (a_low + b_low))
+      a = mean
+      b = sqrt(product)
+      call two_product(b, b, square, square_low)
+      b_low = ((product - square) + (product_low - square_low))/(b + b)
+    end do
+    ! What one more level would take off.
+    orbit%frequency = mean
+    orbit%frequency_low = 0.5_dp*((b - (total - a)) + (a_low + b_low)) &
+                          - half_difference*half_difference/(4.0_dp*mean)
+  end subroutine climb
+
+  pure subroutine evaluate(orbit, time, omega, status)
+    !! The state at a time from that at 0 by the addition theorems of sn, cn, dn. With
+    !! sn : cn = modulus**(1/2) sine : cosine, every sum in them keeps its digits.
+    type(orbit_t), intent(in) :: orbit
+    real(dp), intent(in) :: time
+    real(dp), intent(out) :: omega(3)
+    integer, intent(out) :: status
+    real(dp) :: t              ! in the orbit's unit
+    real(dp) :: phase
+    real(dp) :: phase_low
+    real(dp) :: sine
+    real(dp) :: cosine
+    real(dp) :: s2             ! sine**2
+    real(dp) :: c2             ! cosine**2
+    real(dp) :: dn             ! of this level
+    real(dp) :: dn_below       ! of the next one
+    real(dp) :: inverse
+    real(dp) :: fallen         ! 1 - dn
+    real(dp) :: turn
+    real(dp) :: w(3)
+    integer :: n
+
+    status = COMPLETE
+    t = time
+    if (orbit%time_exponent /= 0) t = scale(time, orbit%time_exponent)
+    if (orbit%kind == STEADY) then
+      w = orbit%omega
+      do n = 1, 3
+        if (abs(orbit%rates(n)) > 0.0_dp) w(n) = w(n) + orbit%rates(n)*t
+      end do
+    else
+      call two_product(orbit%frequency, t, phase, phase_low)
+      phase_low = phase_low + orbit%frequency_low*t
+      if (.not. abs(phase) <= LARGE_PHASE) then
+        status = GAVE_UP
+        return
+      end if
+      fallen = 1.0_dp
+      if (orbit%kind == ELLIPTIC) then
+        call sine_cosine(phase, phase_low, sine, cosine)
+        s2 = sine*sine
+        cosine = orbit%frequency*cosine
+        dn = 1.0_dp
+        dn_below = 1.0_dp
+        inverse = 1.0_dp
+        do n = orbit%levels, 1, -1
+          c2 = cosine*cosine
+          inverse = 1.0_dp/(c2 + orbit%upper(n)*s2)
+          dn_below = (c2 + orbit%lower(n)*s2)*inverse
+          cosine = cosine*dn
+          dn = dn_below
+        end do
+        fallen = orbit%half_gap*s2*inverse
+      else if (abs(phase) < 1.0_dp) then
+        sine = (sinh(phase) + phase_low*cosh(phase))/orbit%frequency
+        cosine = 1.0_dp
+        dn = 1.0_dp/cosh(phase)
+        s2 = sine*sine
+      else
+        turn = exp(-abs(phase))
+        turn = turn - turn*sign(phase_low, phase*phase_low)
+        cosine = 2.0_dp*turn
+        sine = sign(1.0_dp - turn*turn, phase)/orbit%frequency
+        dn = cosine/(1.0_dp + turn*turn)
+        s2 = sine*sine
+      end if
+      c2 = cosine*cosine
+      inverse = 1.0_dp/(c2 + s2*orbit%amplitude(3))
+      turn = sqrt(c2 + s2*orbit%modulus)*inverse
+      w(1) = (cosine*orbit%omega(1) + (sine*dn)*orbit%rates(1))*turn
+      w(2) = (cosine*dn*orbit%omega(2) + sine*orbit%rates(2))*turn
+      w(3) = (s2*dn*orbit%amplitude(2)*orbit%omega(3) + sine*cosine*orbit%rates(3))*inverse
+      if (fallen < 0.5_dp) then
+        w(3) = orbit%omega(3) + (w(3) - fallen*orbit%omega(3))
+      else
+        w(3) = dn*orbit%omega(3) + w(3)
+      end if
+    end if
+    if (orbit%omega_exponent /= 0) w = scale(w, orbit%omega_exponent)
+    if (.not. (abs(w(1)) <= huge(t) .and. abs(w(2)) <= huge(t) .and. abs(w(3)) <= huge(t))) then
+      status = OVERFLOW
+      return
+    end if
+    omega(orbit%axes(1)) = w(1)
+    omega(orbit%axes(2)) = w(2)
+    omega(orbit%axes(3)) = w(3)
+  end subroutine evaluate
+
+  pure subroutine sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
+                              n_times, times, rows, n_rows, status)
+    !! Angular velocity of a sphere, or of any body with A = B = C = 0: omega0 and the integral
+    !! of the torque over the moment.
+    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
+    real(dp), intent(in) :: m_rate(3)              !! 1/s3
+    integer, intent(in) :: n_sines
+    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
+    integer, intent(in) :: n_cosines
+    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
+    integer, intent(in) :: n_times
+    real(dp), intent(in) :: times(n_times)         !! s, in any order
+    real(dp), intent(out) :: rows(3, n_times)      !! rad/s
+    integer, intent(out) :: n_rows                 !! rows that hold a result
+    integer, intent(out) :: status                 !! COMPLETE or OVERFLOW
+    real(dp) :: total(3)
+    real(dp) :: rest(3)    ! what rounding took off the total
+    real(dp) :: t
+    real(dp) :: sine       ! of half the angle
+    real(dp) :: cosine
+    real(dp) :: quotient   ! sine over half the angle
+    integer :: i
+    integer :: k
+
+    n_rows = 0
+    status = COMPLETE
+    do i = 1, n_times
+      t = times(i)
+      total = omega0
+      rest = 0.0_dp
+      call add(total, rest, m_constant, t)
+      call add(total, rest, m_rate, 0.5_dp*t*t)
+      do k = 1, n_sines
+        call half_angle(sines(4, k), t, sine, cosine, quotient)
+        call add(total, rest, sines(1:3, k), t*(sine*quotient))
+      end do
+      do k = 1, n_cosines
+        call half_angle(cosines(4, k), t, sine, cosine, quotient)
+        call add(total, rest, cosines(1:3, k), t*(cosine*quotient))
+      end do
+      total = total + rest
+      if (.not. all(abs(total) <= huge(t))) then
+        status = OVERFLOW
+        return
+      end if
+      rows(:, i) = total
+      n_rows = i
+    end do
+  end subroutine sphere_rows
+
+  pure subroutine add(total, rest, amplitude, factor)
+    !! Add amplitude times factor to total + rest.
+    real(dp), intent(inout) :: total(3)
+    real(dp), intent(inout) :: rest(3)
+    real(dp), intent(in) :: amplitude(3)
+    real(dp), intent(in) :: factor
+    real(dp) :: term
+    real(dp) :: term_low
+    real(dp) :: sum_high
+    real(dp) :: sum_low
+    integer :: axis
+
+    do axis = 1, 3
+      if (.not. abs(amplitude(axis)) > 0.0_dp) cycle
+      call two_product(amplitude(axis), factor, term, term_low)
+      call two_sum(total(axis), term, sum_high, sum_low)
+      total(axis) = sum_high
+      if (abs(sum_high) <= huge(factor)) rest(axis) = rest(axis) + (sum_low + term_low)
+    end do
+  end subroutine add
+
+  pure subroutine half_angle(frequency, t, sine, cosine, quotient)
+    !! Sine and cosine of frequency t/2, and the sine over it.
+    real(dp), intent(in) :: frequency
+    real(dp), intent(in) :: t
+    real(dp), intent(out) :: sine
+    real(dp), intent(out) :: cosine
+    real(dp), intent(out) :: quotient
+    real(dp) :: angle
+    real(dp) :: angle_low
+
+    call two_product(frequency, 0.5_dp*t, angle, angle_low)
+    call sine_cosine(angle, angle_low, sine, cosine)
+    quotient = 1.0_dp
+    if (abs(angle) > 0.0_dp) quotient = sine/angle
+  end subroutine half_angle
+
+  pure subroutine sine_cosine(angle, angle_low, sine, cosine)
+    !! Sine and cosine of angle + angle_low.
+    real(dp), intent(in) :: angle
+    real(dp), intent(in) :: angle_low
+    real(dp), intent(out) :: sine
+    real(dp), intent(out) :: cosine
+    real(dp) :: s
+    real(dp) :: c
+
+    s = sin(angle)
+    c = cos(angle)
+    if (abs(angle) <= SMALL_PHASE) then
+      sine = s + c*angle_low
+      cosine = c - s*angle_low
+    else
+      sine = s*cos(angle_low) + c*sin(angle_low)
+      cosine = c*cos(angle_low) - s*sin(angle_low)
+    end if
+  end subroutine sine_cosine
+
+  pure subroutine bring_near_one(x, power)
+    !! Divide by the power of two that brings the largest of x into [1/2, 1).
+    real(dp), intent(inout) :: x(3)
+    integer, intent(out) :: power
+    real(dp) :: largest
+
+    largest = max(abs(x(1)), abs(x(2)), abs(x(3)))
+    power = 0
+    if (.not. (largest > 0.0_dp .and. largest <= huge(largest))) return
+    power = exponent(largest)
+    x = scale(x, -power)
+  end subroutine bring_near_one
+
+  pure subroutine square_root(x, x_low, root, root_low)
+    !! Square root of x + x_low to twice the working digits.
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: x_low
+    real(dp), intent(out) :: root
+    real(dp), intent(out) :: root_low
+    real(dp) :: square
+    real(dp) :: square_low
+
+    root = sqrt(x)
+    call two_product(root, root, square, square_low)
+    root_low = ((x - square) + (x_low - square_low))/(root + root)
+  end subroutine square_root
+
+  pure subroutine scaled(x, x_low, factor, y, y_low)
+    !! (x + x_low) factor to twice the working digits.
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: x_low
+    real(dp), intent(in) :: factor
+    real(dp), intent(out) :: y
+    real(dp), intent(out) :: y_low
+
+    call two_product(x, factor, y, y_low)
+    y_low = y_low + x_low*factor
+  end subroutine scaled
+
+  pure subroutine two_sum(x, y, total, rest)
+    !! x + y = total + rest, exactly (Knuth).
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: y
+    real(dp), intent(out) :: total
+    real(dp), intent(out) :: rest
+    real(dp) :: s
+    real(dp) :: part
+
+    s = x + y
+    part = s - x
+    rest = (x - (s - part)) + (y - part)
+    total = s
+  end subroutine two_sum
+
+  pure subroutine two_product(x, y, product, rest)
+    !! x y = product + rest up to 2**-106 of it (Dekker, halves cut off by their bits).
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: y
+    real(dp), intent(out) :: product
+    real(dp), intent(out) :: rest
+    real(dp) :: xh
+    real(dp) :: xl
+    real(dp) :: yh
+    real(dp) :: yl
+    real(dp) :: p
+
+    xh = transfer(iand(transfer(x, UPPER_BITS), UPPER_BITS), x)
+    yh = transfer(iand(transfer(y, UPPER_BITS), UPPER_BITS), y)
+    xl = x - xh
+    yl = y - yh
+    p = x*y
+    rest = (((xh*yh - p) + xh*yl) + xl*yh) + xl*yl
+    product = p
+  end subroutine two_product
+
+end module torque_free

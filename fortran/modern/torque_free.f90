@@ -150,8 +150,10 @@ contains
     call scaled(y(3), y_low(3), s(1), left, left_low)
     call scaled(y(1), y_low(1), s(3), right, right_low)
     call two_sum(left, -right, gap, gap_low)
-    gap_low = gap_low + (left_low - right_low)
-    if (gap + gap_low < 0.0_dp) then
+    left = gap
+    left_low = gap_low + (left_low - right_low)
+    call two_sum(left, left_low, gap, gap_low)
+    if (gap < 0.0_dp) then
       i = orbit%axes(1)
       orbit%axes(1) = orbit%axes(3)
       orbit%axes(3) = i

@@ -178,3 +178,84 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   call sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, n_times, &
                    times, rows, n_rows, status)
 end subroutine sphere_solution
+
+subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                          omega0, n_times, times, stages, step, rows, reached, n_rows, status, &
+                          evaluations)
+  ! Gauss collocation in equal steps between the times.
+  !f2py threadsafe
+  use gauss_collocation, only: gauss_rows
+  implicit none
+  real(8), intent(in) :: coefficients(3)
+  real(8), intent(in) :: m_constant(3)
+  real(8), intent(in) :: m_rate(3)
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in) :: sines(4, n_sines)
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in) :: omega0(3)
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times)     ! leading away from 0
+  integer(4), intent(in) :: stages          ! 1 to 8
+  real(8), intent(in) :: step               ! at the most, above 0
+  real(8), intent(out) :: rows(3, n_times)
+  real(8), intent(out) :: reached(4)        ! time and omega after the last good step
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status
+  integer(4), intent(out) :: evaluations
+
+  call gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
+                  n_times, times, stages, step, rows, reached, n_rows, status, evaluations)
+end subroutine gauss_solution
+
+subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                               cosines, omega0, n_times, times, method, step, rows, n_rows, &
+                               status, evaluations)
+  ! Improved Euler, three-term Taylor, Runge-Kutta: whole steps, the last before a time shorter.
+  !f2py threadsafe
+  use fixed_step, only: fixed_step_rows
+  implicit none
+  real(8), intent(in) :: coefficients(3)
+  real(8), intent(in) :: m_constant(3)
+  real(8), intent(in) :: m_rate(3)
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in) :: sines(4, n_sines)
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in) :: omega0(3)
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times)
+  integer(4), intent(in) :: method          ! 1 improved Euler, 2 three-term Taylor, 3 Runge-Kutta
+  real(8), intent(in) :: step               ! above 0
+  real(8), intent(out) :: rows(3, n_times)
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status
+  integer(4), intent(out) :: evaluations
+
+  call fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                       omega0, n_times, times, method, step, rows, n_rows, status, evaluations)
+end subroutine fixed_step_solution
+
+subroutine fixed_step_at_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                             cosines, omega0, t_end, method, n_steps, omega, status)
+  ! The same at one time in equal steps, into an array that is there already.
+  !f2py threadsafe
+  use fixed_step, only: fixed_step_end
+  implicit none
+  real(8), intent(in) :: coefficients(3)
+  real(8), intent(in) :: m_constant(3)
+  real(8), intent(in) :: m_rate(3)
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in) :: sines(4, n_sines)
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in) :: omega0(3)
+  real(8), intent(in) :: t_end
+  integer(4), intent(in) :: method
+  integer(4), intent(in) :: n_steps
+  real(8), intent(inout) :: omega(3)
+  integer(4), intent(out) :: status
+
+  call fixed_step_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                      omega0, t_end, method, n_steps, omega, status)
+end subroutine fixed_step_at_end

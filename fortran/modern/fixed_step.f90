@@ -1,0 +1,305 @@
+module fixed_step
+  !! The methods of III.2 in steps of one size: improved Euler (eq. 29), three terms of the
+  !! Taylor series (eq. 30), classical Runge-Kutta (eq. 31).
+  use kinds, only: dp
+  use torque_law, only: torque_at, torque_rate_at
+  implicit none(type, external)
+  private
+
+  integer, parameter, public :: IMPROVED_EULER = 1
+  integer, parameter, public :: TAYLOR_3 = 2
+  integer, parameter, public :: RUNGE_KUTTA_4 = 3
+  integer, parameter :: COMPLETE = 0          ! every row is a result
+  integer, parameter :: OVERFLOW = 2          ! an angular velocity left the range of numbers
+  integer, parameter :: GAVE_UP = 4           ! too many steps
+  real(dp), parameter :: MOST_STEPS = 4e8_dp  ! four right-hand sides a step are counted
+  real(dp), parameter :: EXCESS = 1e-6_dp     ! of a step, rather than one step more
+
+  public :: fixed_step_rows, fixed_step_end
+
+contains
+
+  pure subroutine fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                                  cosines, omega0, n_times, times, method, step, rows, n_rows, &
+                                  status, evaluations)
+    !! Angular velocity at each of `times`, which lead away from 0: as many whole steps as fit
+    !! between two of them, then a shorter one (or the last one longer by up to EXCESS).
+    real(dp), intent(in) :: coefficients(3)        !! A, B, C
+    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
+    real(dp), intent(in) :: m_rate(3)              !! 1/s3
+    integer, intent(in) :: n_sines
+    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
+    integer, intent(in) :: n_cosines
+    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
+    integer, intent(in) :: n_times
+    real(dp), intent(in) :: times(n_times)         !! s
+    integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RUNGE_KUTTA_4
+    real(dp), intent(in) :: step                   !! s, above 0
+    real(dp), intent(out) :: rows(3, n_times)      !! rad/s
+    integer, intent(out) :: n_rows                 !! rows that hold a result
+    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW or GAVE_UP
+    integer, intent(out) :: evaluations            !! right-hand sides
+    real(dp) :: y(3)
+    real(dp) :: begin
+    real(dp) :: h
+    real(dp) :: n_steps
+    real(dp) :: steps
+    integer :: i
+
+    n_rows = 0
+    status = GAVE_UP
+    evaluations = 0
+    steps = 0.0_dp
+    y = omega0
+    begin = 0.0_dp
+    do i = 1, n_times
+      h = sign(step, times(i) - begin)
+      n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
+      steps = steps + n_steps
+      if (.not. steps <= MOST_STEPS) return
+      evaluations = evaluations + per_step(method)*int(n_steps)
+      call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                   method, begin, h, int(n_steps) - 1, y)
+      begin = begin + h*(n_steps - 1.0_dp)
+      call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                   method, begin, times(i) - begin, 1, y)
+      begin = times(i)
+      if (.not. all(abs(y) <= huge(step))) then
+        status = OVERFLOW
+        return
+      end if
+      rows(:, i) = y
+      n_rows = i
+    end do
+    status = COMPLETE
+  end subroutine fixed_step_rows
+
+  pure subroutine fixed_step_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                                 cosines, omega0, t_end, method, n_steps, omega, status)
+    !! Angular velocity at one time, in a number of equal steps.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp), intent(in) :: m_constant(3)
+    real(dp), intent(in) :: m_rate(3)
+    integer, intent(in) :: n_sines
+    real(dp), intent(in) :: sines(4, n_sines)
+    integer, intent(in) :: n_cosines
+    real(dp), intent(in) :: cosines(4, n_cosines)
+    real(dp), intent(in) :: omega0(3)
+    real(dp), intent(in) :: t_end                  !! s
+    integer, intent(in) :: method
+    integer, intent(in) :: n_steps                 !! 1 or more
+    real(dp), intent(out) :: omega(3)              !! rad/s
+    integer, intent(out) :: status                 !! COMPLETE or OVERFLOW
+
+    omega = omega0
+    call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, method, &
+                 0.0_dp, t_end/real(n_steps, dp), n_steps, omega)
+    status = COMPLETE
+    if (.not. all(abs(omega) <= huge(t_end))) status = OVERFLOW
+  end subroutine fixed_step_end
+
+  pure integer function per_step(method)
+    !! Right-hand sides in a step; the derivative of one counts as another.
+    integer, intent(in) :: method
+
+    per_step = merge(4, 2, method == RUNGE_KUTTA_4)
+  end function per_step
+
+  pure subroutine advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                          method, begin, h, n_steps, y)
+    !! A number of equal steps.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp), intent(in) :: m_constant(3)
+    real(dp), intent(in) :: m_rate(3)
+    integer, intent(in) :: n_sines
+    real(dp), intent(in) :: sines(4, n_sines)
+    integer, intent(in) :: n_cosines
+    real(dp), intent(in) :: cosines(4, n_cosines)
+    integer, intent(in) :: method
+    real(dp), intent(in) :: begin                  !! s
+    real(dp), intent(in) :: h                      !! s
+    integer, intent(in) :: n_steps
+    real(dp), intent(inout) :: y(3)                !! rad/s
+    real(dp) :: m(3)
+    real(dp) :: m_middle(3)
+    real(dp) :: m_end(3)
+    real(dp) :: m_slope(3)
+    real(dp) :: t
+    logical :: varies
+    integer :: n
+
+    varies = n_sines + n_cosines > 0 .or. any(abs(m_rate) > 0.0_dp)
+    if (method == RUNGE_KUTTA_4 .and. .not. varies) then
+      call runge_kutta_constant(coefficients, m_constant, h, n_steps, y)
+      return
+    end if
+    m = m_constant
+    m_middle = m_constant
+    m_end = m_constant
+    m_slope = 0.0_dp
+    if (varies) then
+      call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, begin, m_end)
+    end if
+    do n = 1, n_steps
+      if (varies) then
+        t = begin + real(n - 1, dp)*h
+        m = m_end
+        call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t + h, m_end)
+        if (method == RUNGE_KUTTA_4) then
+          call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                         t + 0.5_dp*h, m_middle)
+        else if (method == TAYLOR_3) then
+          call torque_rate_at(m_rate, n_sines, sines, n_cosines, cosines, t, m_slope)
+        end if
+      end if
+      select case (method)
+      case (IMPROVED_EULER)
+        call improved_euler_step(coefficients, m, m_end, h, y)
+      case (TAYLOR_3)
+        call taylor_step(coefficients, m, m_slope, h, y)
+      case default
+        call runge_kutta_step(coefficients, m, m_middle, m_end, h, y)
+      end select
+    end do
+  end subroutine advance
+
+  pure subroutine improved_euler_step(a, m, m_end, h, y)
+    !! Eq. 29: the mean of the rates at both ends.
+    real(dp), intent(in) :: a(3)
+    real(dp), intent(in) :: m(3)
+    real(dp), intent(in) :: m_end(3)
+    real(dp), intent(in) :: h
+    real(dp), intent(inout) :: y(3)
+    real(dp) :: first(3)
+    real(dp) :: second(3)
+
+    first = rates(a, m, y)
+    second = rates(a, m_end, y + h*first)
+    y = y + (0.5_dp*h)*(first + second)
+  end subroutine improved_euler_step
+
+  pure subroutine taylor_step(a, m, m_slope, h, y)
+    !! Eq. 30: omega + h omega' + h**2/2 omega''.
+    real(dp), intent(in) :: a(3)
+    real(dp), intent(in) :: m(3)
+    real(dp), intent(in) :: m_slope(3)
+    real(dp), intent(in) :: h
+    real(dp), intent(inout) :: y(3)
+    real(dp) :: first(3)
+    real(dp) :: second(3)
+
+    first = rates(a, m, y)
+    second(1) = m_slope(1) + a(1)*(first(2)*y(3) + y(2)*first(3))
+    second(2) = m_slope(2) + a(2)*(first(3)*y(1) + y(3)*first(1))
+    second(3) = m_slope(3) + a(3)*(first(1)*y(2) + y(1)*first(2))
+    y = y + h*(first + (0.5_dp*h)*second)
+  end subroutine taylor_step
+
+  pure subroutine runge_kutta_step(a, m, m_middle, m_end, h, y)
+    !! Eq. 31.
+    real(dp), intent(in) :: a(3)
+    real(dp), intent(in) :: m(3)
+    real(dp), intent(in) :: m_middle(3)
+    real(dp), intent(in) :: m_end(3)
+    real(dp), intent(in) :: h
+    real(dp), intent(inout) :: y(3)
+    real(dp) :: k1(3)
+    real(dp) :: k2(3)
+    real(dp) :: k3(3)
+    real(dp) :: k4(3)
+
+    k1 = rates(a, m, y)
+    k2 = rates(a, m_middle, y + (0.5_dp*h)*k1)
+    k3 = rates(a, m_middle, y + (0.5_dp*h)*k2)
+    k4 = rates(a, m_end, y + h*k3)
+    y = y + (h/6.0_dp)*((k1 + k4) + 2.0_dp*(k2 + k3))
+  end subroutine runge_kutta_step
+
+  pure function rates(a, m, y) result(f)
+    !! Equations 16-18.
+    real(dp), intent(in) :: a(3)
+    real(dp), intent(in) :: m(3)
+    real(dp), intent(in) :: y(3)
+    real(dp) :: f(3)
+
+    f(1) = m(1) + a(1)*(y(2)*y(3))
+    f(2) = m(2) + a(2)*(y(3)*y(1))
+    f(3) = m(3) + a(3)*(y(1)*y(2))
+  end function rates
+
+  pure subroutine runge_kutta_constant(coefficients, m_constant, h, n_steps, y)
+    !! Eq. 31 where the torque is constant: half a step is in the coefficients, and each stage
+    !! is a sum of the last one's rates. What counts is the time from one product to the next.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp), intent(in) :: m_constant(3)
+    real(dp), intent(in) :: h
+    integer, intent(in) :: n_steps
+    real(dp), intent(inout) :: y(3)
+    real(dp), parameter :: third = 1.0_dp/3.0_dp
+    real(dp) :: a1
+    real(dp) :: a2
+    real(dp) :: a3
+    real(dp) :: u1      ! omega at the begin of the step
+    real(dp) :: u2
+    real(dp) :: u3
+    real(dp) :: b1      ! the same plus half a step of the torque
+    real(dp) :: b2
+    real(dp) :: b3
+    real(dp) :: v1      ! omega at the stage
+    real(dp) :: v2
+    real(dp) :: v3
+    real(dp) :: w1
+    real(dp) :: w2
+    real(dp) :: w3
+    real(dp) :: s1      ! sum of the stages
+    real(dp) :: s2
+    real(dp) :: s3
+    real(dp) :: m1      ! half a step of the torque
+    real(dp) :: m2
+    real(dp) :: m3
+    integer :: n
+
+    a1 = 0.5_dp*h*coefficients(1)
+    a2 = 0.5_dp*h*coefficients(2)
+    a3 = 0.5_dp*h*coefficients(3)
+    m1 = 0.5_dp*h*m_constant(1)
+    m2 = 0.5_dp*h*m_constant(2)
+    m3 = 0.5_dp*h*m_constant(3)
+    u1 = y(1)
+    u2 = y(2)
+    u3 = y(3)
+    do n = 1, n_steps
+      b1 = u1 + m1
+      b2 = u2 + m2
+      b3 = u3 + m3
+      v1 = b1 + a1*(u2*u3)
+      v2 = b2 + a2*(u3*u1)
+      v3 = b3 + a3*(u1*u2)
+      w1 = b1 + a1*(v2*v3)
+      w2 = b2 + a2*(v3*v1)
+      w3 = b3 + a3*(v1*v2)
+      ! The sum of increments k1 + 2 k2 + 2 k3 + k4, of which v, w hold k1/2 and k2/2.
+      s1 = (v1 - u1) + 2.0_dp*(w1 - u1)
+      s2 = (v2 - u2) + 2.0_dp*(w2 - u2)
+      s3 = (v3 - u3) + 2.0_dp*(w3 - u3)
+      v1 = 2.0_dp*(m1 + a1*(w2*w3))
+      v2 = 2.0_dp*(m2 + a2*(w3*w1))
+      v3 = 2.0_dp*(m3 + a3*(w1*w2))
+      s1 = s1 + v1
+      s2 = s2 + v2
+      s3 = s3 + v3
+      v1 = u1 + v1
+      v2 = u2 + v2
+      v3 = u3 + v3
+      s1 = s1 + (m1 + a1*(v2*v3))
+      s2 = s2 + (m2 + a2*(v3*v1))
+      s3 = s3 + (m3 + a3*(v1*v2))
+      u1 = u1 + third*s1
+      u2 = u2 + third*s2
+      u3 = u3 + third*s3
+    end do
+    y = [u1, u2, u3]
+  end subroutine runge_kutta_constant
+
+end module fixed_step

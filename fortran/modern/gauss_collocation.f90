@@ -1,0 +1,189 @@
+module gauss_collocation
+  !! Gauss collocation of 1 to 8 stages, order twice that, in equal steps between the times.
+  !! Iterated until rounding stops it, sums carried along, weights in two words, after Hairer,
+  !! McLachlan and Razakarivony 2008: then energy and momentum wander like rounding, no faster.
+  use kinds, only: dp
+  use gauss_tables, only: MOST_STAGES, NODES, WEIGHTS, WEIGHTS_LOW, MATRIX, ONWARD
+  use torque_law, only: torque_at
+  implicit none(type, external)
+  private
+
+  integer, parameter :: COMPLETE = 0            ! every row is a result
+  integer, parameter :: OVERFLOW = 2            ! an angular velocity left the range of numbers
+  integer, parameter :: GAVE_UP = 4             ! no convergence, or too many evaluations
+  integer, parameter :: MOST_ITERATIONS = 60
+  integer, parameter :: MOST_EVALUATIONS = 2000000000
+  real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling
+  real(dp), parameter :: EXCESS = 1e-6_dp       ! of a step, rather than one step more
+
+  public :: gauss_rows
+
+contains
+
+  pure subroutine gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                             cosines, omega0, n_times, times, stages, step, rows, reached, &
+                             n_rows, status, evaluations)
+    !! Angular velocity at each of `times`, which lead away from 0.
+    real(dp), intent(in) :: coefficients(3)        !! A, B, C
+    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
+    real(dp), intent(in) :: m_rate(3)              !! 1/s3
+    integer, intent(in) :: n_sines
+    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
+    integer, intent(in) :: n_cosines
+    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
+    integer, intent(in) :: n_times
+    real(dp), intent(in) :: times(n_times)         !! s
+    integer, intent(in) :: stages                  !! 1 to 8
+    real(dp), intent(in) :: step                   !! at the most, s, above 0
+    real(dp), intent(out) :: rows(3, n_times)      !! rad/s
+    real(dp), intent(out) :: reached(4)            !! time and omega after the last good step
+    integer, intent(out) :: n_rows                 !! rows that hold a result
+    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW or GAVE_UP
+    integer, intent(out) :: evaluations            !! right-hand sides
+    real(dp) :: y(3)
+    real(dp) :: carry(3)             ! what rounding took off y
+    real(dp) :: m(MOST_STAGES, 3)    ! torque at the nodes
+    real(dp) :: f(MOST_STAGES, 3)    ! rates at the nodes
+    real(dp) :: at_node(3)
+    real(dp) :: begin
+    real(dp) :: h
+    real(dp) :: n_steps
+    real(dp) :: done
+    logical :: varies
+    integer :: i
+    integer :: k
+
+    n_rows = 0
+    status = COMPLETE
+    evaluations = 0
+    y = omega0
+    carry = 0.0_dp
+    f = 0.0_dp
+    reached = [0.0_dp, y]
+    varies = n_sines + n_cosines > 0 .or. any(abs(m_rate) > 0.0_dp)
+    do k = 1, MOST_STAGES
+      m(k, :) = m_constant
+    end do
+    begin = 0.0_dp
+    do i = 1, n_times
+      n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
+      h = (times(i) - begin)/n_steps
+      ! The step is new: what the rates of the last one say about it is of no use.
+      f = 0.0_dp
+      done = 0.0_dp
+      do while (done < n_steps)
+        if (varies) then
+          do k = 1, stages
+            call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                           begin + (done + NODES(k, stages))*h, at_node)
+            m(k, :) = at_node
+          end do
+        end if
+        call advance(coefficients, m, h, stages, y, carry, f, status, evaluations)
+        if (status /= COMPLETE) return
+        done = done + 1.0_dp
+        reached = [begin + done*h, y]
+      end do
+      begin = times(i)
+      rows(:, i) = y
+      n_rows = i
+    end do
+  end subroutine gauss_rows
+
+  pure subroutine advance(coefficients, m, h, stages, y, carry, f, status, evaluations)
+    !! One step.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp), intent(in) :: m(MOST_STAGES, 3)
+    real(dp), intent(in) :: h
+    integer, intent(in) :: stages
+    real(dp), intent(inout) :: y(3)
+    real(dp), intent(inout) :: carry(3)
+    real(dp), intent(inout) :: f(MOST_STAGES, 3)  !! rates of the last step, 0 if there is none
+    integer, intent(out) :: status
+    integer, intent(inout) :: evaluations
+    real(dp) :: z(MOST_STAGES, 3)       ! states at the nodes less y
+    real(dp) :: z_before(MOST_STAGES, 3)
+    real(dp) :: states(MOST_STAGES, 3)
+    real(dp) :: change
+    real(dp) :: change_before
+    real(dp) :: scale
+    real(dp) :: increment
+    real(dp) :: total
+    real(dp) :: part
+    integer :: axis
+    integer :: iteration
+    integer :: k
+
+    status = GAVE_UP
+    scale = max(abs(y(1)), abs(y(2)), abs(y(3)))
+    call stage_sums(ONWARD(:, :, stages), f, h, stages, z)
+    change_before = huge(scale)
+    do iteration = 1, MOST_ITERATIONS
+      do axis = 1, 3
+        do k = 1, stages
+          states(k, axis) = y(axis) + (z(k, axis) + carry(axis))
+        end do
+      end do
+      do k = 1, stages
+        f(k, 1) = m(k, 1) + coefficients(1)*states(k, 2)*states(k, 3)
+        f(k, 2) = m(k, 2) + coefficients(2)*states(k, 3)*states(k, 1)
+        f(k, 3) = m(k, 3) + coefficients(3)*states(k, 1)*states(k, 2)
+      end do
+      z_before = z
+      call stage_sums(MATRIX(:, :, stages), f, h, stages, z)
+      change = 0.0_dp
+      do axis = 1, 3
+        do k = 1, stages
+          change = max(change, abs(z(k, axis) - z_before(k, axis)))
+        end do
+      end do
+      if (.not. change > 0.0_dp) status = COMPLETE
+      if (change >= change_before .and. change <= ROUNDING*scale) status = COMPLETE
+      if (status == COMPLETE) exit
+      change_before = change
+    end do
+    evaluations = evaluations + stages*min(iteration, MOST_ITERATIONS)
+    if (evaluations > MOST_EVALUATIONS - MOST_STAGES*MOST_ITERATIONS) status = GAVE_UP
+
+    do axis = 1, 3
+      increment = 0.0_dp
+      part = 0.0_dp
+      do k = 1, stages
+        part = part + WEIGHTS_LOW(k, stages)*f(k, axis)
+        increment = increment + WEIGHTS(k, stages)*f(k, axis)
+      end do
+      increment = h*(increment + part) + carry(axis)
+      total = y(axis) + increment
+      part = total - y(axis)
+      carry(axis) = (y(axis) - (total - part)) + (increment - part)
+      y(axis) = total
+      if (.not. abs(total) <= huge(total)) status = OVERFLOW
+    end do
+  end subroutine advance
+
+  pure subroutine stage_sums(table, f, h, stages, z)
+    !! z = h times table times f.
+    real(dp), intent(in) :: table(MOST_STAGES, MOST_STAGES)
+    real(dp), intent(in) :: f(MOST_STAGES, 3)
+    real(dp), intent(in) :: h
+    integer, intent(in) :: stages
+    real(dp), intent(out) :: z(MOST_STAGES, 3)
+    integer :: axis
+    integer :: j
+    integer :: k
+
+    do axis = 1, 3
+      z(:, axis) = 0.0_dp
+      do j = 1, stages
+        do k = 1, MOST_STAGES
+          z(k, axis) = z(k, axis) + table(k, j)*f(j, axis)
+        end do
+      end do
+      do k = 1, MOST_STAGES
+        z(k, axis) = h*z(k, axis)
+      end do
+    end do
+  end subroutine stage_sums
+
+end module gauss_collocation

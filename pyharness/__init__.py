@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from pyharness.listing import Listing, subset
     from pyharness.scene import Scene, TorqueLaw
     from pyharness.scene_file import case_scene, read_scene
+    from pyharness.solver import Solver, prepare, solve
     from pyharness.trajectory import Stop, Trajectory
 
 __all__ = [
@@ -15,11 +16,14 @@ __all__ = [
     "Listing",
     "NotBuiltError",
     "Scene",
+    "Solver",
     "Stop",
     "TorqueLaw",
     "Trajectory",
     "case_scene",
+    "prepare",
     "read_scene",
+    "solve",
     "subset",
 ]
 
@@ -27,6 +31,7 @@ __all__ = [
 _ROOMS = {
     "errors": ("InputError", "NotBuiltError"),
     "listing": ("Listing", "subset"),
+    "solver": ("Solver", "prepare", "solve"),
     "scene": ("Scene", "TorqueLaw"),
     "scene_file": ("case_scene", "read_scene"),
     "trajectory": ("Stop", "Trajectory"),

@@ -28,7 +28,24 @@ def main(source: str, target: str, level: str) -> None:
         file.write("".join(parts))
 
 
-LOCALS = ("p1", "p2", "p3", "q1", "q2", "q3", "pp1", "pp2", "pp3", "qq1", "qq2", "qq3", "tail1", "tail2", "tail3", "last")
+LOCALS = (
+    "p1",
+    "p2",
+    "p3",
+    "q1",
+    "q2",
+    "q3",
+    "pp1",
+    "pp2",
+    "pp3",
+    "qq1",
+    "qq2",
+    "qq3",
+    "tail1",
+    "tail2",
+    "tail3",
+    "last",
+)
 
 
 def series(torque_orders: int) -> Iterator[str]:

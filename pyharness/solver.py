@@ -1,0 +1,212 @@
+"""Solvers: prepared once, called in a loop at little more than the cost of the kernel itself.
+
+`prepare` validates the scene, decides what it needs (`plan`) and packs it; a call then converts
+three arguments and enters the kernel. `solve` is the same for one use, with rows at many times.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.errors import InputError, unknown
+from pyharness.kernels import extension
+from pyharness.plan import Plan, plan
+from pyharness.scene import Scene, Wave
+from pyharness.trajectory import Array, Trajectory
+
+_STATUS = {0: "complete", 2: "overflow", 3: "refused", 4: "gave up"}
+# Places in the packed array: see fortran/modern/prepared.f90.
+_STATUS_AT, _STEPS_AT, _WAVES_AT = 14, 15, 16
+_CODES = {
+    "closed-form": 1,
+    "sphere": 2,
+    "taylor": 3,
+    "improved-euler": 4,
+    "taylor-3": 5,
+    "rk4": 6,
+    **{f"gauss-{stages}": 10 + stages for stages in range(1, 9)},
+}
+PREPARED = (
+    "auto",
+    "closed-form",
+    *(name for name in _CODES if name not in ("closed-form", "sphere")),
+)
+
+
+class Solver:
+    """A scene prepared for one method; a solver belongs to one thread, its buffers are its own.
+
+    Call it as ``solver(omega0, t_end)``: `omega0` an array of three floats (rad/s), `t_end` in
+    seconds on either side of 0. It returns the angular velocity at `t_end`, an array of shape
+    (3,) that the next call overwrites: copy what you keep. Nothing is checked in a call; where
+    the kernel could not finish the result is NaN and `status` says why.
+
+    Attributes
+    ----------
+    plan : Plan
+        What was decided, and why.
+    """
+
+    __slots__ = ("_call", "_omega", "_packed", "_scene", "_tolerance", "plan")
+
+    def __init__(self, scene: Scene, chosen: Plan, tolerance: float) -> None:
+        """Pack what does not change; `prepare` is the way to make one."""
+        self.plan = chosen
+        self._scene = scene
+        self._tolerance = tolerance
+        self._call = extension().solve_packed
+        self._packed = _pack(scene, chosen, tolerance)
+        self._omega = np.empty(3)
+
+    def __call__(self, omega0: Array, t_end: float) -> Array:
+        """Return the angular velocity at `t_end`, shape (3,), in the solver's own array."""
+        self._call(self._packed, omega0, t_end, self._omega)
+        return self._omega
+
+    @property
+    def status(self) -> str:
+        """How the last call ended: complete, overflow, refused or gave up."""
+        return _STATUS[int(self._packed[_STATUS_AT])]
+
+    @property
+    def steps(self) -> int:
+        """Steps of the last call (right-hand sides of Gauss collocation), 0 of a closed form."""
+        return int(self._packed[_STEPS_AT])
+
+    def trajectory(self, omega0: Sequence[float], times: Sequence[float]) -> Trajectory:
+        """Return rows at `times` from another start.
+
+        Parameters
+        ----------
+        omega0 : sequence of three floats
+            rad/s.
+        times : sequence of float, shape (n,)
+            s; strictly monotonic, on one side of 0.
+
+        Raises
+        ------
+        InputError
+            For a start that is not three finite numbers, or times out of order.
+        """
+        from dataclasses import replace
+
+        from pyharness.methods import solve as solve_by_name
+
+        if len(omega0) != 3:
+            raise InputError(f"omega0: {len(omega0)} numbers; allowed: three")
+        first, second, third = (float(each) for each in omega0)
+        scene = replace(self._scene, omega=(first, second, third))
+        return solve_by_name(scene, times, self.plan.method, self._tolerance)
+
+
+def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Solver:
+    """Prepare a solver.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to solve. Its step size is that of the methods with a fixed step.
+    method : str
+        A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
+    tolerance : float
+        Largest error at the end over the largest angular velocity on the way; the methods with
+        a fixed step do not look at it.
+
+    Returns
+    -------
+    Solver
+        Ready to be called.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, one that can't take the scene, or a tolerance out of range.
+    NotBuiltError
+        Where the extension is not built.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pyharness import case_scene, prepare
+    >>> solver = prepare(case_scene(2), tolerance=1e-12)
+    >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
+    array([-0.958924,  0.283662, 10.      ])
+    """
+    if method not in PREPARED:
+        raise unknown("method", method, PREPARED)
+    return Solver(scene, plan(scene, method, tolerance), tolerance)
+
+
+def solve(
+    scene: Scene, times: Sequence[float], method: str = "auto", tolerance: float = 1e-12
+) -> Trajectory:
+    """Solve a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to solve.
+    times : sequence of float, shape (n,)
+        Where the result is wanted (s): strictly monotonic, on one side of 0.
+    method : str
+        `auto`, or any name in `pyharness.methods.METHODS`.
+    tolerance : float
+        Largest error at `times`, relative to the largest angular velocity.
+
+    Returns
+    -------
+    Trajectory
+        One row per time, fewer where the solution overflows.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, one that can't take the scene, times out of order, or a tolerance
+        that the method can't meet.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, solve
+    >>> solve(case_scene(1), [1.0, 2.0]).omega
+    array([[3.5, 3.5, 3.5],
+           [6. , 6. , 6. ]])
+    """
+    from pyharness.methods import METHODS
+    from pyharness.methods import solve as solve_by_name
+
+    if method not in ("auto", *METHODS):
+        raise unknown("method", method, ("auto", *METHODS))
+    if method == "auto":
+        method = plan(scene, "auto", tolerance).method
+    return solve_by_name(scene, times, method, tolerance)
+
+
+def _pack(scene: Scene, chosen: Plan, tolerance: float) -> Array:
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    law = scene.torque
+    sines = _columns(law.sines, moments) if "sines" not in chosen.skipped else []
+    cosines = _columns(law.cosines, moments) if "cosines" not in chosen.skipped else []
+    # Four places more than the waves need: the kernel names where the cosines would begin.
+    packed = np.zeros(_WAVES_AT + len(sines) + len(cosines) + 4)
+    packed[0] = _CODES["sphere" if chosen.closed_form == "sphere" else chosen.method]
+    packed[1] = tolerance
+    packed[2] = scene.step_size
+    packed[3] = len(sines) // 4
+    packed[4] = len(cosines) // 4
+    packed[5:8] = scene.euler_coefficients
+    packed[8:11] = [n / i for n, i in zip(law.constant, moments, strict=True)]
+    packed[11:14] = [n / i for n, i in zip(law.rate, moments, strict=True)]
+    packed[_WAVES_AT : _WAVES_AT + len(sines) + len(cosines)] = sines + cosines
+    if not np.isfinite(packed).all():
+        raise InputError("torque over moment is not finite; take smaller torques")
+    return packed
+
+
+def _columns(waves: tuple[Wave, ...], moments: tuple[float, float, float]) -> list[float]:
+    """Return amplitude over moment, and frequency, wave by wave; waves without effect drop out."""
+    numbers: list[float] = []
+    for amplitude, frequency in waves:
+        if any(amplitude):
+            numbers += [a / i for a, i in zip(amplitude, moments, strict=True)]
+            numbers.append(frequency)
+    return numbers

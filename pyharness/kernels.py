@@ -1,15 +1,17 @@
 """The compiled programs: scenes in, trajectories out."""
 
+from collections.abc import Sequence
 from types import ModuleType
 
 import numpy as np
 
-from pyharness.errors import NotBuiltError
+from pyharness.errors import InputError, NotBuiltError
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scene import Scene, Wave
 from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 
 _ENDED = ("complete", "stopped", "overflow")
+_GAVE_UP = 4
 
 
 def extension() -> ModuleType:
@@ -80,6 +82,66 @@ def run(
         ended=_ENDED[status],
         stop=Stop(n_rows, STOP_VARIABLES[variable - 1], quotient) if variable else None,
         ier=None if listing.program == "runge-kutta" else ier[:n_rows],
+    )
+
+
+def taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    """Solve a scene by Taylor series.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to integrate.
+    times : sequence of float, shape (n,)
+        Strictly monotonic away from 0, on one side of it (s); not checked.
+    tolerance : float
+        Largest error at `times`, relative to the largest angular velocity.
+
+    Returns
+    -------
+    Trajectory
+        Fewer rows than times where the solution overflows; a series counts as one evaluation.
+
+    Raises
+    ------
+    InputError
+        Where the method gave up: the time is long for so fast a motion.
+    NotBuiltError
+        Where the extension is not built.
+    """
+    rows, n_rows, status, steps = extension().taylor_rows(
+        *normalized(scene), scene.omega, times, tolerance
+    )
+    if status == _GAVE_UP:
+        raise InputError(
+            f"taylor gave up after {steps} steps; take a shorter time or a larger tolerance"
+        )
+    time = np.array(times[:n_rows], dtype=float)
+    ended = "overflow" if status else "complete"
+    return Trajectory(time, time, rows.T[:n_rows], None, steps, steps, ended)
+
+
+def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
+    """Return what the modern kernels take: everything divided by the moments.
+
+    Returns
+    -------
+    coefficients, m_constant, m_rate : ndarray, shape (3,)
+        A, B, C; torque over moment (1/s2) and its rate (1/s3).
+    sines, cosines : ndarray, shape (4, n)
+        Columns of amplitude (1/s2) and frequency (rad/s).
+    """
+    law = scene.torque
+    moments = np.array(scene.moments or (1.0, 1.0, 1.0))
+    sines, cosines = _columns(law.sines), _columns(law.cosines)
+    sines[:3] /= moments[:, None]
+    cosines[:3] /= moments[:, None]
+    return (
+        np.array(scene.euler_coefficients),
+        np.array(law.constant) / moments,
+        np.array(law.rate) / moments,
+        sines,
+        cosines,
     )
 
 

@@ -211,6 +211,12 @@ def _solve_ivp(name: str) -> Callable[[Scene, Sequence[float], float], Trajector
     return solve
 
 
+def _taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    from pyharness import kernels
+
+    return kernels.taylor(scene, times, tolerance)
+
+
 def _reference(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
     from pyharness.reference import reference
 
@@ -263,6 +269,13 @@ METHODS = {
             "scipy.integrate.solve_ivp; Hairer and Wanner 1996, IV.8",
             7e-13,
             _solve_ivp("Radau"),
+        ),
+        Method(
+            "taylor",
+            "Taylor series by recurrence, step and order adapted",
+            "ours; Jorba and Zou 2005, Experimental Mathematics 14",
+            1e-15,
+            _taylor,
         ),
         Method(
             "reference",

@@ -8,12 +8,17 @@ module euler_equations
   integer, parameter, public :: OVERFLOW = 2 !! an angular velocity was not finite
   integer, parameter, public :: GAVE_UP = 4  !! more steps would be needed than are allowed
   integer, parameter, public :: MOST_ORDER = 28
+  integer :: order_
+  real(dp), parameter, public :: INVERSE(MOST_ORDER) = &
+    [(1.0_dp/real(order_, dp), order_=1, MOST_ORDER)]
 
   type, public :: torque_t
     real(dp) :: constant(3)            !! 1/s2
     real(dp) :: rate(3)                !! 1/s3
-    real(dp), pointer :: sines(:, :)   !! columns: amplitude (3) in 1/s2, frequency in rad/s
-    real(dp), pointer :: cosines(:, :) !! the same
+    integer :: n_sines
+    integer :: n_cosines
+    real(dp), pointer, contiguous :: sines(:, :)   !! columns: amplitude (3) in 1/s2, frequency in rad/s
+    real(dp), pointer, contiguous :: cosines(:, :) !! the same
   end type torque_t
 
   public :: torque_terms
@@ -27,37 +32,52 @@ contains
     real(dp), intent(in) :: t_low      !! rounding of t, s
     real(dp), intent(in) :: h          !! step, s
     integer, intent(in) :: most
-    real(dp), intent(out) :: m(MOST_ORDER, 3)
+    real(dp), intent(out) :: m(3, MOST_ORDER)
     real(dp) :: even(3)                ! derivative 0 of the wave times h, rad/s
     real(dp) :: odd(3)                 ! derivative 1, over the frequency
     real(dp) :: sine
     real(dp) :: cosine
     integer :: n
+    integer :: k
     integer :: shared                  ! pairs of waves that begin with one frequency
+    integer :: waves                   ! added so far
 
-    m(1, :) = h*(torque%constant + torque%rate*t + torque%rate*t_low)
-    m(2, :) = (0.5_dp*h*h)*torque%rate
-    m(3:most, :) = 0.0_dp
     shared = 0
-    do n = 1, min(size(torque%sines, 2), size(torque%cosines, 2))
+    waves = 0
+    do n = 1, min(torque%n_sines, torque%n_cosines)
       if (torque%sines(4, n) /= torque%cosines(4, n)) exit
       call sine_cosine(torque%sines(4, n), t, t_low, sine, cosine)
-      even = h*(sine*torque%sines(:3, n) + cosine*torque%cosines(:3, n))
-      odd = h*(cosine*torque%sines(:3, n) - sine*torque%cosines(:3, n))
-      call add_wave(torque%sines(4, n)*h, even, odd, most, m)
+      do k = 1, 3
+        even(k) = h*(sine*torque%sines(k, n) + cosine*torque%cosines(k, n))
+        odd(k) = h*(cosine*torque%sines(k, n) - sine*torque%cosines(k, n))
+      end do
+      call add_wave(torque%sines(4, n)*h, even, odd, most, waves, m)
       shared = n
     end do
-    do n = shared + 1, size(torque%sines, 2)
+    do n = shared + 1, torque%n_sines
       call sine_cosine(torque%sines(4, n), t, t_low, sine, cosine)
-      even = (h*sine)*torque%sines(:3, n)
-      odd = (h*cosine)*torque%sines(:3, n)
-      call add_wave(torque%sines(4, n)*h, even, odd, most, m)
+      do k = 1, 3
+        even(k) = (h*sine)*torque%sines(k, n)
+        odd(k) = (h*cosine)*torque%sines(k, n)
+      end do
+      call add_wave(torque%sines(4, n)*h, even, odd, most, waves, m)
     end do
-    do n = shared + 1, size(torque%cosines, 2)
+    do n = shared + 1, torque%n_cosines
       call sine_cosine(torque%cosines(4, n), t, t_low, sine, cosine)
-      even = (h*cosine)*torque%cosines(:3, n)
-      odd = (-h*sine)*torque%cosines(:3, n)
-      call add_wave(torque%cosines(4, n)*h, even, odd, most, m)
+      do k = 1, 3
+        even(k) = (h*cosine)*torque%cosines(k, n)
+        odd(k) = (-h*sine)*torque%cosines(k, n)
+      end do
+      call add_wave(torque%cosines(4, n)*h, even, odd, most, waves, m)
+    end do
+    if (waves == 0) then
+      do k = 1, most
+        m(1:3, k) = 0.0_dp
+      end do
+    end if
+    do k = 1, 3
+      m(k, 1) = m(k, 1) + h*(torque%constant(k) + torque%rate(k)*t + torque%rate(k)*t_low)
+      m(k, 2) = m(k, 2) + (0.5_dp*h*h)*torque%rate(k)
     end do
   end subroutine torque_terms
 
@@ -78,23 +98,31 @@ contains
     cosine = cosine - turn*unturned
   end subroutine sine_cosine
 
-  pure subroutine add_wave(turn, even, odd, most, m)
+  pure subroutine add_wave(turn, even, odd, most, waves, m)
     !! Derivatives of a wave run even, odd, -even, -odd; sin and cos follow one recurrence.
     real(dp), intent(in) :: turn       !! frequency times step, rad
     real(dp), intent(in) :: even(3)    !! rad/s
     real(dp), intent(in) :: odd(3)     !! rad/s
-    integer, intent(in) :: most
-    real(dp), intent(inout) :: m(MOST_ORDER, 3)
+    integer, intent(in) :: most        !! order, even
+    integer, intent(inout) :: waves    !! the first one finds nothing to add to
+    real(dp), intent(inout) :: m(3, MOST_ORDER)
     real(dp) :: weight                 ! turn**(k - 1) / k!, its sign included
     integer :: k
 
     weight = 1.0_dp
-    do k = 1, most - 1, 2
-      m(k, :) = m(k, :) + weight*even
-      weight = weight*(turn/real(k + 1, dp))
-      m(k + 1, :) = m(k + 1, :) + weight*odd
-      weight = -weight*(turn/real(k + 2, dp))
+    do k = 1, most, 2
+      if (waves > 0) then
+        m(1:3, k) = m(1:3, k) + weight*even
+        weight = weight*(turn*INVERSE(k + 1))
+        m(1:3, k + 1) = m(1:3, k + 1) + weight*odd
+      else
+        m(1:3, k) = weight*even
+        weight = weight*(turn*INVERSE(k + 1))
+        m(1:3, k + 1) = weight*odd
+      end if
+      weight = -weight*(turn*INVERSE(min(k + 2, MOST_ORDER)))
     end do
+    waves = waves + 1
   end subroutine add_wave
 
 end module euler_equations

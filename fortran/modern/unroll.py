@@ -97,8 +97,10 @@ def finish(k: int, total: str, torque_orders: int) -> Iterator[str]:
             yield f"{place} = " + (f"{place} + " if begun else "") + f"{u}{low}*{v}{high}"
             begun = True
     for axis, name in enumerate("xyz", 1):
-        torque = f" + s%m({k}, {axis})" if k <= torque_orders else ""
-        yield f"{name}{k} = s%k{axis}({k})*{total}{axis}{torque}"
+        torque = f" + s%m({axis}, {k})" if k <= torque_orders else ""
+        # A table costs more than it saves where the torque keeps the processor busy.
+        factor = f"s%k{axis}({k})" if torque_orders == 1 else f"(s%k{axis}(1)*INVERSE({k}))"
+        yield f"{name}{k} = {factor}*{total}{axis}{torque}"
         yield f"s%{name}({k}) = {name}{k}"
         if k == 4:
             yield f"tail{axis} = {name}{k}"

@@ -1,0 +1,179 @@
+"""The Taylor kernel: its tolerance, both directions, its rows, its ends, every instruction set."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, case_scene
+from pyharness.kernels import extension, normalized
+from pyharness.methods import solve
+from pyharness.reference import Reference, reference
+from pyharness.scene import TorqueLaw
+from pyharness.trajectory import Array
+
+RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
+LEVELS = ("plain", "avx2", "avx512")
+WAVES = TorqueLaw(
+    (10.0, 0.0, -5.0), (1.0, 2.0, 0.0), (((20.0, 0.0, 5.0), 3.0), ((0.0, 9.0, 0.0), 11.0)),
+    (((5.0, 5.0, 5.0), 3.0), ((0.0, 0.0, 30.0), 0.5), ((1.0, 2.0, 3.0), 0.0)),
+)  # fmt: skip
+SCENES = {
+    **{f"case {case}": case_scene(case) for case in range(1, 8)},
+    "waves": Scene("", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0), torque=WAVES),
+    "from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((5.0, 3.0, 1.0))
+    ),
+    "sine from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
+        torque=TorqueLaw(sines=(((50.0, 30.0, 10.0), 2.0),)),
+    ),
+    "two zeros": Scene("", (1.0, 2.0, 3.0), coefficients=(0.0, -1.0, 0.0)),
+    "not a body": Scene("", (0.1, 0.2, -0.3), coefficients=(1.0, 1.0, 0.5)),
+}  # fmt: skip
+
+
+@cache
+def _truth(name: str, *times: float) -> Reference:
+    return reference(SCENES[name], times)
+
+
+def _error(found: Array, truth: Array) -> float:
+    error: float = np.abs(found - truth).max() / np.abs(truth).max()
+    return error
+
+
+def _end(scene: Scene, time: float, tolerance: float) -> tuple[Array, int, int]:
+    omega = np.zeros(3)
+    status, steps = extension().taylor_end(
+        *normalized(scene), np.array(scene.omega), time, tolerance, omega
+    )
+    return omega, status, steps
+
+
+@pytest.fixture(params=range(len(LEVELS)), ids=LEVELS)
+def level(request: pytest.FixtureRequest) -> Iterator[int]:
+    """Run the kernels of one instruction set, where this machine has it."""
+    wanted: int = request.param
+    if extension().choose_instructions(wanted) != wanted:
+        extension().choose_instructions(len(LEVELS) - 1)
+        pytest.skip(f"this machine does not run {LEVELS[wanted]}")
+    yield wanted
+    extension().choose_instructions(len(LEVELS) - 1)
+
+
+@pytest.mark.parametrize(("case", "horizon"), RUNS)
+def test_tolerance_is_met_from_coarse_to_rounding(case: int, horizon: float, level: int) -> None:
+    truth = _truth(f"case {case}", horizon).omega[0]
+    for digits in range(3, 14):
+        omega, status, _ = _end(case_scene(case), horizon, 10.0**-digits)
+        assert status == 0
+        assert _error(omega, truth) <= 10.0**-digits
+
+
+@pytest.mark.parametrize(("case", "horizon"), RUNS)
+def test_finest_tolerance_reaches_rounding(case: int, horizon: float, level: int) -> None:
+    truth = _truth(f"case {case}", horizon).omega[0]
+    omega, _, _ = _end(case_scene(case), horizon, 1e-15)
+    assert _error(omega, truth) <= (3e-16 if horizon == 3.0 else 2e-15)
+
+
+@pytest.mark.parametrize("time", [2.0, -2.0])
+@pytest.mark.parametrize("name", SCENES)
+def test_any_torque_law_either_way(name: str, time: float) -> None:
+    truth = _truth(name, time).omega[0]
+    for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
+        omega, status, _ = _end(SCENES[name], time, tolerance)
+        assert status == 0
+        assert _error(omega, truth) <= tolerance
+
+
+@pytest.mark.parametrize("name", ["case 2", "case 3", "case 4", "case 5", "case 6"])
+def test_forth_and_back(name: str) -> None:
+    """A torque that does not vary knows no time, so the way back starts at 0 again."""
+    scene = SCENES[name]
+    there, _, _ = _end(scene, 3.0, 1e-15)
+    turned = Scene("", tuple(there), moments=scene.moments, torque=scene.torque)
+    back, _, _ = _end(turned, -3.0, 1e-15)
+    assert _error(back, np.array(scene.omega)) <= 2e-13
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_rows_are_what_solves_to_each_time_give(name: str, side: float) -> None:
+    times = [side * t for t in (0.0, 1e-9, 0.01, 0.3, 0.31, 0.9, 2.0)]
+    rows = solve(SCENES[name], times, "taylor", 1e-15)
+    assert rows.ended == "complete"
+    np.testing.assert_array_equal(rows.omega[0], SCENES[name].omega)
+    scale = np.abs(rows.omega).max()
+    for time, row in zip(times[1:], rows.omega[1:], strict=True):
+        omega, _, _ = _end(SCENES[name], time, 1e-15)
+        np.testing.assert_allclose(row, omega, rtol=0, atol=3e-15 * scale)
+
+
+def test_many_rows_within_one_step() -> None:
+    times = np.linspace(0.0, 3.0, 301)
+    rows = solve(case_scene(5), times.tolist(), "taylor", 1e-12)
+    truth = reference(case_scene(5), times.tolist()).omega
+    assert rows.steps < 60
+    assert _error(rows.omega, truth) <= 1e-12
+
+
+def test_blow_up_ends_the_rows(level: int) -> None:
+    scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    found = solve(scene, [0.5, 0.9, 0.999, 1.001, 2.0], "taylor", 1e-12)
+    assert found.ended == "overflow"
+    np.testing.assert_allclose(found.omega, [[2.0] * 3, [10.0] * 3, [1000.0] * 3], rtol=1e-11)
+    assert found.steps < 10_000
+    omega, status, _ = _end(scene, 2.0, 1e-12)
+    assert status == 2
+    np.testing.assert_array_equal(omega, 0.0)
+
+
+@pytest.mark.parametrize("size", [1e100, 1e160])
+def test_hopeless_scale_ends(size: float) -> None:
+    scene = Scene("", (size, size, size), coefficients=(1.0, -1.0, 1.0))
+    with pytest.raises(InputError, match="gave up after 1 steps") if size < 1e150 else _nothing():
+        assert solve(scene, [2.0], "taylor", 1e-6).ended == "overflow"
+
+
+class _nothing:
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+
+def test_tiny_and_resting_bodies() -> None:
+    scene = Scene("", (1e-300, -2e-300, 0.0), moments=(3.0, 2.0, 1.0))
+    omega, status, steps = _end(scene, 5.0, 1e-12)
+    assert (status, steps) == (0, 1)
+    np.testing.assert_array_equal(omega, scene.omega)
+    omega, status, _ = _end(Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0)), 5.0, 1e-12)
+    assert status == 0
+    np.testing.assert_array_equal(omega, 0.0)
+
+
+def test_steps_fall_with_the_tolerance_and_not_below_the_need() -> None:
+    counts = [_end(case_scene(7), 3.0, e)[2] for e in (1e-3, 1e-6, 1e-9, 1e-12)]
+    assert max(counts) <= 150
+
+
+def test_threads_give_the_same_bits() -> None:
+    def many(_: int) -> list[bytes]:
+        return [_end(case_scene(c), 3.0, 1e-12)[0].tobytes() for c in range(1, 8)]
+
+    with ThreadPoolExecutor(8) as pool:
+        results = list(pool.map(many, range(64)))
+    assert all(result == results[0] for result in results)
+
+
+def test_levels_agree_to_rounding() -> None:
+    found = []
+    for number in range(len(LEVELS)):
+        if extension().choose_instructions(number) == number:
+            found.append(_end(case_scene(5), 3.0, 1e-15)[0])
+    extension().choose_instructions(len(LEVELS) - 1)
+    for omega in found[1:]:
+        assert _error(omega, found[0]) <= 1e-15

@@ -10,14 +10,14 @@ module euler_equations
   integer, parameter, public :: MOST_ORDER = 28
   integer :: order_
   real(dp), parameter, public :: INVERSE(MOST_ORDER) = &
-    [(1.0_dp/real(order_, dp), order_=1, MOST_ORDER)]
+                                 [(1.0_dp/real(order_, dp), order_=1, MOST_ORDER)]
 
   type, public :: torque_t
     real(dp) :: constant(3)            !! 1/s2
     real(dp) :: rate(3)                !! 1/s3
     integer :: n_sines
     integer :: n_cosines
-    real(dp), pointer, contiguous :: sines(:, :)   !! columns: amplitude (3) in 1/s2, frequency in rad/s
+    real(dp), pointer, contiguous :: sines(:, :)   !! amplitude (3) in 1/s2, frequency in rad/s
     real(dp), pointer, contiguous :: cosines(:, :) !! the same
   end type torque_t
 

@@ -4,7 +4,7 @@ module taylor
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use euler_equations, only: COMPLETE, GAVE_UP, INVERSE, MOST_ORDER, OVERFLOW, torque_t, &
-    torque_terms
+                             torque_terms
   use kinds, only: dp
   implicit none(type, external)
   private
@@ -19,7 +19,7 @@ module taylor
     real(dp) :: x(0:MOST_ORDER)      !! omega1: term k is the coefficient times step**k, rad/s
     real(dp) :: y(0:MOST_ORDER)      !! omega2
     real(dp) :: z(0:MOST_ORDER)      !! omega3
-    real(dp) :: k1(MOST_ORDER)       !! A times step over order; with a varying torque only the first
+    real(dp) :: k1(MOST_ORDER)       !! A step over order; with a varying torque the first only
     real(dp) :: k2(MOST_ORDER)       !! B
     real(dp) :: k3(MOST_ORDER)       !! C
     real(dp) :: m(3, MOST_ORDER)     !! what the torque adds to the terms, rad/s

@@ -1,9 +1,11 @@
 """Write the coefficients of Gauss collocation, 1 to 8 stages, as a Fortran module.
 
 Nodes are roots of Legendre polynomials, weights and matrices integrals of Lagrange's
-polynomials, all in 60 digits; a weight has two words, so that its rounding does not add up.
+polynomials, all in 60 digits; weights and matrices have two words each, so that their rounding
+does not add up.
 """
 
+import itertools
 import sys
 from collections.abc import Callable, Sequence
 from decimal import Decimal, localcontext
@@ -31,7 +33,7 @@ def nodes(stages: int) -> list[Decimal]:
     roots: list[Decimal] = []
     for degree in range(1, stages + 1):
         value = _polynomial(now)
-        roots = [_bisect(value, *pair) for pair in zip(borders, borders[1:], strict=False)]
+        roots = [_bisect(value, *pair) for pair in itertools.pairwise(borders)]
         borders = [Decimal(0), *roots, Decimal(1)]
         # (n + 1) P(n+1) = (2 n + 1) (2 x - 1) P(n) - n P(n-1)
         after = [Decimal(0)] * (degree + 2)
@@ -95,7 +97,11 @@ def _table(name: str, shape: str, values: Sequence[Decimal]) -> str:
 def module() -> str:
     """Return the text of the module."""
     zero = Decimal(0)
-    all_nodes, high, low, matrix, onward = [], [], [], [], []
+    all_nodes: list[Decimal] = []
+    high: list[Decimal] = []
+    low: list[Decimal] = []
+    matrix: list[Decimal] = []
+    onward: list[Decimal] = []
     with localcontext(prec=DIGITS):
         for stages in range(1, MOST + 1):
             rest = [zero] * (MOST - stages)
@@ -111,6 +117,7 @@ def module() -> str:
                 for j in range(MOST):
                     used = j < stages
                     table += [source[i][j] if used and i < stages else zero for i in range(MOST)]
+        matrix_low = [x - Decimal(float(x)) for x in matrix]
         square, cube = f"{MOST}, {MOST}", f"{MOST}, {MOST}, {MOST}"
         return (
             HEADER.format(most=MOST)
@@ -118,6 +125,7 @@ def module() -> str:
             + _table("WEIGHTS", square, high)
             + _table("WEIGHTS_LOW", square, low)
             + _table("MATRIX", cube, matrix)
+            + _table("MATRIX_LOW", cube, matrix_low)
             + _table("ONWARD", cube, onward)
             + "\nend module gauss_tables\n"
         )

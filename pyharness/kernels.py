@@ -64,8 +64,8 @@ def run(
         scene.torque.constant,
         scene.torque.rate,
         scene.torque.varies,
-        _columns(scene.torque.sines),
-        _columns(scene.torque.cosines),
+        columns(scene.torque.sines),
+        columns(scene.torque.cosines),
         scene.step_size,
         scene.steps,
         lipschitz,
@@ -133,7 +133,7 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     """
     law = scene.torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
-    sines, cosines = _columns(law.sines), _columns(law.cosines)
+    sines, cosines = columns(law.sines), columns(law.cosines)
     sines[:3] /= moments[:, None]
     cosines[:3] /= moments[:, None]
     return (
@@ -145,7 +145,8 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     )
 
 
-def _columns(waves: tuple[Wave, ...]) -> Array:
+def columns(waves: tuple[Wave, ...]) -> Array:
+    """Return amplitudes and frequencies as the kernels take them, shape (4, n)."""
     columns = np.empty((4, len(waves)), order="F")
     for index, (amplitude, frequency) in enumerate(waves):
         columns[:3, index] = amplitude

@@ -15,6 +15,8 @@ from pyharness.trajectory import Trajectory
 
 IMPLEMENTATIONS = ("fortran", "python")
 
+Solver = Callable[[Scene, Sequence[float], float], Trajectory]
+
 # SciPy controls the error of a step, a tolerance here is on the error at the times asked for:
 # a thirtieth kept every method within it in all seven cases (tests/test_methods.py).
 _STEP_SHARE = 1.0 / 30.0
@@ -23,6 +25,9 @@ _STEP_SHARE = 1.0 / 30.0
 # its way to infinity in finite time, and LSODA would never come back from it.
 _LARGEST_PHASE = 1e13
 _MOST_EVALUATIONS = 2_000_000
+
+# Of 1 to 8 stages: low orders would need more steps than anyone waits for.
+_GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,7 @@ class Method:
     title: str
     source: str
     finest: float
-    solve: Callable[[Scene, Sequence[float], float], Trajectory]
+    solve: Solver
 
 
 def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -> Trajectory:
@@ -107,7 +112,7 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
     Parameters
     ----------
     scene : Scene
-        What to integrate; its step size plays no part.
+        What to integrate; its step size plays a part only for the fixed-step methods.
     times : sequence of float, shape (n,)
         Where the result is wanted (s): strictly monotonic, on one side of 0.
     method : str
@@ -225,6 +230,19 @@ def _reference(scene: Scene, times: Sequence[float], tolerance: float) -> Trajec
     return _trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
 
 
+def _modern(factory: str, argument: str | int | None = None) -> Solver:
+    """Return a solver of `pyharness.modern`, which is imported when it is first used."""
+
+    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        solver = getattr(importlib.import_module("pyharness.modern"), factory)
+        if argument is not None:
+            solver = solver(argument)
+        trajectory: Trajectory = solver(scene, times, tolerance)
+        return trajectory
+
+    return solve
+
+
 def _trajectory(
     times: Sequence[float], omega: np.ndarray, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
@@ -283,6 +301,48 @@ METHODS = {
             "pyharness.reference",
             2.0**-52,
             _reference,
+        ),
+        Method(
+            "closed-form",
+            "known solution: sphere, or any body without torque by elliptic functions",
+            "fortran/modern/torque_free.f90; Jacobi 1849",
+            1e-14,
+            _modern("closed_form"),
+        ),
+        *(
+            Method(
+                f"gauss-{stages}",
+                f"Gauss collocation of order {2 * stages}, steps halved until two agree",
+                "fortran/modern/gauss_collocation.f90; Hairer, McLachlan and Razakarivony 2008",
+                _GAUSS_FINEST[stages - 1],
+                _modern("gauss", stages),
+            )
+            for stages in range(1, 9)
+        ),
+        *(
+            # In the scene's own steps, whatever their error: the only tolerance that they claim
+            # to meet is none.
+            Method(name, title, f"fortran/modern/fixed_step.f90; {source}", 1.0, solver)
+            for name, title, source, solver in (
+                (
+                    "improved-euler",
+                    "improved Euler in the scene's steps",
+                    "Jacobs 1982, eq. 29",
+                    _modern("fixed_step", "improved-euler"),
+                ),
+                (
+                    "taylor-3",
+                    "three terms of the Taylor series in the scene's steps",
+                    "Jacobs 1982, eq. 30",
+                    _modern("fixed_step", "taylor-3"),
+                ),
+                (
+                    "rk4",
+                    "classical Runge-Kutta in the scene's steps",
+                    "Jacobs 1982, eq. 31",
+                    _modern("fixed_step", "rk4"),
+                ),
+            )
         ),
     )
 }

@@ -125,6 +125,11 @@ def _compiled(folder: Path, file: str, old: str, new: str) -> ctypes.CDLL:
     paths = []
     for source in SOURCES:
         text = (FORTRAN / f"{source}.f90").read_text()
+        if source == "api":
+            # The entries of the programs; the modern kernels have tests of their own.
+            text = (
+                text.partition("end subroutine solve_linear\n")[0] + "end subroutine solve_linear\n"
+            )
         path = folder / f"{Path(source).name}.f90"
         if path.stem == file and old:
             assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times in {file}"

@@ -274,7 +274,7 @@ contains
     status = COMPLETE
     t = time
     if (orbit%time_exponent /= 0) t = scale(time, orbit%time_exponent)
-    if (orbit%kind == STEADY) then
+    if (orbit%kind == STEADY .or. .not. abs(t) > 0.0_dp) then
       w = orbit%omega
       do n = 1, 3
         if (abs(orbit%rates(n)) > 0.0_dp) w(n) = w(n) + orbit%rates(n)*t

@@ -1,0 +1,193 @@
+"""The modern kernels: scenes and times in, trajectories out; one solver per kind of method."""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.errors import InputError
+from pyharness.kernels import columns, extension
+from pyharness.scene import Scene, Triple, Wave
+from pyharness.trajectory import Array, Trajectory
+
+Solver = Callable[[Scene, Sequence[float], float], Trajectory]
+
+FIXED_STEP = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
+MOST_STAGES = 8
+
+_COMPLETE, _OVERFLOW, _REFUSED, _GAVE_UP = 0, 2, 3, 4
+# Right-hand sides of all trial steps of Gauss collocation together, some ten seconds.
+_MOST_EVALUATIONS = 200_000_000
+# Two solutions that differ by so many units in the last place will not get closer.
+_ROUNDING = 16 * 2.0**-53
+
+
+@dataclass(frozen=True)
+class Law:
+    """A torque law over the moments, as the kernels take it."""
+
+    constant: Triple
+    rate: Triple
+    sines: Array
+    cosines: Array
+
+    @property
+    def arguments(self) -> tuple[Triple, Triple, Array, Array]:
+        """In the kernels' order."""
+        return self.constant, self.rate, self.sines, self.cosines
+
+
+def law(scene: Scene) -> Law:
+    """Return the torque of `scene` over its moments."""
+    moments = scene.moments or (1.0, 1.0, 1.0)
+
+    def over(torque: Triple) -> Triple:
+        return torque[0] / moments[0], torque[1] / moments[1], torque[2] / moments[2]
+
+    def all_over(waves: tuple[Wave, ...]) -> Array:
+        return columns(tuple((over(amplitude), frequency) for amplitude, frequency in waves))
+
+    torque = scene.torque
+    return Law(
+        over(torque.constant), over(torque.rate), all_over(torque.sines), all_over(torque.cosines)
+    )
+
+
+def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    """Solve a scene that has a closed form; the tolerance plays no part.
+
+    Raises
+    ------
+    InputError
+        Where the scene has none: torque on a body that is no sphere, or coefficients all of
+        one sign; and where the phase is so large that it has no digit left.
+    """
+    if not any(scene.euler_coefficients):
+        rows, n_rows, status = extension().sphere_solution(
+            *law(scene).arguments, scene.omega, times
+        )
+    elif not scene.torque.is_zero:
+        raise InputError(
+            "closed-form: the scene has torque, and its body is no sphere; "
+            "allowed: a sphere, or no torque"
+        )
+    else:
+        rows, n_rows, status = extension().torque_free_solution(
+            scene.euler_coefficients, scene.omega, times
+        )
+    if status == _REFUSED:
+        raise InputError(
+            "closed-form: no bounded motion, or a disturbance too faint to square; allowed: "
+            "coefficients A, B, C not all of one sign, none of them zero between equal signs"
+        )
+    if status == _GAVE_UP:
+        raise InputError(
+            f"closed-form: at t = {times[n_rows]:g} s the phase is beyond 1e15 radians and has "
+            "no digit left; take a shorter time"
+        )
+    return _trajectory(times, rows, n_rows, status, len(times), 0)
+
+
+def fixed_step(name: str) -> Solver:
+    """Return the solver of a method of III.2: steps of the scene's size, no error control.
+
+    Before each time the last step is shortened to hit it.
+    """
+    number = FIXED_STEP[name]
+
+    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        rows, n_rows, status, evaluations = extension().fixed_step_solution(
+            scene.euler_coefficients, *law(scene).arguments, scene.omega, times, number,
+            scene.step_size,
+        )  # fmt: skip
+        if status == _GAVE_UP:
+            raise InputError(
+                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {scene.step_size:g} s "
+                "are too many; take a larger step or a shorter time"
+            )
+        per_step = 4 if name == "rk4" else 2
+        return _trajectory(times, rows, n_rows, status, evaluations // per_step, evaluations)
+
+    return solve
+
+
+def gauss(stages: int) -> Solver:
+    """Return the solver by Gauss collocation, steps halved until two solutions agree.
+
+    The error of the finer one is taken to be that of two solutions whose steps differ by two:
+    their difference over 2**order - 1, and twice that for safety.
+    """
+
+    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        torque = law(scene).arguments
+        scale = max(map(abs, scene.omega)) or 1.0
+        step, spent, reached = _first_step(scene, times), 0, 0.0
+        before: _Solution | None = None
+        while True:
+            # Each step takes two iterations at the least.
+            if spent + 2.0 * stages * _steps(times, step) > _MOST_EVALUATIONS:
+                raise InputError(
+                    f"gauss-{stages} gave up at t = {reached:.6g} s after {spent} right-hand "
+                    "sides; take a shorter time, a larger tolerance or more stages"
+                )
+            found = _Solution(
+                *extension().gauss_solution(
+                    scene.euler_coefficients, *torque, scene.omega, times, stages, step
+                )
+            )
+            spent += found.evaluations
+            reached = float(found.reached[0])
+            if before is not None and before.n_rows == found.n_rows:
+                n = found.n_rows
+                scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
+                difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
+                error = 2.0 * difference / (4.0**stages - 1.0)
+                close = error <= tolerance * scale or difference <= _ROUNDING * scale
+                if (close and found.status == _COMPLETE) or found.blows_up(before):
+                    count = _steps(times, step)
+                    return _trajectory(times, found.rows, n, found.status, count, spent)
+            before = found
+            step *= 0.5
+
+    return solve
+
+
+@dataclass(frozen=True)
+class _Solution:
+    rows: Array
+    reached: Array
+    n_rows: int
+    status: int
+    evaluations: int
+
+    def blows_up(self, coarser: "_Solution") -> bool:
+        """Whether it ended where the coarser one did, with an omega that grows as steps fall."""
+        if _COMPLETE in (self.status, coarser.status):
+            return False
+        largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
+        return largest > 1.5 * before > 1e3 * float(np.abs(self.rows[:, : self.n_rows]).max())
+
+
+def _steps(times: Sequence[float], step: float) -> int:
+    """Return the steps that the kernel takes: equal ones between times, `step` at the most."""
+    lengths = (abs(t1 - t0) for t0, t1 in itertools.pairwise((0.0, *times)))
+    return sum(max(1, math.floor(min(length / step, 1e18) + (1.0 - 1e-6))) for length in lengths)
+
+
+def _first_step(scene: Scene, times: Sequence[float]) -> float:
+    """Return a step in which the phase grows by about a half."""
+    rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
+    for waves in (scene.torque.sines, scene.torque.cosines):
+        rate = max([rate, *(abs(frequency) for _, frequency in waves)])
+    end = abs(times[-1]) or 1.0
+    return max(1e-300, min(end, 0.5 / rate)) if rate else end
+
+
+def _trajectory(
+    times: Sequence[float], rows: Array, n_rows: int, status: int, steps: int, evaluations: int
+) -> Trajectory:
+    time = np.array(times[:n_rows], dtype=float)
+    ended = "complete" if status == _COMPLETE else "overflow"
+    return Trajectory(time, time, rows.T[:n_rows], None, steps, evaluations, ended)

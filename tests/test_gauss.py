@@ -1,0 +1,147 @@
+"""Gauss collocation: its table, its order, what it conserves, and the steps it chooses."""
+
+import importlib.util
+from concurrent.futures import ThreadPoolExecutor
+from decimal import Decimal, localcontext
+from pathlib import Path
+from types import ModuleType
+
+import mpmath
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, case_scene
+from pyharness.kernels import extension
+from pyharness.methods import METHODS, solve
+from pyharness.modern import law
+from pyharness.reference import reference
+from pyharness.trajectory import Array
+
+_MAKER = Path(__file__).parent.parent / "fortran/make_gauss.py"
+_STAGES = range(1, 9)
+
+
+def _maker() -> ModuleType:
+    specification = importlib.util.spec_from_file_location("make_gauss", _MAKER)
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def _end(scene: Scene, times: list[float], stages: int, step: float) -> Array:
+    rows, _, n_rows, status, _ = extension().gauss_solution(
+        scene.euler_coefficients, *law(scene).arguments, scene.omega, times, stages, step
+    )
+    assert (n_rows, status) == (len(times), 0)
+    result: Array = rows.T
+    return result
+
+
+@pytest.mark.skipif(not _MAKER.exists(), reason="needs a checkout")
+@pytest.mark.parametrize("stages", _STAGES)
+def test_coefficients_agree_with_mpmath(stages: int) -> None:
+    maker = _maker()
+    with localcontext(prec=maker.DIGITS), mpmath.workdps(70):
+        nodes = maker.nodes(stages)
+        assert nodes == sorted(set(nodes))
+        for node in nodes:
+            assert abs(mpmath.legendre(stages, 2 * mpmath.mpf(str(node)) - 1)) < 1e-50
+        weights = maker.integrals(nodes, Decimal(0), Decimal(1))
+        rows = [maker.integrals(nodes, Decimal(0), c) for c in nodes]
+        # Integrals of 1 ... c**(s-1) are exact; that fixes the matrix.
+        for power in range(stages):
+            for row, end in zip([*rows, weights], [*nodes, Decimal(1)], strict=True):
+                total = sum(a * c**power for a, c in zip(row, nodes, strict=True))
+                assert abs(total - end ** (power + 1) / (power + 1)) < Decimal("1e-50")
+        # What makes it conserve quadratic invariants.
+        for i, j in np.ndindex(stages, stages):
+            left = weights[i] * rows[i][j] + weights[j] * rows[j][i]
+            assert abs(left - weights[i] * weights[j]) < Decimal("1e-50")
+
+
+# Steps in which the error is far above rounding, and its first term rules.
+_STEPS = {
+    4: ((40, 80), (40, 80), (20, 40), (10, 20), (10, 20), (6, 12), (5, 9), (5, 8)),
+    7: ((40, 80), (20, 40), (8, 16), (5, 10), (3, 6), (2, 4), (2, 3), (2, 4)),
+}
+
+
+@pytest.mark.parametrize(
+    ("case", "stages", "steps"),
+    [(case, s, steps[s - 1]) for case, steps in _STEPS.items() for s in _STAGES],
+)
+def test_order_is_twice_the_stages(case: int, stages: int, steps: tuple[int, int]) -> None:
+    scene = case_scene(case)
+    scene = Scene(
+        "", scene.omega, moments=scene.moments,
+        torque=TorqueLaw(rate=scene.torque.rate, sines=(((9.0, 9.0, 0.0), 3.0),))
+        if case == 7 else TorqueLaw(),
+    )  # fmt: skip
+    end = 3.0
+    truth = reference(scene, [end]).omega[0]
+    errors = [np.abs(_end(scene, [end], stages, end / n) - truth).max() for n in steps]
+    slope = np.log(errors[0] / errors[1]) / np.log(steps[1] / steps[0])
+    assert slope == pytest.approx(2 * stages, abs=0.9)
+
+
+@pytest.mark.parametrize("stages", _STAGES)
+def test_energy_and_momentum_stay_within_rounding(stages: int) -> None:
+    """1e5 steps; 2e-13 is what 1e6 steps are held to (2e-15 was measured there)."""
+    scene = case_scene(4)
+    moments = np.array(scene.moments)
+    rows = _end(scene, [float(t) for t in range(100, 1001, 100)], stages, 0.01)
+    for weight in (moments, moments**2):
+        start = weight @ np.array(scene.omega) ** 2
+        assert np.abs(rows**2 @ weight / start - 1.0).max() <= 4e-15
+
+
+@pytest.mark.parametrize("case", range(1, 8))
+@pytest.mark.parametrize("stages", [1, 2, 4, 8])
+def test_tolerance_is_met(stages: int, case: int) -> None:
+    scene = case_scene(case)
+    times = [-0.1, -0.55, -1.0] if case == 5 else [0.1, 0.55, 1.0]
+    truth = reference(scene, times)
+    finest = METHODS[f"gauss-{stages}"].finest
+    for tolerance in (1e-3, 1e-6, finest):
+        found = solve(scene, times, f"gauss-{stages}", tolerance)
+        error = np.abs(found.omega - truth.omega).max() / np.abs(truth.omega).max()
+        assert error <= tolerance + 1e-15
+        assert 0 < found.steps < found.evaluations
+
+
+def test_forth_and_back_returns() -> None:
+    """The method is its own inverse, up to rounding."""
+    scene = case_scene(4)
+    there = _end(scene, [2.0], 3, 0.05)[0]
+    returned = Scene("", (there[0], there[1], there[2]), moments=scene.moments)
+    np.testing.assert_allclose(_end(returned, [-2.0], 3, 0.05)[0], scene.omega, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("stages", [1, 8])
+def test_step_that_does_not_converge_gives_up(stages: int) -> None:
+    scene = case_scene(4)
+    found = extension().gauss_solution(
+        scene.euler_coefficients, *law(scene).arguments, scene.omega, [1.0, 100.0], stages, 50.0
+    )
+    assert found[3] in (2, 4)
+    assert found[2] < 2
+
+
+def test_hopeless_scene_gives_up() -> None:
+    scene = Scene("", (1e100, 1e100, 1e100), coefficients=(1.0, -1.0, 1.0))
+    with pytest.raises(InputError, match="gauss-2 gave up"):
+        solve(scene, [2.0], "gauss-2", 1e-6)
+
+
+def test_same_bits_from_many_threads() -> None:
+    scene = case_scene(7)
+
+    def run(_: int) -> Array:
+        return _end(scene, [0.3, 1.0], 5, 0.01)
+
+    with ThreadPoolExecutor(8) as pool:
+        first, *others = pool.map(run, range(40))
+    for other in others:
+        np.testing.assert_array_equal(first, other)

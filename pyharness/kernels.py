@@ -28,7 +28,11 @@ def extension() -> ModuleType:
 
 
 def run(
-    scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
+    scene: Scene,
+    listing: Listing,
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    velocity: bool = True,
 ) -> Trajectory:
     """Run a program in Fortran.
 
@@ -42,6 +46,9 @@ def run(
         The constant of the stop test (1/s); only the Runge-Kutta program has one.
     may_stop : bool
         Whether the stop test may end the run.
+    velocity : bool
+        Whether the velocity is wanted; where it is not, the translational block is computed
+        only if the stop test reads it. No other bit depends on this.
 
     Returns
     -------
@@ -70,13 +77,14 @@ def run(
         scene.steps,
         lipschitz,
         may_stop,
+        velocity or stop_reads_velocity(listing, may_stop),
     )
     results = rows.T[:n_rows]
     return Trajectory(
         time=results[:, 0],
         recorded_time=results[:, 1],
         omega=results[:, 2:5],
-        velocity=results[:, 5:8],
+        velocity=results[:, 5:8] if velocity else None,
         steps=n_rows,
         evaluations=evaluations,
         ended=_ENDED[status],
@@ -143,6 +151,11 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
         sines,
         cosines,
     )
+
+
+def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
+    """Whether the stop test of a listing looks at the translational velocity."""
+    return may_stop and listing.has("lipschitz-tests-velocity")
 
 
 def columns(waves: tuple[Wave, ...]) -> Array:

@@ -229,7 +229,7 @@ contains
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
     ! An error turns into one of phase and grows with it; the weights are from the seven cases and
     ! from random scenes.
-    share = tolerance/(5.0_dp + coupling*abs(time)*(0.15_dp*scale + 0.05_dp*gain))
+    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain))
     share = max(share, LEAST_SHARE)
     best = order_for(share, varies)
     most = min(best + 4, MOST_ORDER)

@@ -32,6 +32,9 @@ SCENES = {
     "from rest": Scene(
         "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((5.0, 3.0, 1.0))
     ),
+    "rate from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw(rate=(90.0, 60.0, 70.0))
+    ),
     "sine from rest": Scene(
         "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
         torque=TorqueLaw(sines=(((50.0, 30.0, 10.0), 2.0),)),

@@ -20,7 +20,7 @@ module taylor
     ! `right` are those of equations 13-15, three at once: w2 w3, w1 w3, w1 w2; the fourth is idle.
     real(dp) :: left(4, 0:MOST_ORDER)  !! omega2, omega1, omega1, 0
     real(dp) :: right(4, 0:MOST_ORDER) !! omega3, omega3, omega2, 0
-    real(dp) :: sums(4)                !! of products, (rad/s)**2
+    real(dp) :: sums(4)              !! of products, (rad/s)**2
     real(dp) :: k1(MOST_ORDER)       !! A step over order; with a varying torque the first only
     real(dp) :: k2(MOST_ORDER)       !! B
     real(dp) :: k3(MOST_ORDER)       !! C
@@ -136,6 +136,8 @@ contains
         call following(h, s, best, best_share, allowed, decay, next)
         scale = max(scale, scale_of(s))
         allowed = share*scale
+        ! From rest a torque that grows with time makes every third term only.
+        s%last = s%last + size_of(s, s%order - 2)
       end if
       call following(h, s, best, best_share, allowed, decay, next)
       if ((.not. s%last <= SLACK*allowed) .or. (steps == 0 .and. tries == 0)) then
@@ -173,6 +175,7 @@ contains
       w_low = (w - (total - back)) + (change - back)
       w = total
       steps = steps + 1
+      tries = 1
       if (.not. all(abs(w) <= huge(scale))) then
         status = OVERFLOW
         return
@@ -275,19 +278,25 @@ contains
     real(dp), intent(out) :: next            !! s
     integer(int64) :: before                 ! logarithm
     integer(int64) :: change                 ! logarithm
-    real(dp) :: size_before                  ! of the two terms before the last two, rad/s
     integer :: k
 
     k = s%order
-    size_before = (abs(s%left(2, k - 2)) + abs(s%left(2, k - 3))) &
-                  + (abs(s%left(1, k - 2)) + abs(s%left(1, k - 3))) &
-                  + (abs(s%right(1, k - 2)) + abs(s%right(1, k - 3)))
-    before = transfer(size_before, before)
+    before = transfer(size_of(s, k - 2), before)
     change = transfer(allowed, change) - before - ((best - k + 2)/2)*decay
     change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), shifta(change, 16)*share))
     next = transfer(transfer(h, change) + change, h)
     decay = transfer(s%last, before) - before
   end subroutine following
+
+  pure real(dp) function size_of(s, k)
+    !! Size of the terms k - 1 and k, rad/s.
+    type(series_t), intent(in) :: s
+    integer, intent(in) :: k
+
+    size_of = (abs(s%left(2, k)) + abs(s%left(2, k - 1))) &
+              + (abs(s%left(1, k)) + abs(s%left(1, k - 1))) &
+              + (abs(s%right(1, k)) + abs(s%right(1, k - 1)))
+  end function size_of
 
   pure real(dp) function scale_of(s)
     !! Size of the first terms, rad/s: what a body at rest is about to reach.
@@ -398,8 +407,7 @@ contains
       if (k > 3) s%tail = s%tail + [x, y, z]
       if (k < max(6, least) .or. mod(k, 2) == 1) cycle
       s%order = k
-      s%last = abs(s%left(2, k)) + abs(s%left(1, k)) + abs(s%right(1, k)) &
-               + abs(s%left(2, k - 1)) + abs(s%left(1, k - 1)) + abs(s%right(1, k - 1))
+      s%last = size_of(s, k)
       if (s%last <= allowed) exit
     end do
     ! end unroll

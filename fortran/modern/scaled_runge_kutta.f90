@@ -24,8 +24,11 @@ module scaled_runge_kutta
   real(dp), parameter :: ENOUGH = 0.75_dp    ! of the aim, where the seams are looked at
   ! Against the series, in steps of this method for a radian of motion: so many, and so many more
   ! for each binary digit. Measured, see docs/benchmark.md.
-  real(dp), parameter :: SERIES_STEPS = 2.0_dp
-  real(dp), parameter :: SERIES_STEPS_A_BIT = 0.12_dp
+  real(dp), parameter :: SERIES_STEPS = 1.9_dp
+  real(dp), parameter :: SERIES_STEPS_A_BIT = 0.28_dp
+  real(dp), parameter :: WAVE_RADIAN = 0.4_dp ! of a wave, in radians of motion, to the series
+  real(dp), parameter :: VARYING = 1.5_dp    ! cost of a step under a torque of time
+  real(dp), parameter :: A_WAVE = 0.9_dp     ! and of each wave in it
   real(dp), parameter :: FAST = 8.0_dp       ! frequency of a wave over the rate of the motion
   real(dp), parameter :: WEAK = 0.2_dp
   real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that counts
@@ -83,6 +86,7 @@ contains
     real(dp) :: wave         ! what it adds to the unknowns, times time
     real(dp) :: resolved     ! steps for a radian of it
     real(dp) :: radians      ! of the motion and of the waves
+    real(dp) :: cost         ! in steps under constant torque
     real(dp) :: bits         ! of the tolerance
     integer :: tries
     integer :: n
@@ -92,7 +96,7 @@ contains
     steps = 0
     result = omega
     if (n_sines + n_cosines > MOST_WAVES) return
-    call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, motion, status)
+   call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, motion, status)
     if (status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale
     rate_0 = max(abs(start(1)), abs(start(2)), abs(start(3)))
@@ -117,10 +121,12 @@ contains
     if (contest /= 0) then
       radians = 0.5_dp*abs(t_end)*(rate_0 + rate)
       do n = 1, whole%waves
-        radians = radians + abs(whole%frequency(n)*t_end)
+        radians = radians + WAVE_RADIAN*abs(whole%frequency(n)*t_end)
       end do
+      cost = n_steps
+      if (varies) cost = n_steps*(VARYING + A_WAVE*motion%waves)
       bits = 1023.0_dp - real(ishft(transfer(aim, 0_int64), -52), dp)
-      if (n_steps > 10.0_dp + radians*(SERIES_STEPS + SERIES_STEPS_A_BIT*bits)) then
+      if (cost > 10.0_dp + radians*(SERIES_STEPS + SERIES_STEPS_A_BIT*bits)) then
         status = REFUSED
         return
       end if

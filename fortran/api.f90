@@ -2,8 +2,8 @@
 
 subroutine run_program(program, flags, by_moments, body, omega, masses, forces, torque_constant, &
                        torque_rate, torque_varies, n_sines, sines, n_cosines, cosines, &
-                       step_size, n_steps, lipschitz, may_stop, rows, ier_rows, n_rows, status, &
-                       evaluations, stop_variable, stop_quotient)
+                       step_size, n_steps, lipschitz, may_stop, with_velocity, rows, ier_rows, &
+                       n_rows, status, evaluations, stop_variable, stop_quotient)
   ! One of the three programs of the appendix on one scene.
   !f2py threadsafe
   use deck, only: deck_t, stop_t
@@ -28,6 +28,7 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   integer(4), intent(in) :: n_steps
   real(8), intent(in) :: lipschitz
   integer(4), intent(in) :: may_stop
+  integer(4), intent(in) :: with_velocity  ! 0: V1-V3 of the rows are not set
   real(8), intent(out) :: rows(8, n_steps)  ! n h, TIME, U1-U3, V1-V3 for n_rows results
   integer(4), intent(out) :: ier_rows(n_steps)    ! IER as printed, 0 for runge-kutta
   integer(4), intent(out) :: n_rows
@@ -39,7 +40,8 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   type(stop_t) :: stop_at
 
   scene = deck_t(by_moments /= 0, body, omega, masses, forces, torque_constant, torque_rate, &
-                 torque_varies /= 0, sines, cosines, step_size, n_steps, lipschitz, may_stop /= 0)
+                 torque_varies /= 0, sines, cosines, step_size, n_steps, lipschitz, may_stop /= 0, &
+                 with_velocity /= 0)
   call run(program, scene, listing_from_bits(flags), rows, ier_rows, n_rows, status, evaluations, &
            stop_at)
   stop_variable = stop_at%variable

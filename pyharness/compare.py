@@ -210,7 +210,8 @@ def measured_order(
             finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
         except InputError:
             return None, False  # does not fit in memory
-        omega = program.run(finer, listing, may_stop=False).omega[parts - 1 :: parts]
+        run = program.run(finer, listing, may_stop=False, velocity=False)
+        omega = run.omega[parts - 1 :: parts]
         if len(omega) < n:
             continue  # overflow: the step is far too large
         error = float(np.abs(omega - truth.omega).max())

@@ -173,7 +173,8 @@ def _program(listing: Listing, scene: Scene) -> Maker:
             stepped = replace(scene, step_size=horizon / steps, steps=steps)
         except InputError as error:
             raise RefusedError(str(error)) from None
-        return Ready(partial(extension().run_program, *program_arguments(stepped, listing)), read)
+        arguments = program_arguments(stepped, listing, velocity=False)
+        return Ready(partial(extension().run_program, *arguments), read)
 
     def read(result: Any) -> Outcome:
         rows, _, n_rows, status, evaluations, variable, _ = result

@@ -29,7 +29,11 @@ def extension() -> ModuleType:
 
 
 def run(
-    scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
+    scene: Scene,
+    listing: Listing,
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    velocity: bool = True,
 ) -> Trajectory:
     """Run a program in Fortran.
 
@@ -43,6 +47,9 @@ def run(
         The constant of the stop test (1/s); only the Runge-Kutta program has one.
     may_stop : bool
         Whether the stop test may end the run.
+    velocity : bool
+        Whether the velocity is wanted; where it is not, the translational block is computed
+        only if the stop test reads it. No other bit depends on this.
 
     Returns
     -------
@@ -55,14 +62,14 @@ def run(
         Where the extension is not built.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
-        *program_arguments(scene, listing, lipschitz, may_stop)
+        *program_arguments(scene, listing, lipschitz, may_stop, velocity)
     )
     results = rows.T[:n_rows]
     return Trajectory(
         time=results[:, 0],
         recorded_time=results[:, 1],
         omega=results[:, 2:5],
-        velocity=results[:, 5:8],
+        velocity=results[:, 5:8] if velocity else None,
         steps=n_rows,
         evaluations=evaluations,
         ended=_ENDED[status],
@@ -72,7 +79,11 @@ def run(
 
 
 def program_arguments(
-    scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
+    scene: Scene,
+    listing: Listing,
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    velocity: bool = True,
 ) -> tuple[Any, ...]:
     """Return what the compiled `run_program` takes."""
     return (
@@ -92,6 +103,7 @@ def program_arguments(
         scene.steps,
         lipschitz,
         may_stop,
+        velocity or stop_reads_velocity(listing, may_stop),
     )
 
 
@@ -153,6 +165,11 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
         sines,
         cosines,
     )
+
+
+def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
+    """Whether the stop test of a listing looks at the translational velocity."""
+    return may_stop and listing.has("lipschitz-tests-velocity")
 
 
 def columns(waves: tuple[Wave, ...]) -> Array:

@@ -86,7 +86,9 @@ def limit(program: str, scene: Scene, halvings: int = 6) -> Limit:
     found = []
     for parts in (2**k for k in range(halvings + 1)):
         finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
-        run = PROGRAM_REGISTRY[program].run(finer, original(program), may_stop=False)
+        run = PROGRAM_REGISTRY[program].run(
+            finer, original(program), may_stop=False, velocity=False
+        )
         omega = run.omega[parts - 1 :: parts]
         distances = []
         for goal in (wanted, truth.omega):

@@ -55,6 +55,7 @@ class Program:
         implementation: str = "fortran",
         lipschitz: float = 500.0,
         may_stop: bool = True,
+        velocity: bool = True,
     ) -> Trajectory:
         """Run the program.
 
@@ -70,6 +71,9 @@ class Program:
             Constant of the stop test (1/s).
         may_stop : bool
             Whether the stop test may end the run.
+        velocity : bool
+            Whether the velocity is wanted; the compiled program then computes it only if its
+            stop test needs it.
 
         Raises
         ------
@@ -79,7 +83,7 @@ class Program:
         if implementation == "fortran":
             from pyharness import kernels
 
-            return kernels.run(scene, listing, lipschitz, may_stop)
+            return kernels.run(scene, listing, lipschitz, may_stop, velocity)
         twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")
         trajectory: Trajectory = twin.run(scene, listing, lipschitz, may_stop)
         return trajectory

@@ -6,7 +6,7 @@ from pyharness.errors import InputError
 from pyharness.scene import Scene
 
 FINEST = 1e-15  # relative; below it a tolerance asks for more digits than binary64 has
-_FIXED_STEP = ("improved-euler", "taylor-3", "rk4")
+_SCIPY = ("dop853", "rk45", "lsoda", "radau")
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,9 @@ def plan(
             "reference",
             method == "reference",
             "asked for" if method == "reference" else "not asked for",
+        ),
+        Decision(
+            "SciPy", method in _SCIPY, "the method is SciPy's" if method in _SCIPY else "ours"
         ),
     ]
     return Plan(method, form if closed else None, tuple(decisions))

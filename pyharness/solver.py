@@ -178,6 +178,8 @@ def solve(
         raise unknown("method", method, ("auto", *METHODS))
     if method == "auto":
         method = plan(scene, "auto", tolerance).method
+        # A closed form is as good as rounding lets it be, whatever is asked.
+        tolerance = max(tolerance, METHODS[method].finest)
     return solve_by_name(scene, times, method, tolerance)
 
 

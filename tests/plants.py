@@ -30,6 +30,7 @@ class PlantedTwin(Program):
         implementation: str = "python",
         lipschitz: float = 500.0,
         may_stop: bool = True,
+        velocity: bool = True,
     ) -> Trajectory:
         """Run the faulty twin."""
         trajectory: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)

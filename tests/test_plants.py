@@ -177,7 +177,8 @@ def _rows(
     library.run_program_(
         whole(number), whole(listing.flags), whole(1), vector(moments), vector(omega),
         vector(scene.masses), vector(scene.forces), vector(zero), vector(zero), whole(0),
-        whole(0), None, whole(0), None, real(scene.step_size), whole(steps), real(500.0), whole(0),
+        whole(0), None, whole(0), None, real(scene.step_size), whole(steps), real(500.0),
+        whole(0), whole(1),
         rows.ctypes.data_as(ctypes.c_void_p), ier.ctypes.data_as(ctypes.c_void_p),
         *map(ctypes.byref, answers), ctypes.byref(ctypes.c_double()),
     )  # fmt: skip

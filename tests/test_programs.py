@@ -247,6 +247,26 @@ def test_evaluations_count_right_hand_sides() -> None:
     assert counts == {"two-term": 300, "four-term": 500, "runge-kutta": 400}
 
 
+@pytest.mark.bitwise
+def test_velocity_that_no_one_asked_for_changes_no_bit_of_the_rest() -> None:
+    """The skip of the plan: every cell again without the translational block."""
+    for listing, case in all_cells():
+        scene = case_scene(case)
+        whole, part = (kernels.run(scene, listing, velocity=wanted) for wanted in (True, False))
+        assert part.velocity is None
+        assert (part.steps, part.ended, part.stop) == (whole.steps, whole.ended, whole.stop)
+        np.testing.assert_array_equal(part.omega, whole.omega)
+        np.testing.assert_array_equal(part.recorded_time, whole.recorded_time)
+        np.testing.assert_array_equal(part.ier, whole.ier)
+
+
+def test_stop_test_that_reads_the_velocity_keeps_it() -> None:
+    """As punched the velocity ends Case 2 at step 25, whether it is asked for or not."""
+    run = kernels.run(case_scene(2), original("runge-kutta"), velocity=False)
+    assert run.stop is not None
+    assert (run.stop.step, run.stop.variable) == (25, "V2")
+
+
 def test_calls_release_the_gil_and_give_the_same_bits_from_many_threads() -> None:
     from concurrent.futures import ThreadPoolExecutor
 

@@ -1,8 +1,13 @@
 """The Taylor kernel: its tolerance, both directions, its rows, its ends, every instruction set."""
 
+import ctypes
+import os
+import shutil
+import subprocess
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +19,7 @@ from pyharness.reference import Reference, reference
 from pyharness.scene import TorqueLaw
 from pyharness.trajectory import Array
 
+FORTRAN = Path(__file__).parent.parent / "fortran"
 RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
 LEVELS = ("plain", "avx2", "avx512")
 WAVES = TorqueLaw(
@@ -25,6 +31,9 @@ SCENES = {
     "waves": Scene("", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0), torque=WAVES),
     "from rest": Scene(
         "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((5.0, 3.0, 1.0))
+    ),
+    "rate from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw(rate=(90.0, 60.0, 70.0))
     ),
     "sine from rest": Scene(
         "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
@@ -182,3 +191,35 @@ def test_levels_agree_to_rounding() -> None:
     extension().choose_instructions(len(LEVELS) - 1)
     for omega in found[1:]:
         assert _error(omega, found[0]) <= 1e-15
+
+
+@pytest.mark.external
+@pytest.mark.skipif(shutil.which(os.environ.get("FC", "gfortran")) is None, reason="no compiler")
+def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
+    """The source is the definition; unroll.py only writes its loops out."""
+    sources = ["kinds.f90", "modern/euler_equations.f90", "modern/taylor.f90"]
+    library = tmp_path / "loops.so"
+    command = [os.environ.get("FC", "gfortran"), "-shared", "-fPIC", "-O1", "-o", str(library)]
+    subprocess.run([*command, *(str(FORTRAN / s) for s in sources)], cwd=tmp_path, check=True)
+    loops = ctypes.CDLL(str(library)).taylor_solve_level
+    for name, scene in SCENES.items():
+        coefficients, constant, rate, sines, cosines = normalized(scene)
+        found = np.zeros(3)
+        counts = (ctypes.c_int * 3)()
+        loops(
+            *map(_address, (coefficients, constant, rate)),
+            sines.shape[1], _address(sines), cosines.shape[1], _address(cosines),
+            _address(np.array(scene.omega)), _address(np.array([1e-12])),
+            1, _address(np.array([2.0])), _address(found),
+            *(ctypes.byref(counts, 4 * i) for i in range(3)),
+        )  # fmt: skip
+        omega, status, steps = _end(scene, 2.0, 1e-12)
+        assert (counts[1], abs(counts[2] - steps) <= 1) == (status, True), name
+        np.testing.assert_allclose(found, omega, rtol=0, atol=1e-13 * np.abs(omega).max())
+
+
+def _address(array: Array) -> ctypes.Array[ctypes.c_double]:
+    """Return the array's memory, columns first, in a form that ctypes passes and keeps alive."""
+    if not array.size:
+        return (ctypes.c_double * 1)()
+    return (ctypes.c_double * array.size).from_buffer(array.T.reshape(-1).data)

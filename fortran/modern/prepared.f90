@@ -1,6 +1,7 @@
 module prepared
   !! One door for a solver that was prepared: all that does not change lies packed in one array,
   !! so that a call from Python converts three arguments and not fourteen.
+  use, intrinsic :: iso_fortran_env, only: int64
   use fixed_step, only: fixed_step_end, IMPROVED_EULER, RUNGE_KUTTA_4, TAYLOR_3
   use gauss_collocation, only: gauss_rows
   use kinds, only: dp
@@ -92,7 +93,7 @@ contains
     packed(STATUS) = real(ended, dp)
     packed(STEPS) = real(count, dp)
     ! Not ieee_value: that module ties the binary to libgfortran.
-    if (ended /= 0) omega = transfer(huge(0_8), 1.0_dp)
+    if (ended /= 0) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
 
   pure integer function fixed_method(code)

@@ -16,9 +16,11 @@ module taylor
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass: orders that vary cost time
 
   type :: series_t
-    real(dp) :: x(0:MOST_ORDER)      !! omega1: term k is the coefficient times step**k, rad/s
-    real(dp) :: y(0:MOST_ORDER)      !! omega2
-    real(dp) :: z(0:MOST_ORDER)      !! omega3
+    ! Term k is the coefficient times step**k, rad/s. The products of a column of `left` and one of
+    ! `right` are those of equations 13-15, three at once: w2 w3, w1 w3, w1 w2; the fourth is idle.
+    real(dp) :: left(4, 0:MOST_ORDER)  !! omega2, omega1, omega1, 0
+    real(dp) :: right(4, 0:MOST_ORDER) !! omega3, omega3, omega2, 0
+    real(dp) :: sums(4)              !! of products, (rad/s)**2
     real(dp) :: k1(MOST_ORDER)       !! A step over order; with a varying torque the first only
     real(dp) :: k2(MOST_ORDER)       !! B
     real(dp) :: k3(MOST_ORDER)       !! C
@@ -96,8 +98,10 @@ contains
     torque%cosines => cosines
     varies = n_sines + n_cosines > 0 .or. any(m_rate /= 0.0_dp)
     scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
-    call plan(coefficients, torque, scale, tolerance, rest, best, most, share, h)
+    call plan(coefficients, torque, varies, scale, tolerance, rest, best, most, share, h)
     best_share = 65536/best
+    s%left(4, :) = 0.0_dp
+    s%right(4, :) = 0.0_dp
     decay = 0
     tries = 0
     do
@@ -113,9 +117,8 @@ contains
       end if
       scale = max(scale, abs(w(1)), abs(w(2)), abs(w(3)))
       allowed = share*scale
-      s%x(0) = w(1)
-      s%y(0) = w(2)
-      s%z(0) = w(3)
+      s%left(:, 0) = [w(2), w(1), w(1), 0.0_dp]
+      s%right(:, 0) = [w(3), w(3), w(2), 0.0_dp]
       if (varies) then
         s%k1(1) = coefficients(1)*h
         s%k2(1) = coefficients(2)*h
@@ -133,6 +136,8 @@ contains
         call following(h, s, best, best_share, allowed, decay, next)
         scale = max(scale, scale_of(s))
         allowed = share*scale
+        ! From rest a torque that grows with time makes every third term only.
+        s%last = s%last + size_of(s, s%order - 2)
       end if
       call following(h, s, best, best_share, allowed, decay, next)
       if ((.not. s%last <= SLACK*allowed) .or. (steps == 0 .and. tries == 0)) then
@@ -161,15 +166,16 @@ contains
         n_rows = n_rows + 1
         rows(:, n_rows) = w + (w_low + inside(s, ((times(n_rows) - t) - t_low)/h))
       end do
-      change(1) = ((s%tail(1) + s%x(3)) + s%x(2)) + s%x(1)
-      change(2) = ((s%tail(2) + s%y(3)) + s%y(2)) + s%y(1)
-      change(3) = ((s%tail(3) + s%z(3)) + s%z(2)) + s%z(1)
+      change(1) = ((s%tail(1) + s%left(2, 3)) + s%left(2, 2)) + s%left(2, 1)
+      change(2) = ((s%tail(2) + s%left(1, 3)) + s%left(1, 2)) + s%left(1, 1)
+      change(3) = ((s%tail(3) + s%right(1, 3)) + s%right(1, 2)) + s%right(1, 1)
       change = change + w_low
       total = w + change
       back = total - w
       w_low = (w - (total - back)) + (change - back)
       w = total
       steps = steps + 1
+      tries = 1
       if (.not. all(abs(w) <= huge(scale))) then
         status = OVERFLOW
         return
@@ -189,10 +195,11 @@ contains
     end do
   end subroutine taylor_solve
 
-  pure subroutine plan(coefficients, torque, scale, tolerance, time, best, most, share, h)
+  pure subroutine plan(coefficients, torque, varies, scale, tolerance, time, best, most, share, h)
     !! Order from the tolerance, the first step from the rates of the problem.
     real(dp), intent(in) :: coefficients(3) !! A, B, C
     type(torque_t), intent(in) :: torque
+    logical, intent(in) :: varies           !! torque with time
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: time            !! to go, s
@@ -225,9 +232,9 @@ contains
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
     ! An error turns into one of phase and grows with it; the weights are from the seven cases and
     ! from random scenes.
-    share = tolerance/(5.0_dp + coupling*abs(time)*(0.15_dp*scale + 0.05_dp*gain))
+    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain))
     share = max(share, LEAST_SHARE)
-    best = order_for(share)
+    best = order_for(share, varies)
     most = min(best + 4, MOST_ORDER)
   end subroutine plan
 
@@ -247,13 +254,15 @@ contains
     end if
   end subroutine add_wave_rates
 
-  pure integer function order_for(share)
-    !! Even order with the least work: the number of digits and this machine's costs set it.
+  pure integer function order_for(share, varies)
+    !! Even order with the least work, a line through measured ones. A torque that varies costs
+    !! the same at every order, so that fewer and longer steps pay.
     real(dp), intent(in) :: share
+    logical, intent(in) :: varies  !! torque with time
     integer(int64) :: bits  ! of accuracy
 
     bits = 1023 - ishft(transfer(share, bits), -52)
-    order_for = min(MOST_ORDER - 4, 2*int((20 + bits)/6))
+    order_for = min(MOST_ORDER - 4, 2*int((30 + 2*bits)/10) + merge(2, 0, varies))
   end function order_for
 
   pure subroutine following(h, s, best, share, allowed, decay, next)
@@ -269,18 +278,25 @@ contains
     real(dp), intent(out) :: next            !! s
     integer(int64) :: before                 ! logarithm
     integer(int64) :: change                 ! logarithm
-    real(dp) :: size_before                  ! of the two terms before the last two, rad/s
     integer :: k
 
     k = s%order
-    size_before = (abs(s%x(k - 2)) + abs(s%x(k - 3))) + (abs(s%y(k - 2)) + abs(s%y(k - 3))) &
-                  + (abs(s%z(k - 2)) + abs(s%z(k - 3)))
-    before = transfer(size_before, before)
+    before = transfer(size_of(s, k - 2), before)
     change = transfer(allowed, change) - before - ((best - k + 2)/2)*decay
     change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), shifta(change, 16)*share))
     next = transfer(transfer(h, change) + change, h)
     decay = transfer(s%last, before) - before
   end subroutine following
+
+  pure real(dp) function size_of(s, k)
+    !! Size of the terms k - 1 and k, rad/s.
+    type(series_t), intent(in) :: s
+    integer, intent(in) :: k
+
+    size_of = (abs(s%left(2, k)) + abs(s%left(2, k - 1))) &
+              + (abs(s%left(1, k)) + abs(s%left(1, k - 1))) &
+              + (abs(s%right(1, k)) + abs(s%right(1, k - 1)))
+  end function size_of
 
   pure real(dp) function scale_of(s)
     !! Size of the first terms, rad/s: what a body at rest is about to reach.
@@ -289,7 +305,7 @@ contains
 
     scale_of = 0.0_dp
     do k = 1, 4
-      scale_of = max(scale_of, abs(s%x(k)), abs(s%y(k)), abs(s%z(k)))
+      scale_of = max(scale_of, abs(s%left(2, k)), abs(s%left(1, k)), abs(s%right(1, k)))
     end do
     scale_of = min(scale_of, huge(scale_of))
   end function scale_of
@@ -317,10 +333,10 @@ contains
     s%tail = 0.0_dp
     do k = 1, s%order
       power = power*ratio
-      s%x(k) = s%x(k)*power
-      s%y(k) = s%y(k)*power
-      s%z(k) = s%z(k)*power
-      if (k > 3) s%tail = s%tail + [s%x(k), s%y(k), s%z(k)]
+      s%left(2, k) = s%left(2, k)*power
+      s%left(1, k) = s%left(1, k)*power
+      s%right(1, k) = s%right(1, k)*power
+      if (k > 3) s%tail = s%tail + [s%left(2, k), s%left(1, k), s%right(1, k)]
     end do
   end subroutine shorten
 
@@ -333,7 +349,7 @@ contains
 
     change = 0.0_dp
     do k = s%order, 1, -1
-      change = (change + [s%x(k), s%y(k), s%z(k)])*part
+      change = (change + [s%left(2, k), s%left(1, k), s%right(1, k)])*part
     end do
   end function inside
 
@@ -359,7 +375,6 @@ contains
     integer, intent(in) :: least     !! order
     integer, intent(in) :: most      !! order
     real(dp), intent(in) :: allowed  !! rad/s
-
     ! unroll: m 1
     s%m(:, 2:) = 0.0_dp
     call expand_varying(s, least, most, allowed)
@@ -372,19 +387,27 @@ contains
     integer, intent(in) :: least     !! order
     integer, intent(in) :: most      !! order
     real(dp), intent(in) :: allowed  !! rad/s
+    ! unroll: m 28
+    real(dp) :: x
+    real(dp) :: y
+    real(dp) :: z
+    integer :: i
     integer :: k
 
-    ! unroll: m 28
     s%tail = 0.0_dp
     do k = 1, most
-      s%x(k) = s%k1(1)*INVERSE(k)*dot_product(s%y(0:k - 1), s%z(k - 1:0:-1)) + s%m(1, k)
-      s%y(k) = s%k2(1)*INVERSE(k)*dot_product(s%x(0:k - 1), s%z(k - 1:0:-1)) + s%m(2, k)
-      s%z(k) = s%k3(1)*INVERSE(k)*dot_product(s%x(0:k - 1), s%y(k - 1:0:-1)) + s%m(3, k)
-      if (k > 3) s%tail = s%tail + [s%x(k), s%y(k), s%z(k)]
+      do i = 1, 3
+        s%sums(i) = dot_product(s%left(i, 0:k - 1), s%right(i, k - 1:0:-1))
+      end do
+      x = s%k1(1)*INVERSE(k)*s%sums(1) + s%m(1, k)
+      y = s%k2(1)*INVERSE(k)*s%sums(2) + s%m(2, k)
+      z = s%k3(1)*INVERSE(k)*s%sums(3) + s%m(3, k)
+      s%left(:3, k) = [y, x, x]
+      s%right(:3, k) = [z, z, y]
+      if (k > 3) s%tail = s%tail + [x, y, z]
       if (k < max(6, least) .or. mod(k, 2) == 1) cycle
       s%order = k
-      s%last = abs(s%x(k)) + abs(s%y(k)) + abs(s%z(k)) &
-               + abs(s%x(k - 1)) + abs(s%y(k - 1)) + abs(s%z(k - 1))
+      s%last = size_of(s, k)
       if (s%last <= allowed) exit
     end do
     ! end unroll

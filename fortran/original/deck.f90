@@ -24,6 +24,7 @@ module deck
     integer :: n_steps
     real(dp) :: lipschitz             !! LIP, 1/s
     logical :: may_stop
+    logical :: with_velocity          !! else the translational block is not computed
   end type deck_t
 
   type, public :: stop_t

@@ -61,6 +61,7 @@ contains
     real(dp) :: X1, Y1, Z1  ! translational ones, m/s2
     integer :: I
     integer :: L
+    integer :: M         ! right-hand sides of LEQT1F
     integer :: IER
 
     n_rows = 0
@@ -81,6 +82,7 @@ contains
     V3(1) = 0.0_dp                                                                ! 530
     call accelerations(scene, ACL1, ACL2, ACL3)                                   ! 640-660
     DT = scene%step_size                                                          ! 680
+    M = merge(6, 3, scene%with_velocity)                                          ! 1280
 
     do I = 1, scene%n_steps                                                       ! 700
       begin = real(I - 1, dp)*scene%step_size
@@ -109,9 +111,11 @@ contains
       F1 = M1(1) + A1*U2(1)*U3(1)                                                 ! 780
       G1 = M2(1) + B1*U1(1)*U3(1)                                                 ! 790
       H1 = M3(1) + C*U1(1)*U2(1)                                                  ! 800
-      X1 = ACL1 + V2(1)*U3(1) - V3(1)*U2(1)                                       ! 810
-      Y1 = ACL2 + V3(1)*U1(1) - V1(1)*U3(1)                                       ! 820
-      Z1 = ACL3 + V1(1)*U2(1) - V2(1)*U1(1)                                       ! 830
+      if (scene%with_velocity) then
+        X1 = ACL1 + V2(1)*U3(1) - V3(1)*U2(1)                                     ! 810
+        Y1 = ACL2 + V3(1)*U1(1) - V1(1)*U3(1)                                     ! 820
+        Z1 = ACL3 + V1(1)*U2(1) - V2(1)*U1(1)                                     ! 830
+      end if
       A(1, 1) = 1.0_dp                                                            ! 850
       A(1, 2) = 2.0_dp*T1                                                         ! 860
       A(1, 3) = 3.0_dp*(T1*T1)                                                    ! 870
@@ -140,19 +144,21 @@ contains
       B(2, 3) = H1                                                                ! 1110
       B(3, 3) = H1                                                                ! 1120
       B(4, 3) = H1                                                                ! 1130
-      B(1, 4) = X1                                                                ! 1140
-      B(2, 4) = X1                                                                ! 1150
-      B(3, 4) = X1                                                                ! 1160
-      B(4, 4) = X1                                                                ! 1170
-      B(1, 5) = Y1                                                                ! 1180
-      B(2, 5) = Y1                                                                ! 1190
-      B(3, 5) = Y1                                                                ! 1200
-      B(4, 5) = Y1                                                                ! 1210
-      B(1, 6) = Z1                                                                ! 1220
-      B(2, 6) = Z1                                                                ! 1230
-      B(3, 6) = Z1                                                                ! 1240
-      B(4, 6) = Z1                                                                ! 1250
-      call leqt1f(A, 6, 4, B, IER)                                                ! 1320
+      if (scene%with_velocity) then
+        B(1, 4) = X1                                                              ! 1140
+        B(2, 4) = X1                                                              ! 1150
+        B(3, 4) = X1                                                              ! 1160
+        B(4, 4) = X1                                                              ! 1170
+        B(1, 5) = Y1                                                              ! 1180
+        B(2, 5) = Y1                                                              ! 1190
+        B(3, 5) = Y1                                                              ! 1200
+        B(4, 5) = Y1                                                              ! 1210
+        B(1, 6) = Z1                                                              ! 1220
+        B(2, 6) = Z1                                                              ! 1230
+        B(3, 6) = Z1                                                              ! 1240
+        B(4, 6) = Z1                                                              ! 1250
+      end if
+      call leqt1f(A, M, 4, B, IER)                                                ! 1320
       T(1) = 0.0_dp
       T(2) = T1                                                                   ! 1350
       T(3) = T2                                                                   ! 1360
@@ -168,18 +174,22 @@ contains
                 B(4, 2)*TL4                                                       ! 1420
         U3(L) = U3(1) + B(1, 3)*T(L) + B(2, 3)*TL2 + B(3, 3)*TL3 + &              ! 1430
                 B(4, 3)*TL4                                                       ! 1440
-        V1(L) = V1(1) + B(1, 4)*T(L) + B(2, 4)*TL2 + B(3, 4)*TL3 + &              ! 1450
-                B(4, 4)*TL4                                                       ! 1460
-        V2(L) = V2(1) + B(1, 5)*T(L) + B(2, 5)*TL2 + B(3, 5)*TL3 + &              ! 1470
-                B(4, 5)*TL4                                                       ! 1480
-        V3(L) = V3(1) + B(1, 6)*T(L) + B(2, 6)*TL2 + B(3, 6)*TL3 + &              ! 1490
-                B(4, 6)*TL4                                                       ! 1500
+        if (scene%with_velocity) then
+          V1(L) = V1(1) + B(1, 4)*T(L) + B(2, 4)*TL2 + B(3, 4)*TL3 + &            ! 1450
+                  B(4, 4)*TL4                                                     ! 1460
+          V2(L) = V2(1) + B(1, 5)*T(L) + B(2, 5)*TL2 + B(3, 5)*TL3 + &            ! 1470
+                  B(4, 5)*TL4                                                     ! 1480
+          V3(L) = V3(1) + B(1, 6)*T(L) + B(2, 6)*TL2 + B(3, 6)*TL3 + &            ! 1490
+                  B(4, 6)*TL4                                                     ! 1500
+        end if
         F(L) = M1(L) + A1*U2(L)*U3(L)                                             ! 1510
         G(L) = M2(L) + B1*U1(L)*U3(L)                                             ! 1520
         H(L) = M3(L) + C*U1(L)*U2(L)                                              ! 1530
-        X(L) = ACL1 + V2(L)*U3(L) - V3(L)*U2(L)                                   ! 1540
-        Y(L) = ACL2 + V3(L)*U1(L) - V1(L)*U3(L)                                   ! 1550
-        Z(L) = ACL3 + V1(L)*U2(L) - V2(L)*U1(L)                                   ! 1560
+        if (scene%with_velocity) then
+          X(L) = ACL1 + V2(L)*U3(L) - V3(L)*U2(L)                                 ! 1540
+          Y(L) = ACL2 + V3(L)*U1(L) - V1(L)*U3(L)                                 ! 1550
+          Z(L) = ACL3 + V1(L)*U2(L) - V2(L)*U1(L)                                 ! 1560
+        end if
       end do                                                                      ! 1570
 
       ! correction: right-hand sides at the collocation points
@@ -211,19 +221,21 @@ contains
       B(2, 3) = H(3)                                                              ! 1860
       B(3, 3) = H(4)                                                              ! 1870
       B(4, 3) = H(5)                                                              ! 1880
-      B(1, 4) = X(2)                                                              ! 1890
-      B(2, 4) = X(3)                                                              ! 1900
-      B(3, 4) = X(4)                                                              ! 1910
-      B(4, 4) = X(5)                                                              ! 1920
-      B(1, 5) = Y(2)                                                              ! 1930
-      B(2, 5) = Y(3)                                                              ! 1940
-      B(3, 5) = Y(4)                                                              ! 1950
-      B(4, 5) = Y(5)                                                              ! 1960
-      B(1, 6) = Z(2)                                                              ! 1970
-      B(2, 6) = Z(3)                                                              ! 1980
-      B(3, 6) = Z(4)                                                              ! 1990
-      B(4, 6) = Z(5)                                                              ! 2000
-      call leqt1f(A, 6, 4, B, IER)                                                ! 2010
+      if (scene%with_velocity) then
+        B(1, 4) = X(2)                                                            ! 1890
+        B(2, 4) = X(3)                                                            ! 1900
+        B(3, 4) = X(4)                                                            ! 1910
+        B(4, 4) = X(5)                                                            ! 1920
+        B(1, 5) = Y(2)                                                            ! 1930
+        B(2, 5) = Y(3)                                                            ! 1940
+        B(3, 5) = Y(4)                                                            ! 1950
+        B(4, 5) = Y(5)                                                            ! 1960
+        B(1, 6) = Z(2)                                                            ! 1970
+        B(2, 6) = Z(3)                                                            ! 1980
+        B(3, 6) = Z(4)                                                            ! 1990
+        B(4, 6) = Z(5)                                                            ! 2000
+      end if
+      call leqt1f(A, M, 4, B, IER)                                                ! 2010
       TL2 = T5*T5
       TL3 = TL2*T5
       TL4 = TL2*TL2
@@ -233,12 +245,14 @@ contains
               B(4, 2)*TL4                                                         ! 2060
       U3(6) = U3(1) + B(1, 3)*T5 + B(2, 3)*TL2 + B(3, 3)*TL3 + &                  ! 2070
               B(4, 3)*TL4                                                         ! 2080
-      V1(6) = V1(1) + B(1, 4)*T5 + B(2, 4)*TL2 + B(3, 4)*TL3 + &                  ! 2090
-              B(4, 4)*TL4                                                         ! 2100
-      V2(6) = V2(1) + B(1, 5)*T5 + B(2, 5)*TL2 + B(3, 5)*TL3 + &                  ! 2110
-              B(4, 5)*TL4                                                         ! 2120
-      V3(6) = V3(1) + B(1, 6)*T5 + B(2, 6)*TL2 + B(3, 6)*TL3 + &                  ! 2130
-              B(4, 6)*TL4                                                         ! 2140
+      if (scene%with_velocity) then
+        V1(6) = V1(1) + B(1, 4)*T5 + B(2, 4)*TL2 + B(3, 4)*TL3 + &                ! 2090
+                B(4, 4)*TL4                                                       ! 2100
+        V2(6) = V2(1) + B(1, 5)*T5 + B(2, 5)*TL2 + B(3, 5)*TL3 + &                ! 2110
+                B(4, 5)*TL4                                                       ! 2120
+        V3(6) = V3(1) + B(1, 6)*T5 + B(2, 6)*TL2 + B(3, 6)*TL3 + &                ! 2130
+                B(4, 6)*TL4                                                       ! 2140
+      end if
       evaluations = evaluations + 5
       if (.not. is_finite(U1(6), U2(6), U3(6))) then
         status = OVERFLOW
@@ -252,15 +266,19 @@ contains
       rows(3, I) = U1(6)                                                          ! 2180
       rows(4, I) = U2(6)                                                          ! 2180
       rows(5, I) = U3(6)                                                          ! 2180
-      rows(6, I) = V1(6)                                                          ! 2180
-      rows(7, I) = V2(6)                                                          ! 2180
-      rows(8, I) = V3(6)                                                          ! 2180
+      if (scene%with_velocity) then
+        rows(6, I) = V1(6)                                                        ! 2180
+        rows(7, I) = V2(6)                                                        ! 2180
+        rows(8, I) = V3(6)                                                        ! 2180
+      end if
       U1(1) = U1(6)                                                               ! 2190
       U2(1) = U2(6)                                                               ! 2200
       U3(1) = U3(6)                                                               ! 2210
-      V1(1) = V1(6)                                                               ! 2220
-      V2(1) = V2(6)                                                               ! 2230
-      V3(1) = V3(6)                                                               ! 2240
+      if (scene%with_velocity) then
+        V1(1) = V1(6)                                                             ! 2220
+        V2(1) = V2(6)                                                             ! 2230
+        V3(1) = V3(6)                                                             ! 2240
+      end if
       if (listing%dt_accumulates) then
         DT = DT + scene%step_size                                                 ! 2250
       end if

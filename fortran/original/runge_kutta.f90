@@ -122,23 +122,29 @@ contains
         KF(I) = R1(I) + A*U2(J)*U3(J)                                             ! 800
         KG(I) = R2(I) + B*U3(J)*U1(J)                                             ! 810
         KH(I) = R3(I) + C*U1(J)*U2(J)                                             ! 820
-        KX(I) = ACL1 + V2(J)*U3(J) - V3(J)*U2(J)                                  ! 830
-        KY(I) = ACL2 + V3(J)*U1(J) - V1(J)*U3(J)                                  ! 840
-        KZ(I) = ACL3 + V1(J)*U2(J) - V2(J)*U1(J)                                  ! 850
+        if (scene%with_velocity) then
+          KX(I) = ACL1 + V2(J)*U3(J) - V3(J)*U2(J)                                ! 830
+          KY(I) = ACL2 + V3(J)*U1(J) - V1(J)*U3(J)                                ! 840
+          KZ(I) = ACL3 + V1(J)*U2(J) - V2(J)*U1(J)                                ! 850
+        end if
         if (listing%stage_base) then
           U1(I) = U1(J) + 0.5_dp*DT*KF(I)                                         ! 860
           U2(I) = U2(J) + 0.5_dp*DT*KG(I)                                         ! 870
           U3(I) = U3(J) + 0.5_dp*DT*KH(I)                                         ! 880
-          V1(I) = V1(J) + 0.5_dp*DT*KX(I)                                         ! 890
-          V2(I) = V2(J) + 0.5_dp*DT*KY(I)                                         ! 900
-          V3(I) = V3(J) + 0.5_dp*DT*KZ(I)                                         ! 910
+          if (scene%with_velocity) then
+            V1(I) = V1(J) + 0.5_dp*DT*KX(I)                                       ! 890
+            V2(I) = V2(J) + 0.5_dp*DT*KY(I)                                       ! 900
+            V3(I) = V3(J) + 0.5_dp*DT*KZ(I)                                       ! 910
+          end if
         else
           U1(I) = UU1 + 0.5_dp*DT*KF(I)                                           ! 860
           U2(I) = UU2 + 0.5_dp*DT*KG(I)                                           ! 870
           U3(I) = UU3 + 0.5_dp*DT*KH(I)                                           ! 880
-          V1(I) = VV1 + 0.5_dp*DT*KX(I)                                           ! 890
-          V2(I) = VV2 + 0.5_dp*DT*KY(I)                                           ! 900
-          V3(I) = VV3 + 0.5_dp*DT*KZ(I)                                           ! 910
+          if (scene%with_velocity) then
+            V1(I) = VV1 + 0.5_dp*DT*KX(I)                                         ! 890
+            V2(I) = VV2 + 0.5_dp*DT*KY(I)                                         ! 900
+            V3(I) = VV3 + 0.5_dp*DT*KZ(I)                                         ! 910
+          end if
         end if
       end do                                                                      ! 920
       if (listing%do_variable) then
@@ -151,38 +157,50 @@ contains
       KF(I) = R1(I) + A*U2(J)*U3(J)                                               ! 950
       KG(I) = R2(I) + B*U3(J)*U1(J)                                               ! 960
       KH(I) = R3(I) + C*U1(J)*U2(J)                                               ! 970
-      KX(I) = ACL1 + V2(J)*U3(J) - V3(J)*U2(J)                                    ! 980
-      KY(I) = ACL2 + V3(J)*U1(J) - V1(J)*U3(J)                                    ! 990
-      KZ(I) = ACL3 + V1(J)*U2(J) - V2(J)*U1(J)                                    ! 1000
+      if (scene%with_velocity) then
+        KX(I) = ACL1 + V2(J)*U3(J) - V3(J)*U2(J)                                  ! 980
+        KY(I) = ACL2 + V3(J)*U1(J) - V1(J)*U3(J)                                  ! 990
+        KZ(I) = ACL3 + V1(J)*U2(J) - V2(J)*U1(J)                                  ! 1000
+      end if
       if (listing%stage_base) then
         U1(I) = U1(J) + DT*KF(I)                                                  ! 1040
         U2(I) = U2(J) + DT*KG(I)                                                  ! 1050
         U3(I) = U3(J) + DT*KH(I)                                                  ! 1060
-        V1(I) = V1(J) + DT*KX(I)                                                  ! 1070
-        V2(I) = V2(J) + DT*KY(I)                                                  ! 1080
-        V3(I) = V3(J) + DT*KZ(I)                                                  ! 1090
+        if (scene%with_velocity) then
+          V1(I) = V1(J) + DT*KX(I)                                                ! 1070
+          V2(I) = V2(J) + DT*KY(I)                                                ! 1080
+          V3(I) = V3(J) + DT*KZ(I)                                                ! 1090
+        end if
       else
         U1(I) = UU1 + DT*KF(I)                                                    ! 1040
         U2(I) = UU2 + DT*KG(I)                                                    ! 1050
         U3(I) = UU3 + DT*KH(I)                                                    ! 1060
-        V1(I) = VV1 + DT*KX(I)                                                    ! 1070
-        V2(I) = VV2 + DT*KY(I)                                                    ! 1080
-        V3(I) = VV3 + DT*KZ(I)                                                    ! 1090
+        if (scene%with_velocity) then
+          V1(I) = VV1 + DT*KX(I)                                                  ! 1070
+          V2(I) = VV2 + DT*KY(I)                                                  ! 1080
+          V3(I) = VV3 + DT*KZ(I)                                                  ! 1090
+        end if
       end if
       I = 4                                                                       ! 1100
       J = 3                                                                       ! 1110
       KF(I) = R1(I) + A*U2(J)*U3(J)                                               ! 1120
       KG(I) = R2(I) + B*U3(J)*U1(J)                                               ! 1130
       KH(I) = R3(I) + C*U1(J)*U2(J)                                               ! 1140
-      KX(I) = ACL1 + V2(J)*U3(J) - V3(J)*U2(J)                                    ! 1150
-      KY(I) = ACL2 + V3(J)*U1(J) - V1(J)*U3(J)                                    ! 1160
-      KZ(I) = ACL3 + V1(J)*U2(J) - V2(J)*U1(J)                                    ! 1170
+      if (scene%with_velocity) then
+        KX(I) = ACL1 + V2(J)*U3(J) - V3(J)*U2(J)                                  ! 1150
+        KY(I) = ACL2 + V3(J)*U1(J) - V1(J)*U3(J)                                  ! 1160
+        KZ(I) = ACL3 + V1(J)*U2(J) - V2(J)*U1(J)                                  ! 1170
+      end if
       U1(I) = UU1 + (DT/6.0_dp)*(KF(1) + 2.0_dp*(KF(2) + KF(3)) + KF(4))          ! 1180
       U2(I) = UU2 + (DT/6.0_dp)*(KG(1) + 2.0_dp*(KG(2) + KG(3)) + KG(4))          ! 1190
       U3(I) = UU3 + (DT/6.0_dp)*(KH(1) + 2.0_dp*(KH(2) + KH(3)) + KH(4))          ! 1200
-      V1(I) = VV1 + (DT/6.0_dp)*(KX(1) + 2.0_dp*(KX(2) + KX(3)) + KX(4))          ! 1210
-      V2(I) = VV2 + (DT/6.0_dp)*(KY(1) + 2.0_dp*(KY(2) + KY(3)) + KY(4))          ! 1220
-      V3(I) = VV3 + (DT/6.0_dp)*(KZ(1) + 2.0_dp*(KZ(2) + KZ(3)) + KZ(4))          ! 1230
+      if (scene%with_velocity) then
+        if (scene%with_velocity) then
+          V1(I) = VV1 + (DT/6.0_dp)*(KX(1) + 2.0_dp*(KX(2) + KX(3)) + KX(4))      ! 1210
+          V2(I) = VV2 + (DT/6.0_dp)*(KY(1) + 2.0_dp*(KY(2) + KY(3)) + KY(4))      ! 1220
+          V3(I) = VV3 + (DT/6.0_dp)*(KZ(1) + 2.0_dp*(KZ(2) + KZ(3)) + KZ(4))      ! 1230
+        end if
+      end if
       evaluations = evaluations + 4
       if (.not. is_finite(U1(4), U2(4), U3(4))) then
         status = OVERFLOW
@@ -195,9 +213,11 @@ contains
       rows(3, L) = U1(4)                                                          ! 1250
       rows(4, L) = U2(4)                                                          ! 1250
       rows(5, L) = U3(4)                                                          ! 1250
-      rows(6, L) = V1(4)                                                          ! 1250
-      rows(7, L) = V2(4)                                                          ! 1250
-      rows(8, L) = V3(4)                                                          ! 1250
+      if (scene%with_velocity) then
+        rows(6, L) = V1(4)                                                        ! 1250
+        rows(7, L) = V2(4)                                                        ! 1250
+        rows(8, L) = V3(4)                                                        ! 1250
+      end if
 
       ! the Lipschitz test
       if (listing%lipschitz_mismatched_pairs) then
@@ -232,16 +252,20 @@ contains
       UU1 = U1(I)                                                                 ! 1480
       UU2 = U2(I)                                                                 ! 1490
       UU3 = U3(I)                                                                 ! 1500
-      VV1 = V1(I)                                                                 ! 1510
-      VV2 = V2(I)                                                                 ! 1520
-      VV3 = V3(I)                                                                 ! 1530
+      if (scene%with_velocity) then
+        VV1 = V1(I)                                                               ! 1510
+        VV2 = V2(I)                                                               ! 1520
+        VV3 = V3(I)                                                               ! 1530
+      end if
       if (.not. listing%base_not_restored) then
         U1(1) = U1(I)
         U2(1) = U2(I)
         U3(1) = U3(I)
-        V1(1) = V1(I)
-        V2(1) = V2(I)
-        V3(1) = V3(I)
+        if (scene%with_velocity) then
+          V1(1) = V1(I)
+          V2(1) = V2(I)
+          V3(1) = V3(I)
+        end if
       end if
     end do                                                                        ! 1540
   end subroutine runge_kutta

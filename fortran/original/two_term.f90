@@ -52,6 +52,7 @@ contains
     real(dp) :: F1, F2, F3, G1, G2, G3, H1, H2, H3  ! right-hand sides of eq. 16-18, rad/s2
     real(dp) :: X1, X2, X3, Y1, Y2, Y3, Z1, Z2, Z3  ! translational right-hand sides, m/s2
     integer :: I
+    integer :: M         ! right-hand sides of LEQT1F
     integer :: IER
 
     n_rows = 0
@@ -73,6 +74,7 @@ contains
     V3(1) = 0.0_dp                                                                ! 520
     call accelerations(scene, ACL1, ACL2, ACL3)                                   ! 630-650
     DT = scene%step_size                                                          ! 670
+    M = merge(6, 3, scene%with_velocity)                                          ! 1010
 
     do I = 1, scene%n_steps                                                       ! 690
       begin = real(I - 1, dp)*scene%step_size
@@ -104,9 +106,11 @@ contains
       else
         H1 = M3(1) + C*U1(1)*U2(1)                                                ! 770
       end if
-      X1 = ACL1 + V2(1)*U3(1) - V3(1)*U2(1)                                       ! 780
-      Y1 = ACL2 + V3(1)*U1(1) - V1(1)*U3(1)                                       ! 790
-      Z1 = ACL3 + V1(1)*U2(1) - V2(1)*U1(1)                                       ! 800
+      if (scene%with_velocity) then
+        X1 = ACL1 + V2(1)*U3(1) - V3(1)*U2(1)                                     ! 780
+        Y1 = ACL2 + V3(1)*U1(1) - V1(1)*U3(1)                                     ! 790
+        Z1 = ACL3 + V1(1)*U2(1) - V2(1)*U1(1)                                     ! 800
+      end if
       A(1, 1) = 1.0_dp                                                            ! 820
       A(1, 2) = 2.0_dp*T1                                                         ! 830
       A(2, 1) = 1.0_dp                                                            ! 840
@@ -117,25 +121,29 @@ contains
       B(2, 2) = G1                                                                ! 900
       B(1, 3) = H1                                                                ! 910
       B(2, 3) = H1                                                                ! 920
-      B(1, 4) = X1                                                                ! 930
-      B(2, 4) = X1                                                                ! 940
-      B(1, 5) = Y1                                                                ! 950
-      B(2, 5) = Y1                                                                ! 960
-      B(1, 6) = Z1                                                                ! 970
-      B(2, 6) = Z1                                                                ! 980
-      call leqt1f(A, 6, 2, B, IER)                                                ! 1050
+      if (scene%with_velocity) then
+        B(1, 4) = X1                                                              ! 930
+        B(2, 4) = X1                                                              ! 940
+        B(1, 5) = Y1                                                              ! 950
+        B(2, 5) = Y1                                                              ! 960
+        B(1, 6) = Z1                                                              ! 970
+        B(2, 6) = Z1                                                              ! 980
+      end if
+      call leqt1f(A, M, 2, B, IER)                                                ! 1050
       U1(2) = U1(1) + B(1, 1)*T1 + B(2, 1)*T12                                    ! 1070
       U1(3) = U1(1) + B(1, 1)*T2 + B(2, 1)*T22                                    ! 1080
       U2(2) = U2(1) + B(1, 2)*T1 + B(2, 2)*T12                                    ! 1090
       U2(3) = U2(1) + B(1, 2)*T2 + B(2, 2)*T22                                    ! 1100
       U3(2) = U3(1) + B(1, 3)*T1 + B(2, 3)*T12                                    ! 1110
       U3(3) = U3(1) + B(1, 3)*T2 + B(2, 3)*T22                                    ! 1120
-      V1(2) = V1(1) + B(1, 4)*T1 + B(2, 4)*T12                                    ! 1130
-      V1(3) = V1(1) + B(1, 4)*T2 + B(2, 4)*T22                                    ! 1140
-      V2(2) = V2(1) + B(1, 5)*T1 + B(2, 5)*T12                                    ! 1150
-      V2(3) = V2(1) + B(1, 5)*T2 + B(2, 5)*T22                                    ! 1160
-      V3(2) = V3(1) + B(1, 6)*T1 + B(2, 6)*T12                                    ! 1170
-      V3(3) = V3(1) + B(1, 6)*T2 + B(2, 6)*T22                                    ! 1180
+      if (scene%with_velocity) then
+        V1(2) = V1(1) + B(1, 4)*T1 + B(2, 4)*T12                                  ! 1130
+        V1(3) = V1(1) + B(1, 4)*T2 + B(2, 4)*T22                                  ! 1140
+        V2(2) = V2(1) + B(1, 5)*T1 + B(2, 5)*T12                                  ! 1150
+        V2(3) = V2(1) + B(1, 5)*T2 + B(2, 5)*T22                                  ! 1160
+        V3(2) = V3(1) + B(1, 6)*T1 + B(2, 6)*T12                                  ! 1170
+        V3(3) = V3(1) + B(1, 6)*T2 + B(2, 6)*T22                                  ! 1180
+      end if
 
       ! correction: right-hand sides at the collocation points
       F2 = M1(2) + A1*U2(2)*U3(2)                                                 ! 1190
@@ -144,16 +152,18 @@ contains
       G3 = M2(3) + B1*U1(3)*U3(3)                                                 ! 1220
       H2 = M3(2) + C*U1(2)*U2(2)                                                  ! 1230
       H3 = M3(3) + C*U1(3)*U2(3)                                                  ! 1240
-      X2 = ACL1 + V2(2)*U3(2) - V3(2)*U2(2)                                       ! 1250
-      if (listing%x3_reads_acl2) then
-        X3 = ACL2 + V2(3)*U3(3) - V3(3)*U2(3)                                     ! 1260
-      else
-        X3 = ACL1 + V2(3)*U3(3) - V3(3)*U2(3)                                     ! 1260
+      if (scene%with_velocity) then
+        X2 = ACL1 + V2(2)*U3(2) - V3(2)*U2(2)                                     ! 1250
+        if (listing%x3_reads_acl2) then
+          X3 = ACL2 + V2(3)*U3(3) - V3(3)*U2(3)                                   ! 1260
+        else
+          X3 = ACL1 + V2(3)*U3(3) - V3(3)*U2(3)                                   ! 1260
+        end if
+        Y2 = ACL2 + V3(2)*U1(2) - V1(2)*U3(2)                                     ! 1270
+        Y3 = ACL2 + V3(3)*U1(3) - V1(3)*U3(3)                                     ! 1280
+        Z2 = ACL3 + V1(2)*U2(2) - V2(2)*U1(2)                                     ! 1290
+        Z3 = ACL3 + V1(3)*U2(3) - V2(3)*U1(3)                                     ! 1300
       end if
-      Y2 = ACL2 + V3(2)*U1(2) - V1(2)*U3(2)                                       ! 1270
-      Y3 = ACL2 + V3(3)*U1(3) - V1(3)*U3(3)                                       ! 1280
-      Z2 = ACL3 + V1(2)*U2(2) - V2(2)*U1(2)                                       ! 1290
-      Z3 = ACL3 + V1(3)*U2(3) - V2(3)*U1(3)                                       ! 1300
       A(1, 1) = 1.0_dp                                                            ! 1320
       A(1, 2) = 2.0_dp*T1                                                         ! 1330
       A(2, 1) = 1.0_dp                                                            ! 1340
@@ -164,19 +174,23 @@ contains
       B(2, 2) = G3                                                                ! 1390
       B(1, 3) = H2                                                                ! 1400
       B(2, 3) = H3                                                                ! 1410
-      B(1, 4) = X2                                                                ! 1420
-      B(2, 4) = X3                                                                ! 1430
-      B(1, 5) = Y2                                                                ! 1440
-      B(2, 5) = Y3                                                                ! 1450
-      B(1, 6) = Z2                                                                ! 1460
-      B(2, 6) = Z3                                                                ! 1470
-      call leqt1f(A, 6, 2, B, IER)                                                ! 1480
+      if (scene%with_velocity) then
+        B(1, 4) = X2                                                              ! 1420
+        B(2, 4) = X3                                                              ! 1430
+        B(1, 5) = Y2                                                              ! 1440
+        B(2, 5) = Y3                                                              ! 1450
+        B(1, 6) = Z2                                                              ! 1460
+        B(2, 6) = Z3                                                              ! 1470
+      end if
+      call leqt1f(A, M, 2, B, IER)                                                ! 1480
       U1(4) = U1(1) + B(1, 1)*T3 + B(2, 1)*T32                                    ! 1500
       U2(4) = U2(1) + B(1, 2)*T3 + B(2, 2)*T32                                    ! 1510
       U3(4) = U3(1) + B(1, 3)*T3 + B(2, 3)*T32                                    ! 1520
-      V1(4) = V1(1) + B(1, 4)*T3 + B(2, 4)*T32                                    ! 1530
-      V2(4) = V2(1) + B(1, 5)*T3 + B(2, 5)*T32                                    ! 1540
-      V3(4) = V3(1) + B(1, 6)*T3 + B(2, 6)*T32                                    ! 1550
+      if (scene%with_velocity) then
+        V1(4) = V1(1) + B(1, 4)*T3 + B(2, 4)*T32                                  ! 1530
+        V2(4) = V2(1) + B(1, 5)*T3 + B(2, 5)*T32                                  ! 1540
+        V3(4) = V3(1) + B(1, 6)*T3 + B(2, 6)*T32                                  ! 1550
+      end if
       evaluations = evaluations + 3
       if (.not. is_finite(U1(4), U2(4), U3(4))) then
         status = OVERFLOW
@@ -190,15 +204,19 @@ contains
       rows(3, I) = U1(4)                                                          ! 1590
       rows(4, I) = U2(4)                                                          ! 1590
       rows(5, I) = U3(4)                                                          ! 1590
-      rows(6, I) = V1(4)                                                          ! 1590
-      rows(7, I) = V2(4)                                                          ! 1590
-      rows(8, I) = V3(4)                                                          ! 1590
+      if (scene%with_velocity) then
+        rows(6, I) = V1(4)                                                        ! 1590
+        rows(7, I) = V2(4)                                                        ! 1590
+        rows(8, I) = V3(4)                                                        ! 1590
+      end if
       U1(1) = U1(4)                                                               ! 1600
       U2(1) = U2(4)                                                               ! 1610
       U3(1) = U3(4)                                                               ! 1620
-      V1(1) = V1(4)                                                               ! 1630
-      V2(1) = V2(4)                                                               ! 1640
-      V3(1) = V3(4)                                                               ! 1650
+      if (scene%with_velocity) then
+        V1(1) = V1(4)                                                             ! 1630
+        V2(1) = V2(4)                                                             ! 1640
+        V3(1) = V3(4)                                                             ! 1650
+      end if
       if (listing%dt_accumulates) then
         DT = DT + scene%step_size                                                 ! 1660
       end if

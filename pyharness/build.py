@@ -46,6 +46,25 @@ def build() -> Build:
     )
 
 
+def machine(packages: Iterable[str]) -> dict[str, str]:
+    """Return processor and cores, and the versions of `packages` that are installed."""
+    found = {"processor": _processor(), "cores": str(os.cpu_count())}
+    return found | {name: text for name in packages if (text := _version(name)) is not None}
+
+
+def _processor() -> str:
+    import platform
+
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            for line in file:
+                if line.startswith("model name"):
+                    return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
 def missing(packages: Iterable[str] = OPTIONAL) -> list[str]:
     """Return those of the optional packages that are not installed."""
     return [name for name in packages if importlib.util.find_spec(name) is None]

@@ -18,6 +18,7 @@ VERBS = {
     "claims": "every statement of the thesis about results, judged",
     "family": "the weighted residual methods: orders derived, and orders measured",
     "plan": "what a scene needs, what is therefore not computed, and why",
+    "bench": "run time against error: ours, the programs, and other people's integrators",
     "doctor": "what is built, with what, and what is missing",
 }
 

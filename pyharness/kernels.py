@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +62,31 @@ def run(
         Where the extension is not built.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
+        *program_arguments(scene, listing, lipschitz, may_stop, velocity)
+    )
+    results = rows.T[:n_rows]
+    return Trajectory(
+        time=results[:, 0],
+        recorded_time=results[:, 1],
+        omega=results[:, 2:5],
+        velocity=results[:, 5:8] if velocity else None,
+        steps=n_rows,
+        evaluations=evaluations,
+        ended=_ENDED[status],
+        stop=Stop(n_rows, STOP_VARIABLES[variable - 1], quotient) if variable else None,
+        ier=None if listing.program == "runge-kutta" else ier[:n_rows],
+    )
+
+
+def program_arguments(
+    scene: Scene,
+    listing: Listing,
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    velocity: bool = True,
+) -> tuple[Any, ...]:
+    """Return what the compiled `run_program` takes."""
+    return (
         PROGRAMS.index(listing.program) + 1,
         listing.flags,
         scene.moments is not None,
@@ -78,18 +104,6 @@ def run(
         lipschitz,
         may_stop,
         velocity or stop_reads_velocity(listing, may_stop),
-    )
-    results = rows.T[:n_rows]
-    return Trajectory(
-        time=results[:, 0],
-        recorded_time=results[:, 1],
-        omega=results[:, 2:5],
-        velocity=results[:, 5:8] if velocity else None,
-        steps=n_rows,
-        evaluations=evaluations,
-        ended=_ENDED[status],
-        stop=Stop(n_rows, STOP_VARIABLES[variable - 1], quotient) if variable else None,
-        ier=None if listing.program == "runge-kutta" else ier[:n_rows],
     )
 
 

@@ -46,6 +46,8 @@ class Reference:
         What it is.
     estimate : float
         Estimated error of any omega before rounding (rad/s).
+    remainder : ndarray, shape (n, 3), or None
+        What rounding took from omega (rad/s): `omega` and it together have twice the digits.
     """
 
     time: Array
@@ -53,6 +55,7 @@ class Reference:
     velocity: Array | None
     source: str
     estimate: float
+    remainder: Array | None = None
 
     @property
     def error(self) -> float:
@@ -301,4 +304,5 @@ def _rounded(
         velocity=None if velocity is None else array(velocity),
         source=source,
         estimate=float(estimate) if estimate < Decimal(math.inf) else math.inf,
+        remainder=array([[x - Decimal(float(x)) for x in row] for row in omega]),
     )

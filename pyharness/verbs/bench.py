@@ -1,0 +1,112 @@
+"""`bench`: run time against error, every method of ours against programs and peers."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from pyharness import options as shared
+from pyharness.bench import Finding, Refusal, measure, workloads
+from pyharness.contenders import Contender, own
+from pyharness.errors import InputError, unknown
+from pyharness.peers import installed, peers
+from pyharness.scene_file import case_numbers
+
+# Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.
+_LONGEST = 1e3
+
+
+def declare(parser: shared.Parser) -> None:
+    """Declare the options."""
+    parser.add_argument("--case", metavar="N", help="one case of Table 1 (default: 2 to 7)")
+    parser.add_argument(
+        "--horizon", metavar="T", help="go to this time, s (default: 3; Cases 3 and 4 also 100)"
+    )
+    parser.add_argument("--methods", metavar="A,B", help="these of ours only, or none")
+    parser.add_argument("--peers", metavar="X,Y", help="these peers or packages only, or none")
+    shared.add_output_options(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure and show."""
+    form = shared.chosen_format(options, shared.FORMATS)
+    known = [str(each) for each in case_numbers()]
+    if options.case is not None and options.case not in known:
+        raise unknown("case", options.case, known, "--case")
+    horizon = None
+    if options.horizon is not None:
+        horizon = shared.positive(options.horizon, "--horizon", 0.0)
+        if horizon > _LONGEST:
+            raise InputError(f"--horizon: {horizon:g}; allowed: above 0, up to {_LONGEST:g}")
+    methods = chosen(own(), options.methods, "method", "--methods")
+    others = chosen(peers(), options.peers, "peer", "--peers")
+    missing = [each for each in others if not installed(each)]
+    if missing and options.peers is not None:
+        raise InputError(
+            f"--peers: {missing[0].name} needs {missing[0].package}, which is not installed: "
+            "pip install 'pyharness[peers]'"
+        )
+    contenders = methods + [each for each in others if each not in missing]
+    if not contenders:
+        raise InputError("bench: no method and no peer is left; name one")
+    shared.check_outputs(options)
+    loads = workloads(None if options.case is None else int(options.case), horizon)
+    found = measure(loads, contenders, _progress)
+    _progress("")
+    absent = "not installed: pip install 'pyharness[peers]'"
+    found.refused.extend(
+        Refusal(load, each.name, None, absent) for each in missing for load in loads
+    )
+
+    if options.plot is not None:
+        from pyharness.bench_plots import bench_picture
+
+        shared.write(bench_picture(found, options.plot), "--plot")
+    shared.emit(_text(form, options, found), options.out)
+    return 0
+
+
+def chosen(
+    contenders: Sequence[Contender], text: str | None, what: str, where: str
+) -> list[Contender]:
+    """Return the contenders named, by their own name or their package; all where none are."""
+    if text is None:
+        return list(contenders)
+    names = shared.names(text)
+    if names == ["none"]:
+        return []
+    allowed = [each.name for each in contenders]
+    packages = sorted({each.package for each in contenders} - {""})
+    for name in names:
+        if name not in allowed and name not in packages:
+            raise unknown(what, name, [*allowed, *packages, "none"], where)
+    return [each for each in contenders if each.name in names or each.package in names]
+
+
+def _text(form: str, options: argparse.Namespace, found: Finding) -> str:
+    from pyharness import bench_tables as views
+    from pyharness.build import build, machine
+
+    if form == "table":
+        return views.bench_table(found)
+    if form == "csv":
+        from pyharness.tables import csv_text
+
+        return csv_text(*views.bench_rows(found))
+    packages = sorted({each.package for each in peers()} - {"", "scipy"})
+    if form == "json":
+        from pyharness.records import json_text
+
+        return json_text(views.bench_record(found, machine(packages), build()))
+    command = "pyharness bench"
+    for name in ("case", "horizon", "methods", "peers"):
+        value = getattr(options, name)
+        command += f" --{name} {value}" if value is not None else ""
+    command += " --format markdown"
+    return views.bench_markdown(found, machine(packages), build(), command)
+
+
+def _progress(text: str) -> None:
+    """Say on a terminal how far it is; an empty text wipes the line."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()

@@ -8,6 +8,8 @@ from pyharness.scene import Scene
 FINEST = 1e-15  # relative; below it a tolerance asks for more digits than binary64 has
 # For few digits Runge-Kutta takes fewer operations than a series; which, the kernel decides.
 EITHER = "quick or taylor"
+_FEW_DIGITS = 1e-7  # below it never, so that it is not asked
+_WAVES_DIGITS = 1e-9
 _SCIPY = ("dop853", "rk45", "lsoda", "radau")
 
 
@@ -85,7 +87,8 @@ def plan(
         raise InputError(f"tolerance is {tolerance:g}; allowed: {FINEST:g} to 1")
     form = closed_form(scene)
     if method == "auto":
-        method = "closed-form" if form else EITHER
+        few_digits = tolerance >= (_WAVES_DIGITS if scene.torque.varies else _FEW_DIGITS)
+        method = "closed-form" if form else EITHER if few_digits else "taylor"
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
     closed = method == "closed-form"

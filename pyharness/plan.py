@@ -6,6 +6,8 @@ from pyharness.errors import InputError
 from pyharness.scene import Scene
 
 FINEST = 1e-15  # relative; below it a tolerance asks for more digits than binary64 has
+# For few digits Runge-Kutta takes fewer operations than a series; which, the kernel decides.
+EITHER = "quick or taylor"
 _SCIPY = ("dop853", "rk45", "lsoda", "radau")
 
 
@@ -83,7 +85,7 @@ def plan(
         raise InputError(f"tolerance is {tolerance:g}; allowed: {FINEST:g} to 1")
     form = closed_form(scene)
     if method == "auto":
-        method = "closed-form" if form else "taylor"
+        method = "closed-form" if form else EITHER
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
     closed = method == "closed-form"

@@ -10,7 +10,7 @@ import numpy as np
 
 from pyharness.errors import InputError, unknown
 from pyharness.kernels import extension
-from pyharness.plan import Plan, plan
+from pyharness.plan import EITHER, Plan, plan
 from pyharness.scene import Scene, Wave
 from pyharness.trajectory import Array, Trajectory
 
@@ -24,12 +24,14 @@ _CODES = {
     "improved-euler": 4,
     "taylor-3": 5,
     "rk4": 6,
+    "quick": 7,
+    EITHER: 8,
     **{f"gauss-{stages}": 10 + stages for stages in range(1, 9)},
 }
 PREPARED = (
     "auto",
     "closed-form",
-    *(name for name in _CODES if name not in ("closed-form", "sphere")),
+    *(name for name in _CODES if name not in ("closed-form", "sphere", EITHER)),
 )
 
 
@@ -96,7 +98,8 @@ class Solver:
             raise InputError(f"omega0: {len(omega0)} numbers; allowed: three")
         first, second, third = (float(each) for each in omega0)
         scene = replace(self._scene, omega=(first, second, third))
-        return solve_by_name(scene, times, self.plan.method, self._tolerance)
+        method = "taylor" if self.plan.method in ("quick", EITHER) else self.plan.method
+        return solve_by_name(scene, times, method, self._tolerance)
 
 
 def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Solver:
@@ -177,7 +180,7 @@ def solve(
     if method not in ("auto", *METHODS):
         raise unknown("method", method, ("auto", *METHODS))
     if method == "auto":
-        method = plan(scene, "auto", tolerance).method
+        method = "closed-form" if plan(scene, "auto", tolerance).closed_form else "taylor"
         # A closed form is as good as rounding lets it be, whatever is asked.
         tolerance = max(tolerance, METHODS[method].finest)
     return solve_by_name(scene, times, method, tolerance)

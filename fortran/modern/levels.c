@@ -6,29 +6,42 @@
       const double *tolerance, int n_times, const double *times, double *rows, int *n_rows,    \
       int *status, int *steps
 
+#define QUICK_ARGUMENTS                                                                        \
+  const double *coefficients, const double *m_constant, const double *m_rate, int n_sines,     \
+      const double *sines, int n_cosines, const double *cosines, const double *omega,          \
+      const double *tolerance, const double *t_end, int contest, double *result, int *status,  \
+      int *steps
+
 typedef void solver(ARGUMENTS);
+typedef void quick_solver(QUICK_ARGUMENTS);
 
 solver taylor_solve_plain;
+quick_solver quick_solve_plain;
 #ifdef WITH_LEVELS
 solver taylor_solve_avx2, taylor_solve_avx512;
+quick_solver quick_solve_avx2, quick_solve_avx512;
 #endif
 
 static solver *chosen = taylor_solve_plain;
+static quick_solver *chosen_quick = quick_solve_plain;
 static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
 
 /* Take a level, or the best below it that the processor has; return the one taken. */
 int choose_level(int highest)
 {
   chosen = taylor_solve_plain;
+  chosen_quick = quick_solve_plain;
   level = 0;
 #ifdef WITH_LEVELS
   __builtin_cpu_init();
   if (highest >= 2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("fma")) {
     chosen = taylor_solve_avx512;
+    chosen_quick = quick_solve_avx512;
     level = 2;
   } else if (highest >= 1 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
     chosen = taylor_solve_avx2;
+    chosen_quick = quick_solve_avx2;
     level = 1;
   }
 #endif
@@ -43,4 +56,10 @@ void taylor_solve(ARGUMENTS)
 {
   chosen(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, tolerance,
          n_times, times, rows, n_rows, status, steps);
+}
+
+void quick_solve(QUICK_ARGUMENTS)
+{
+  chosen_quick(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega,
+               tolerance, t_end, contest, result, status, steps);
 }

@@ -4,7 +4,7 @@ module levels
   implicit none(type, external)
   private
 
-  public :: choose_level, taylor_solve
+  public :: choose_level, quick_solve, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -36,6 +36,28 @@ module levels
       integer(c_int), intent(out) :: status
       integer(c_int), intent(out) :: steps
     end subroutine taylor_solve
+
+    subroutine quick_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                           omega, tolerance, t_end, contest, result, status, steps) &
+      bind(c, name="quick_solve")
+      !! As in scaled_runge_kutta.f90.
+      import :: c_double, c_int
+      implicit none(type, external)
+      real(c_double), intent(in) :: coefficients(3)
+      real(c_double), intent(in) :: m_constant(3)
+      real(c_double), intent(in) :: m_rate(3)
+      integer(c_int), intent(in), value :: n_sines
+      real(c_double), intent(in) :: sines(4, n_sines)
+      integer(c_int), intent(in), value :: n_cosines
+      real(c_double), intent(in) :: cosines(4, n_cosines)
+      real(c_double), intent(in) :: omega(3)
+      real(c_double), intent(in) :: tolerance
+      real(c_double), intent(in) :: t_end
+      integer(c_int), intent(in), value :: contest
+      real(c_double), intent(out) :: result(3)
+      integer(c_int), intent(out) :: status
+      integer(c_int), intent(out) :: steps
+    end subroutine quick_solve
   end interface
 
 end module levels

@@ -5,7 +5,7 @@ module prepared
   use fixed_step, only: fixed_step_end, IMPROVED_EULER, RUNGE_KUTTA_4, TAYLOR_3
   use gauss_collocation, only: gauss_rows
   use kinds, only: dp
-  use levels, only: taylor_solve
+  use levels, only: quick_solve, taylor_solve
   use torque_free, only: sphere_rows, torque_free_end
   implicit none(type, external)
   private
@@ -30,6 +30,8 @@ module prepared
   integer, parameter :: EULER_STEPS = 4
   integer, parameter :: TAYLOR_3_STEPS = 5
   integer, parameter :: RUNGE_KUTTA_STEPS = 6
+  integer, parameter :: QUICK = 7           ! Runge-Kutta for few digits
+  integer, parameter :: QUICK_OR_SERIES = 8 ! whichever takes fewer operations
   integer, parameter :: GAUSS = 10
 
   real(dp), parameter :: MOST_STEPS = 1e9_dp
@@ -69,11 +71,19 @@ contains
       call sphere_rows(packed(M_CONSTANT), packed(M_RATE), sines, packed(WAVES), cosines, &
                        packed(cosines_at), omega0, 1, times, rows, n_rows, ended)
       omega = rows(:, 1)
-    case (SERIES)
-      call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                        packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
-                        1, times, rows, n_rows, ended, count)
-      omega = rows(:, 1)
+    case (SERIES, QUICK, QUICK_OR_SERIES)
+      ended = 1
+      if (int(packed(METHOD)) /= SERIES) then
+        call quick_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
+                         packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
+                         t_end, int(packed(METHOD)) - QUICK, omega, ended, count)
+      end if
+      if (ended /= 0 .and. int(packed(METHOD)) /= QUICK) then
+        call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
+                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
+                          1, times, rows, n_rows, ended, count)
+        omega = rows(:, 1)
+      end if
     case (EULER_STEPS:RUNGE_KUTTA_STEPS)
       whole = max(1.0_dp, aint(abs(t_end)/packed(STEP) + (1.0_dp - 1e-6_dp)))
       ended = GAVE_UP

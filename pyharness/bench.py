@@ -192,10 +192,10 @@ def ladder(contender: Contender, scene: Scene, horizon: float) -> Iterator[float
     if contender.settings:
         yield from contender.settings
         return
-    rate = max(map(abs, scene.omega))
-    for _, frequency in scene.torque.sines + scene.torque.cosines:
-        rate = max(rate, abs(frequency))
-    steps = 1 << max(1, math.ceil(math.log2(max(1.0, rate * horizon / 8.0))))
+    # A step for 16 radians of the first motion is too few for anyone. A fast torque does not
+    # count: it may be too faint to need its own steps.
+    phase = max(map(abs, scene.omega)) * horizon / 16.0
+    steps = 1 << max(1, math.ceil(math.log2(max(1.0, phase))))
     while steps <= _LARGEST_STEPS:
         yield float(steps)
         # A low order needs many steps: coarser rungs find its place as well.

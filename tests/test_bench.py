@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 
 from pyharness import bench, bench_timing
-from pyharness.bench import Finding, Refusal, Row, Workload, measure, relative_error, workloads
+from pyharness.bench import (
+    Finding,
+    Refusal,
+    Row,
+    Workload,
+    ladder,
+    measure,
+    relative_error,
+    workloads,
+)
 from pyharness.bench_scores import groups, means, scores, yardstick
 from pyharness.bench_tables import bench_markdown, bench_record, bench_rows, bench_table, ratio
 from pyharness.build import build, machine
@@ -163,6 +172,14 @@ def test_error_is_relative_to_the_largest_component() -> None:
     omega[0] += 1e-5
     assert relative_error(omega, truth) == pytest.approx(1e-5 / abs(truth.omega[0]).max())
     assert relative_error([math.nan, 0.0, 0.0], truth) is None
+
+
+def test_ladder_begins_too_coarse_for_anyone_and_has_rungs_between_powers_of_two() -> None:
+    by_name = {each.name: each for each in own()}
+    assert list(ladder(by_name["gauss-8"], case_scene(7), 3.0))[:4] == [2.0, 3.0, 4.0, 6.0]
+    assert list(ladder(by_name["taylor-3"], case_scene(7), 3.0))[:3] == [2.0, 4.0, 8.0]
+    assert next(ladder(by_name["rk4"], case_scene(4), 100.0)) == 64.0
+    assert next(ladder(by_name["auto"], case_scene(4), 3.0)) == 1e-3
 
 
 def _fake(answer: Callable[[float], Outcome]) -> Callable[[Scene], Maker]:

@@ -6,25 +6,16 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from pyharness.errors import InputError, unknown
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scene import Scene
+from pyharness.scipy_methods import rows_trajectory, scipy_method
 from pyharness.trajectory import Trajectory
 
 IMPLEMENTATIONS = ("fortran", "python")
 
 Solver = Callable[[Scene, Sequence[float], float], Trajectory]
 
-# SciPy controls the error of a step, a tolerance here is on the error at the times asked for:
-# a thirtieth kept every method within it in all seven cases (tests/test_methods.py).
-_STEP_SHARE = 1.0 / 30.0
-
-# A phase of so many radians has hardly a digit left in binary64. What still grows there is on
-# its way to infinity in finite time, and LSODA would never come back from it.
-_LARGEST_PHASE = 1e13
-_MOST_EVALUATIONS = 2_000_000
 
 # Of 1 to 8 stages: low orders would need more steps than anyone waits for.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
@@ -173,51 +164,12 @@ def _outward(times: Sequence[float]) -> tuple[list[float], bool]:
     return values, turned
 
 
-def _solve_ivp(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        from scipy.integrate import solve_ivp
+def _auto(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    from pyharness.plan import closed_form
 
-        if times[-1] == 0.0:
-            return _trajectory(times, np.array([scene.omega]), 0, 0, "complete")
-        largest = max(map(abs, scene.omega))
-        step_tolerance = tolerance * _STEP_SHARE
-        rate = max(map(abs, scene.euler_coefficients))
-        right_hand_side = scene.right_hand_side()
-        evaluations = 0
-
-        def counted(time: float, omega: Sequence[float]) -> list[float]:
-            nonlocal evaluations
-            evaluations += 1
-            if evaluations > _MOST_EVALUATIONS:
-                raise InputError(
-                    f"{name} gave up at t = {time:.6g} s after {_MOST_EVALUATIONS} right-hand "
-                    "sides; take a shorter time or a larger tolerance"
-                )
-            return right_hand_side(time, omega)
-
-        def phase_left(time: float, omega: Sequence[float]) -> float:
-            return _LARGEST_PHASE - rate * abs(time) * max(map(abs, omega))
-
-        phase_left.terminal = True  # type: ignore[attr-defined]
-        with np.errstate(all="ignore"):
-            result = solve_ivp(
-                counted,
-                (0.0, times[-1]),
-                scene.omega,
-                method=name,
-                t_eval=times,
-                events=phase_left,
-                rtol=step_tolerance,
-                atol=step_tolerance * (largest or 1.0),
-            )
-        rows = result.y.T if len(result.t) else np.empty((0, 3))
-        finite = np.isfinite(rows).all(axis=1)
-        count = len(rows) if finite.all() else int(np.argmin(finite))
-        ended = "complete" if count == len(times) else "overflow"
-        # The result does not carry the steps taken; right-hand sides are what it counts.
-        return _trajectory(times[:count], rows[:count], int(result.nfev), len(times), ended)
-
-    return solve
+    name = "closed-form" if closed_form(scene) else "taylor"
+    # A closed form is as good as rounding lets it be, whatever is asked.
+    return METHODS[name].solve(scene, times, max(tolerance, METHODS[name].finest))
 
 
 def _taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
@@ -231,7 +183,7 @@ def _reference(scene: Scene, times: Sequence[float], tolerance: float) -> Trajec
 
     result = reference(scene, times)
     ended = "complete" if len(result.time) == len(times) else "overflow"
-    return _trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
+    return rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
 
 
 def _modern(factory: str, argument: str | int | None = None) -> Solver:
@@ -247,13 +199,6 @@ def _modern(factory: str, argument: str | int | None = None) -> Solver:
     return solve
 
 
-def _trajectory(
-    times: Sequence[float], omega: np.ndarray, evaluations: int, steps: int, ended: str
-) -> Trajectory:
-    time = np.array(times, dtype=float)
-    return Trajectory(time, time, omega, None, steps, evaluations, ended)
-
-
 PROGRAM_REGISTRY = {
     "two-term": Program("two-term", 2, "Jacobs 1982, IV.2 and appendix"),
     "four-term": Program("four-term", 2, "Jacobs 1982, IV.2 and appendix"),
@@ -265,32 +210,39 @@ METHODS = {
     method.name: method
     for method in (
         Method(
+            "auto",
+            "closed form where there is one, else Taylor series",
+            "pyharness.plan",
+            1e-15,
+            _auto,
+        ),
+        Method(
             "dop853",
             "Runge-Kutta 8(5,3)",
             "scipy.integrate.solve_ivp; Hairer, Norsett and Wanner 1993, II.5",
             7e-13,
-            _solve_ivp("DOP853"),
+            scipy_method("DOP853"),
         ),
         Method(
             "rk45",
             "Runge-Kutta 5(4)",
             "scipy.integrate.solve_ivp; Dormand and Prince 1980",
             7e-13,
-            _solve_ivp("RK45"),
+            scipy_method("RK45"),
         ),
         Method(
             "lsoda",
             "Adams and BDF with switching",
             "scipy.integrate.solve_ivp; Petzold 1983",
             7e-13,
-            _solve_ivp("LSODA"),
+            scipy_method("LSODA"),
         ),
         Method(
             "radau",
             "implicit Runge-Kutta of order 5",
             "scipy.integrate.solve_ivp; Hairer and Wanner 1996, IV.8",
             7e-13,
-            _solve_ivp("Radau"),
+            scipy_method("Radau"),
         ),
         Method(
             "taylor",

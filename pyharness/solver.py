@@ -152,7 +152,7 @@ def solve(
     times : sequence of float, shape (n,)
         Where the result is wanted (s): strictly monotonic, on one side of 0.
     method : str
-        `auto`, or any name in `pyharness.methods.METHODS`.
+        A name in `pyharness.methods.METHODS`.
     tolerance : float
         Largest error at `times`, relative to the largest angular velocity.
 
@@ -174,15 +174,8 @@ def solve(
     array([[3.5, 3.5, 3.5],
            [6. , 6. , 6. ]])
     """
-    from pyharness.methods import METHODS
     from pyharness.methods import solve as solve_by_name
 
-    if method not in ("auto", *METHODS):
-        raise unknown("method", method, ("auto", *METHODS))
-    if method == "auto":
-        method = "closed-form" if plan(scene, "auto", tolerance).closed_form else "taylor"
-        # A closed form is as good as rounding lets it be, whatever is asked.
-        tolerance = max(tolerance, METHODS[method].finest)
     return solve_by_name(scene, times, method, tolerance)
 
 

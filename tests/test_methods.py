@@ -51,7 +51,7 @@ def test_solution_that_blows_up_returns_the_rows_until_then(method: str) -> None
 @pytest.mark.parametrize("method", ["dop853", "reference"])
 def test_hopeless_scale_gives_up(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing hangs: the number of right-hand sides and of Taylor steps is bounded."""
-    monkeypatch.setattr("pyharness.methods._MOST_EVALUATIONS", 10_000)
+    monkeypatch.setattr("pyharness.scipy_methods._MOST_EVALUATIONS", 10_000)
     scene = Scene("", (1e100, 1e100, 1e100), coefficients=(1.0, -1.0, 1.0))
     with pytest.raises(InputError, match=r"gave up|Taylor steps"):
         solve(scene, [2.0], method, 1e-6)

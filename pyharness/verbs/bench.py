@@ -23,12 +23,17 @@ def declare(parser: shared.Parser) -> None:
     )
     parser.add_argument("--methods", metavar="A,B", help="these of ours only, or none")
     parser.add_argument("--peers", metavar="X,Y", help="these peers or packages only, or none")
+    parser.add_argument(
+        "--plan", action="store_true", help="what each skip of the plan saves, with and without"
+    )
     shared.add_output_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Measure and show."""
     form = shared.chosen_format(options, shared.FORMATS)
+    if options.plan:
+        return _plan(options, form)
     known = [str(each) for each in case_numbers()]
     if options.case is not None and options.case not in known:
         raise unknown("case", options.case, known, "--case")
@@ -110,3 +115,34 @@ def _progress(text: str) -> None:
     if sys.stderr.isatty():
         sys.stderr.write(f"\r\x1b[K{text}")
         sys.stderr.flush()
+
+
+def _plan(options: argparse.Namespace, form: str) -> int:
+    shared.refuse(options, "--plan", ("case", "horizon", "methods", "peers", "plot"))
+    shared.check_outputs(options)
+    from dataclasses import asdict
+
+    from pyharness.plan_bench import savings
+    from pyharness.records import SCHEMA, json_text
+    from pyharness.tables import aligned, csv_text, markdown_text
+
+    found = savings()
+    head = ("skipped", "where", "us with it", "us without", "ratio")
+    rows = [
+        [
+            each.part,
+            each.where,
+            f"{1e6 * each.with_it:.3g}",
+            f"{1e6 * each.without:.3g}",
+            f"{each.ratio:.2f}",
+        ]
+        for each in found
+    ]
+    if form == "json":
+        text = json_text({"schema": SCHEMA, "savings": [asdict(each) for each in found]})
+    elif form == "table":
+        text = "\n".join(aligned(head, rows, left=2)) + "\n"
+    else:
+        text = (csv_text if form == "csv" else markdown_text)(head, rows)
+    shared.emit(text, options.out)
+    return 0

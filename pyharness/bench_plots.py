@@ -1,7 +1,7 @@
 """The work-precision picture of `bench`: error against time and against right-hand sides."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,8 @@ from pyharness.tables import csv_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from pyharness.growth import Growth
 
 _FLOOR = 2.0**-53
 # Told apart without colour: a family by its dashes and width, a member by its marker.
@@ -127,3 +129,31 @@ def _slopes(axes: "Axes") -> None:
         x = begin * (end / begin) ** 0.5
         axes.text(x, 0.5 * (x / begin) ** -order, str(order), color="#707070", fontsize=9)
     axes.set_xlim(low, high)
+
+
+def growth_picture(found: "Mapping[int, Sequence[Growth]]", path: str) -> dict[str, bytes]:
+    """Draw error over time beside what one rounding of time changes; content by path, with CSV."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.5 * len(found), 4.0), layout="constrained")
+    axes = figure.subplots(1, len(found), sharey=True, squeeze=False)
+    rows = []
+    for place, (case, growths) in enumerate(found.items()):
+        times = [each.time for each in growths]
+        one = axes[0, place]
+        one.loglog(times, [each.error for each in growths], "k-o", label="Taylor, tolerance 1e-15")
+        yardstick = [each.conditioning for each in growths]
+        one.loglog(times, yardstick, "k--", label="one rounding of time")
+        one.set_title(f"Case {case}", fontsize=10)
+        one.set_xlabel("time (s)")
+        one.grid(visible=True, linewidth=0.3)
+        rows += [
+            [str(case), repr(each.time), repr(each.error), repr(each.conditioning)]
+            for each in growths
+        ]
+    axes[0, 0].set_ylabel("error over the largest omega")
+    axes[0, 0].legend(loc="best")
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
+    numbers = csv_text(("case", "time", "error", "one_rounding"), rows)
+    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}

@@ -198,3 +198,21 @@ def test_plan_savings_are_measured() -> None:
     saving = _saving("part", "where", slow, lambda: None)
     assert saving.with_it > saving.without > 0.0
     assert saving.ratio == saving.with_it / saving.without
+
+
+def test_error_of_the_series_grows_as_the_conditioning_of_the_motion() -> None:
+    """A few roundings of time, no more; measured to 1e5 s by `bench --growth`."""
+    from pyharness.growth import growth
+
+    for case in (3, 4):
+        for found in growth(case_scene(case), (10.0, 100.0, 1000.0)):
+            assert found.error <= 8.0 * max(found.conditioning, 2.0**-53)
+    with pytest.raises(InputError, match="closed form"):
+        growth(case_scene(5), (1.0,))
+
+
+def test_plan_and_growth_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "--plan", "--case", "3"]) == 2
+    assert main(["bench", "--growth", "--peers", "none"]) == 2
+    assert main(["bench", "--plan", "--growth"]) == 2
+    capsys.readouterr()

@@ -26,14 +26,21 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--plan", action="store_true", help="what each skip of the plan saves, with and without"
     )
+    parser.add_argument(
+        "--growth", action="store_true", help="error of the Taylor method up to 1e5 s (Cases 3, 4)"
+    )
     shared.add_output_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Measure and show."""
     form = shared.chosen_format(options, shared.FORMATS)
-    if options.plan:
-        return _plan(options, form)
+    if options.plan or options.growth:
+        meaningless = ["case", "horizon", "methods", "peers"]
+        meaningless += ["plot", "growth"] if options.plan else []
+        shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
+        shared.check_outputs(options)
+        return _plan(options, form) if options.plan else _growth(options, form)
     known = [str(each) for each in case_numbers()]
     if options.case is not None and options.case not in known:
         raise unknown("case", options.case, known, "--case")
@@ -118,8 +125,6 @@ def _progress(text: str) -> None:
 
 
 def _plan(options: argparse.Namespace, form: str) -> int:
-    shared.refuse(options, "--plan", ("case", "horizon", "methods", "peers", "plot"))
-    shared.check_outputs(options)
     from dataclasses import asdict
 
     from pyharness.plan_bench import savings
@@ -144,5 +149,42 @@ def _plan(options: argparse.Namespace, form: str) -> int:
         text = "\n".join(aligned(head, rows, left=2)) + "\n"
     else:
         text = (csv_text if form == "csv" else markdown_text)(head, rows)
+    shared.emit(text, options.out)
+    return 0
+
+
+def _growth(options: argparse.Namespace, form: str) -> int:
+    from dataclasses import asdict
+
+    from pyharness.growth import growth
+    from pyharness.records import SCHEMA, json_text
+    from pyharness.scene_file import case_scene
+    from pyharness.tables import aligned, csv_text, markdown_text
+
+    found = {case: growth(case_scene(case)) for case in (3, 4)}
+    head = ("case", "time", "error", "one rounding of time", "ratio", "steps")
+    rows = [
+        [
+            str(case),
+            f"{each.time:.3g}",
+            f"{each.error:.2g}",
+            f"{each.conditioning:.2g}",
+            f"{each.error / each.conditioning:.2f}",
+            str(each.steps),
+        ]
+        for case, rows in found.items()
+        for each in rows
+    ]
+    if form == "json":
+        record = {str(case): [asdict(each) for each in rows] for case, rows in found.items()}
+        text = json_text({"schema": SCHEMA, "growth": record})
+    elif form == "table":
+        text = "\n".join(aligned(head, rows, left=1)) + "\n"
+    else:
+        text = (csv_text if form == "csv" else markdown_text)(head, rows)
+    if options.plot is not None:
+        from pyharness.bench_plots import growth_picture
+
+        shared.write(growth_picture(found, options.plot), "--plot")
     shared.emit(text, options.out)
     return 0

@@ -106,8 +106,15 @@ def plan(
         ("B w1 w3", b, "I3 = I1"),
         ("C w1 w2", c, "I1 = I2"),
     ):
-        kept = value != 0.0
-        decisions.append(Decision(name, kept, f"coefficient {value:g}" if kept else product))
+        if value != 0.0:
+            decisions.append(Decision(name, True, f"coefficient {value:g}"))
+        elif closed:
+            decisions.append(Decision(name, False, product))
+        else:
+            # The kernels sum three products side by side in one register.
+            decisions.append(
+                Decision(name, True, f"{product}: zero, beside the others for nothing")
+            )
     decisions.append(Decision("torque", not law.is_zero, "zero" if law.is_zero else "acts"))
     for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
         acts = any(any(amplitude) for amplitude, _ in waves)

@@ -54,6 +54,12 @@ def test_pictures_of_the_report_are_current() -> None:
             assert path.with_suffix(".svg").exists()
 
 
+def test_examples_in_the_documents_run() -> None:
+    for path in DOCS:
+        for block in re.findall(r"```python\n(.*?)```", path.read_text(), re.DOTALL):
+            exec(compile(block, path.name, "exec"), {})
+
+
 def write_anew() -> None:
     """Replace the output of every block by what the command prints today."""
     import contextlib

@@ -33,6 +33,8 @@ def test_output_is_current(capsys: pytest.CaptureFixture[str]) -> None:
 def test_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     exec(compile(_block("python"), "README.md", "exec"), {})
     assert capsys.readouterr().out.startswith("stopped Stop(step=")
+    exec(compile(_block("python", 1), "README.md", "exec"), {})
+    assert capsys.readouterr().out.count("23.12") == 2
 
 
 def test_scene_file_is_read(tmp_path: Path) -> None:

@@ -144,3 +144,77 @@ def test_sine_and_cosine_have_all_their_digits() -> None:
             sine, cosine = sine_cosine(Decimal(angle))
             assert abs(mpmath.mpf(str(sine)) - mpmath.sin(mpmath.mpf(angle))) < 1e-38
             assert abs(mpmath.mpf(str(cosine)) - mpmath.cos(mpmath.mpf(angle))) < 1e-38
+
+
+def _whole(found: room.Reference, row: int) -> list[mpmath.mpf]:
+    """The reference to all the digits that it carries."""
+    return [
+        mpmath.mpf(float(high)) + mpmath.mpf(float(low))
+        for high, low in zip(found.omega[row], found.remainder[row], strict=True)
+    ]
+
+
+def test_precise_series_agrees_with_jacobis_functions_to_25_digits() -> None:
+    """Case 4 over 100 s: closed form against series, in different arithmetics."""
+    scene = case_scene(4)
+    times = [3.0, 100.0]
+    found = reference(scene, times, precise=True)
+    assert found.estimate < 1e-25
+    with mpmath.workdps(45):
+        i1, i2, i3 = (mpmath.mpf(i) for i in scene.moments or ())
+        _, w2, w3 = (mpmath.mpf(w) for w in scene.omega)
+        rate = mpmath.sqrt((i2 - i3) * (i1 - i3) / (i1 * i2)) * w3
+        amplitude = (i2 - i3) / i1 * w2 * w3 / rate
+        parameter = (i1 - i2) / i3 * amplitude * w2 / (-w3 * rate)
+        for row, t in enumerate(times):
+            phase = rate * mpmath.mpf(t)
+            wanted = [
+                amplitude * mpmath.ellipfun("sn", phase, m=parameter),
+                w2 * mpmath.ellipfun("cn", phase, m=parameter),
+                w3 * mpmath.ellipfun("dn", phase, m=parameter),
+            ]
+            for value, exact in zip(_whole(found, row), wanted, strict=True):
+                assert abs(value - exact) < mpmath.mpf("1e-25")
+
+
+def test_precise_series_agrees_with_extrapolation_to_25_digits() -> None:
+    """Case 7, torque and all: modified midpoint steps, extrapolated by Neville's scheme."""
+    scene = case_scene(7)
+    found = reference(scene, [0.05], precise=True)
+    with mpmath.workdps(45):
+        moments = [mpmath.mpf(i) for i in scene.moments or ()]
+
+        def rate(t: mpmath.mpf, w: list[mpmath.mpf]) -> list[mpmath.mpf]:
+            i1, i2, i3 = moments
+            return [
+                ((i2 - i3) * w[1] * w[2] + mpmath.sin(100 * t)) / i1,
+                ((i3 - i1) * w[0] * w[2] + mpmath.cos(100 * t)) / i2,
+                ((i1 - i2) * w[0] * w[1] + t) / i3,
+            ]
+
+        end = mpmath.mpf(0.05)
+        rows: list[list[mpmath.mpf]] = []
+        counts = [4 * k for k in range(2, 20)]
+        for n in counts:
+            h = end / n
+            before = [mpmath.mpf(w) for w in scene.omega]
+            now = [w + h * f for w, f in zip(before, rate(mpmath.mpf(0), before), strict=True)]
+            for k in range(1, n):
+                slope = rate(k * h, now)
+                before, now = (
+                    now,
+                    [w + 2 * h * f for w, f in zip(before, slope, strict=True)],
+                )
+            slope = rate(end, now)
+            rows.append([(w + v + h * f) / 2 for w, v, f in zip(now, before, slope, strict=True)])
+        # The error is a series in h**2: extrapolate each component to h = 0.
+        for axis, value in enumerate(_whole(found, 0)):
+            column = [row[axis] for row in rows]
+            for level in range(1, len(counts)):
+                column = [
+                    column[i + 1]
+                    + (column[i + 1] - column[i])
+                    / ((mpmath.mpf(counts[i + level]) / counts[i]) ** 2 - 1)
+                    for i in range(len(column) - 1)
+                ]
+            assert abs(column[0] - value) < mpmath.mpf("1e-25")

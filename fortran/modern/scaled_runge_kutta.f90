@@ -23,7 +23,7 @@ module scaled_runge_kutta
   real(dp), parameter :: SHARE = 0.5_dp      ! of the tolerance: what is not seen takes the rest
   real(dp), parameter :: ENOUGH = 0.75_dp    ! of the aim, where the seams are looked at
   ! Against the series, in steps of this method for a radian of motion: so many, and so many more
-  ! for each binary digit. Measured, see docs/benchmark.md.
+  ! for each binary digit: measured in Cases 5 to 7.
   real(dp), parameter :: SERIES_STEPS = 1.9_dp
   real(dp), parameter :: SERIES_STEPS_A_BIT = 0.28_dp
   real(dp), parameter :: WAVE_RADIAN = 0.4_dp ! of a wave, in radians of motion, to the series

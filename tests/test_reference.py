@@ -147,7 +147,8 @@ def test_sine_and_cosine_have_all_their_digits() -> None:
 
 
 def _whole(found: room.Reference, row: int) -> list[mpmath.mpf]:
-    """The reference to all the digits that it carries."""
+    """Return the reference to all the digits that it carries."""
+    assert found.remainder is not None
     return [
         mpmath.mpf(float(high)) + mpmath.mpf(float(low))
         for high, low in zip(found.omega[row], found.remainder[row], strict=True)

@@ -262,16 +262,18 @@ subroutine fixed_step_at_end(coefficients, m_constant, m_rate, n_sines, sines, n
                       omega0, t_end, method, n_steps, omega, status)
 end subroutine fixed_step_at_end
 
-subroutine solve_packed(packed, n_packed, omega0, t_end, omega)
-  ! A prepared solver's call: see fortran/modern/prepared.f90 for what is packed.
+subroutine solve_packed(packed, n_packed, omega, omega0, t_end)
+  ! A prepared solver's call: see fortran/modern/prepared.f90 for what is packed. What never changes
+  ! comes first, and omega is returned, the very array that was given.
   !f2py threadsafe
+  !f2py intent(out) omega
   use prepared, only: solve_prepared
   implicit none
   integer(4), intent(in) :: n_packed
   real(8), intent(inout) :: packed(n_packed)
+  real(8), intent(inout) :: omega(3) ! rad/s; NaN unless the status in packed is 0
   real(8), intent(in) :: omega0(3)   ! rad/s
   real(8), intent(in) :: t_end       ! s
-  real(8), intent(inout) :: omega(3) ! rad/s; NaN unless the status in packed is 0
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega)
 end subroutine solve_packed

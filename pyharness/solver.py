@@ -5,6 +5,8 @@ three arguments and enters the kernel. `solve` is the same for one use, with row
 """
 
 from collections.abc import Sequence
+from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -35,7 +37,7 @@ PREPARED = (
 )
 
 
-class Solver:
+class Solver(partial[Array]):
     """A scene prepared for one method; a solver belongs to one thread, its buffers are its own.
 
     Call it as ``solver(omega0, t_end)``: `omega0` an array of three floats (rad/s), `t_end` in
@@ -49,31 +51,34 @@ class Solver:
         What was decided, and why.
     """
 
-    __slots__ = ("_call", "_omega", "_packed", "_scene", "_tolerance", "plan")
+    # A partial of the kernel: a call goes from the interpreter into the kernel with no Python
+    # between, which would cost as much as an easy solve.
+    plan: Plan
+    _scene: Scene
+    _tolerance: float
 
-    def __init__(self, scene: Scene, chosen: Plan, tolerance: float) -> None:
+    def __new__(cls, scene: Scene, chosen: Plan, tolerance: float) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
-        self.plan = chosen
-        self._scene = scene
-        self._tolerance = tolerance
-        self._call = extension().solve_packed
-        self._packed = _pack(scene, chosen, tolerance)
-        self._omega = np.empty(3)
+        packed = _pack(scene, chosen, tolerance)
+        solver = super().__new__(cls, extension().solve_packed, packed, np.empty(3))
+        solver.plan = chosen
+        solver._scene = scene
+        solver._tolerance = tolerance
+        return solver
 
-    def __call__(self, omega0: Array, t_end: float) -> Array:
-        """Return the angular velocity at `t_end`, shape (3,), in the solver's own array."""
-        self._call(self._packed, omega0, t_end, self._omega)
-        return self._omega
+    def __repr__(self) -> str:
+        """Say the scene and the method."""
+        return f"<Solver of '{self._scene.name}' by {self.plan.method}>"
 
     @property
     def status(self) -> str:
         """How the last call ended: complete, overflow, refused or gave up."""
-        return _STATUS[int(self._packed[_STATUS_AT])]
+        return _STATUS[int(self.args[0][_STATUS_AT])]
 
     @property
     def steps(self) -> int:
         """Steps of the last call (right-hand sides of Gauss collocation), 0 of a closed form."""
-        return int(self._packed[_STEPS_AT])
+        return int(self.args[0][_STEPS_AT])
 
     def trajectory(self, omega0: Sequence[float], times: Sequence[float]) -> Trajectory:
         """Return rows at `times` from another start.

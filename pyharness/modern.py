@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.errors import InputError
-from pyharness.kernels import columns, extension
-from pyharness.scene import Scene, Triple, Wave
+from pyharness.kernels import extension, normalized
+from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
 Solver = Callable[[Scene, Sequence[float], float], Trajectory]
@@ -24,37 +24,6 @@ _MOST_EVALUATIONS = 200_000_000
 _ROUNDING = 16 * 2.0**-53
 
 
-@dataclass(frozen=True)
-class Law:
-    """A torque law over the moments, as the kernels take it."""
-
-    constant: Triple
-    rate: Triple
-    sines: Array
-    cosines: Array
-
-    @property
-    def arguments(self) -> tuple[Triple, Triple, Array, Array]:
-        """In the kernels' order."""
-        return self.constant, self.rate, self.sines, self.cosines
-
-
-def law(scene: Scene) -> Law:
-    """Return the torque of `scene` over its moments."""
-    moments = scene.moments or (1.0, 1.0, 1.0)
-
-    def over(torque: Triple) -> Triple:
-        return torque[0] / moments[0], torque[1] / moments[1], torque[2] / moments[2]
-
-    def all_over(waves: tuple[Wave, ...]) -> Array:
-        return columns(tuple((over(amplitude), frequency) for amplitude, frequency in waves))
-
-    torque = scene.torque
-    return Law(
-        over(torque.constant), over(torque.rate), all_over(torque.sines), all_over(torque.cosines)
-    )
-
-
 def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
     """Solve a scene that has a closed form; the tolerance plays no part.
 
@@ -66,7 +35,7 @@ def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Traje
     """
     if not any(scene.euler_coefficients):
         rows, n_rows, status = extension().sphere_solution(
-            *law(scene).arguments, scene.omega, times
+            *normalized(scene)[1:], scene.omega, times
         )
     elif not scene.torque.is_zero:
         raise InputError(
@@ -99,7 +68,7 @@ def fixed_step(name: str) -> Solver:
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
         rows, n_rows, status, evaluations = extension().fixed_step_solution(
-            scene.euler_coefficients, *law(scene).arguments, scene.omega, times, number,
+            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
             scene.step_size,
         )  # fmt: skip
         if status == _GAVE_UP:
@@ -121,7 +90,7 @@ def gauss(stages: int) -> Solver:
     """
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        torque = law(scene).arguments
+        torque = normalized(scene)[1:]
         scale = max(map(abs, scene.omega)) or 1.0
         step, spent, reached = _first_step(scene, times), 0, 0.0
         before: _Solution | None = None

@@ -202,6 +202,13 @@ def warn(message: str) -> None:
     sys.stderr.write(f"pyharness: warning: {message}\n")
 
 
+def progress(text: str) -> None:
+    """Say on a terminal how far it is, in a line that the next one replaces; "" wipes it."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\x1b[K{text}")
+        sys.stderr.flush()
+
+
 def check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs that can't be written, before anything is computed."""
     picture = getattr(options, "plot", None)

@@ -11,9 +11,9 @@ from typing import Self
 import numpy as np
 
 from pyharness.errors import InputError, unknown
-from pyharness.kernels import extension
+from pyharness.kernels import extension, normalized
 from pyharness.plan import EITHER, Plan, plan
-from pyharness.scene import Scene, Wave
+from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
 _STATUS = {0: "complete", 2: "overflow", 3: "refused", 4: "gave up"}
@@ -185,31 +185,16 @@ def solve(
 
 
 def _pack(scene: Scene, chosen: Plan, tolerance: float) -> Array:
-    moments = scene.moments or (1.0, 1.0, 1.0)
-    law = scene.torque
-    sines = _columns(law.sines, moments) if "sines" not in chosen.skipped else []
-    cosines = _columns(law.cosines, moments) if "cosines" not in chosen.skipped else []
+    coefficients, constant, rate, sines, cosines = normalized(scene)
+    # A wave without amplitude has no effect, and would cost its sine and cosine.
+    sines, cosines = (waves[:, waves[:3].any(axis=0)] for waves in (sines, cosines))
     # Four places more than the waves need: the kernel names where the cosines would begin.
-    packed = np.zeros(_WAVES_AT + len(sines) + len(cosines) + 4)
+    packed = np.zeros(_WAVES_AT + sines.size + cosines.size + 4)
     packed[0] = _CODES["sphere" if chosen.closed_form == "sphere" else chosen.method]
-    packed[1] = tolerance
-    packed[2] = scene.step_size
-    packed[3] = len(sines) // 4
-    packed[4] = len(cosines) // 4
-    packed[5:8] = scene.euler_coefficients
-    packed[8:11] = [n / i for n, i in zip(law.constant, moments, strict=True)]
-    packed[11:14] = [n / i for n, i in zip(law.rate, moments, strict=True)]
-    packed[_WAVES_AT : _WAVES_AT + len(sines) + len(cosines)] = sines + cosines
+    packed[1:5] = tolerance, scene.step_size, sines.shape[1], cosines.shape[1]
+    packed[5:14] = np.concatenate([coefficients, constant, rate])
+    packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
+    packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
     if not np.isfinite(packed).all():
         raise InputError("torque over moment is not finite; take smaller torques")
     return packed
-
-
-def _columns(waves: tuple[Wave, ...], moments: tuple[float, float, float]) -> list[float]:
-    """Return amplitude over moment, and frequency, wave by wave; waves without effect drop out."""
-    numbers: list[float] = []
-    for amplitude, frequency in waves:
-        if any(amplitude):
-            numbers += [a / i for a, i in zip(amplitude, moments, strict=True)]
-            numbers.append(frequency)
-    return numbers

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene, kernels, subset
-from pyharness.kernels import extension
+from pyharness.kernels import extension, normalized
 from pyharness.methods import METHODS, solve
-from pyharness.modern import FIXED_STEP, law
+from pyharness.modern import FIXED_STEP
 from pyharness.reference import reference
 from pyharness.trajectory import Array
 
@@ -107,7 +107,7 @@ def test_end_alone_in_any_thread(method: str, torque: TorqueLaw) -> None:
     def end(_: int) -> Array:
         omega = np.empty(3)
         status = extension().fixed_step_at_end(
-            scene.euler_coefficients, *law(scene).arguments, scene.omega, 2.0, FIXED_STEP[method],
+            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, 2.0, FIXED_STEP[method],
             16, omega,
         )  # fmt: skip
         assert status == 0

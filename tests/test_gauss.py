@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.kernels import extension
+from pyharness.kernels import extension, normalized
 from pyharness.methods import METHODS, solve
-from pyharness.modern import law
 from pyharness.reference import reference
 from pyharness.trajectory import Array
 
@@ -32,7 +31,7 @@ def _maker() -> ModuleType:
 
 def _end(scene: Scene, times: list[float], stages: int, step: float) -> Array:
     rows, _, n_rows, status, _ = extension().gauss_solution(
-        scene.euler_coefficients, *law(scene).arguments, scene.omega, times, stages, step
+        scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
     )
     assert (n_rows, status) == (len(times), 0)
     result: Array = rows.T
@@ -123,7 +122,7 @@ def test_forth_and_back_returns() -> None:
 def test_step_that_does_not_converge_gives_up(stages: int) -> None:
     scene = case_scene(4)
     found = extension().gauss_solution(
-        scene.euler_coefficients, *law(scene).arguments, scene.omega, [1.0, 100.0], stages, 50.0
+        scene.euler_coefficients, *normalized(scene)[1:], scene.omega, [1.0, 100.0], stages, 50.0
     )
     assert found[3] in (2, 4)
     assert found[2] < 2

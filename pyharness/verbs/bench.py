@@ -1,7 +1,6 @@
 """`bench`: run time against error, every method of ours against programs and peers."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 
 from pyharness import options as shared
@@ -62,8 +61,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("bench: no method and no peer is left; name one")
     shared.check_outputs(options)
     loads = workloads(None if options.case is None else int(options.case), horizon)
-    found = measure(loads, contenders, _progress)
-    _progress("")
+    found = measure(loads, contenders, shared.progress)
+    shared.progress("")
     absent = "not installed: pip install 'pyharness[peers]'"
     found.refused.extend(
         Refusal(load, each.name, None, absent) for each in missing for load in loads
@@ -115,13 +114,6 @@ def _text(form: str, options: argparse.Namespace, found: Finding) -> str:
         command += f" --{name} {value}" if value is not None else ""
     command += " --format markdown"
     return views.bench_markdown(found, machine(packages), build(), command)
-
-
-def _progress(text: str) -> None:
-    """Say on a terminal how far it is; an empty text wipes the line."""
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()
 
 
 def _plan(options: argparse.Namespace, form: str) -> int:

@@ -1,7 +1,6 @@
 """`claims`: every statement of the thesis about results, judged."""
 
 import argparse
-import sys
 
 from pyharness import options as shared
 from pyharness.claims import assignments, claim, claims, judge
@@ -46,9 +45,9 @@ def run(options: argparse.Namespace) -> int:
 
     judgements = []
     for number, entry in enumerate(chosen, 1):
-        _progress(f"{number} of {len(chosen)}: {entry['id']}")
+        shared.progress(f"{number} of {len(chosen)}: {entry['id']}")
         judgements.append(judge(entry))
-    _progress("")
+    shared.progress("")
     if form == "json":
         from pyharness.records import SCHEMA, json_text
 
@@ -61,10 +60,3 @@ def run(options: argparse.Namespace) -> int:
         text = (csv_text if form == "csv" else markdown_text)(head, rows)
     shared.emit(text, options.out)
     return 0
-
-
-def _progress(text: str) -> None:
-    """Say on a terminal how far it is; an empty text wipes the line."""
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()

@@ -34,9 +34,9 @@ def run(options: argparse.Namespace) -> int:
     one = any(getattr(options, name) is not None for name in _OF_A_MEMBER)
     members = [_member(options)] if one else None
     shared.check_outputs(options)
-    found = order_table(scene, members, _progress if sys.stderr.isatty() else None)
+    found = order_table(scene, members, shared.progress if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
-        _progress("")
+        shared.progress("")
 
     if form == "json":
         from pyharness.build import build
@@ -69,9 +69,3 @@ def _member(options: argparse.Namespace) -> Member:
         if options.corrections is None
         else shared.whole(options.corrections, "--corrections"),
     )
-
-
-def _progress(text: str) -> None:
-    """Replace the last line on the terminal by `text`."""
-    sys.stderr.write(f"\r{text:60s}" if text else f"\r{'':60s}\r")
-    sys.stderr.flush()

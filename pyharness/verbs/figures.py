@@ -1,7 +1,6 @@
 """`figures`: Figures 6 to 12 of the thesis, from the programs as punched and as mended."""
 
 import argparse
-import sys
 
 from pyharness import figures as room
 from pyharness import options as shared
@@ -30,10 +29,10 @@ def run(options: argparse.Namespace) -> int:
     content: dict[str, bytes] = {}
     drawn = []
     for number, finding in enumerate(room.findings(), 1):
-        _progress(f"figures: {number} of {len(plans)}")
+        shared.progress(f"figures: {number} of {len(plans)}")
         content.update(views.files(finding))
         drawn.append(finding)
-    _progress("")
+    shared.progress("")
     write_folder(options.out, content, "--out")
 
     if form == "json":
@@ -44,10 +43,3 @@ def run(options: argparse.Namespace) -> int:
     else:
         shared.emit(views.figures_table(drawn), None)
     return 0
-
-
-def _progress(text: str) -> None:
-    """Show how far it is, in one line that the next one replaces; only to a terminal."""
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()

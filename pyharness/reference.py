@@ -22,7 +22,7 @@ from pyharness.trajectory import Array
 
 DIGITS = 40
 # Order and tolerance (relative to the solution, per step) of the two series that are compared.
-_QUICK = ((20, Decimal("1e-19")), (26, Decimal("1e-25")))
+_QUICK = ((20, Decimal("1e-19")), (24, Decimal("1e-22")))
 _PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
 _MOST_STEPS = 100_000
 _HALF_ULP = 2.0**-53

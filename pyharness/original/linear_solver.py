@@ -44,11 +44,11 @@ def _factor(a: list[list[float]]) -> list[int] | None:
         scale.append(1.0 / biggest)
 
     for j in range(n):
-        for i in range(n):
-            total = a[i][j]
+        for i, row in enumerate(a):
+            total = row[j]
             for k in range(min(i, j)):
-                total = total - a[i][k] * a[k][j]
-            a[i][j] = total
+                total = total - row[k] * a[k][j]
+            row[j] = total
 
         # On and below the diagonal these are candidates for the pivot; the first maximum wins.
         biggest = 0.0
@@ -74,15 +74,16 @@ def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list
     """Forward through L, then backward through U."""
     n = len(a)
     x = list(b)
-    for i in range(n):
-        x[i], x[pivots[i]] = x[pivots[i]], x[i]
-        total = x[i]
+    for i, row in enumerate(a):
+        total = x[pivots[i]]
+        x[pivots[i]] = x[i]
         for k in range(i):
-            total = total - a[i][k] * x[k]
+            total = total - row[k] * x[k]
         x[i] = total
     for i in reversed(range(n)):
+        row = a[i]
         total = x[i]
         for k in range(i + 1, n):
-            total = total - a[i][k] * x[k]
-        x[i] = total / a[i][i]
+            total = total - row[k] * x[k]
+        x[i] = total / row[i]
     return x

@@ -66,33 +66,6 @@ subroutine solve_linear(n, m, a, b, factors, x, ier)
   call leqt1f(factors, m, n, x, ier)
 end subroutine solve_linear
 
-subroutine taylor_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                      omega0, t_end, tolerance, omega, status, steps)
-  ! Taylor series: omega at one time.
-  !f2py threadsafe
-  use levels, only: taylor_solve
-  implicit none
-  real(8), intent(in) :: coefficients(3)        ! A, B, C
-  real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
-  real(8), intent(in) :: m_rate(3)              ! 1/s3
-  integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
-  integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)  ! the same
-  real(8), intent(in) :: omega0(3)              ! rad/s
-  real(8), intent(in) :: t_end                  ! s
-  real(8), intent(in) :: tolerance              ! of the error at t_end over the largest |omega|
-  real(8), intent(inout) :: omega(3)            ! rad/s; as it was unless status is 0
-  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
-  integer(4), intent(out) :: steps
-  integer(4) :: n_rows
-  real(8) :: times(1)
-
-  times(1) = t_end
-  call taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                    omega0, tolerance, 1, times, omega, n_rows, status, steps)
-end subroutine taylor_end
-
 subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
                        omega0, n_times, times, tolerance, rows, n_rows, status, steps)
   ! Taylor series: omega at times that lead away from 0 on one side.
@@ -128,6 +101,7 @@ subroutine choose_instructions(highest, taken)
 
   taken = choose_level(highest)
 end subroutine choose_instructions
+
 subroutine torque_free_solution(coefficients, omega0, n_times, times, rows, n_rows, status)
   ! Closed form of a body without torque.
   !f2py threadsafe
@@ -143,20 +117,6 @@ subroutine torque_free_solution(coefficients, omega0, n_times, times, rows, n_ro
 
   call torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
 end subroutine torque_free_solution
-
-subroutine torque_free_at_end(coefficients, omega0, t_end, omega, status)
-  ! The same at one time, into an array that is there already.
-  !f2py threadsafe
-  use torque_free, only: torque_free_end
-  implicit none
-  real(8), intent(in) :: coefficients(3)
-  real(8), intent(in) :: omega0(3)
-  real(8), intent(in) :: t_end
-  real(8), intent(inout) :: omega(3)
-  integer(4), intent(out) :: status
-
-  call torque_free_end(coefficients, omega0, t_end, omega, status)
-end subroutine torque_free_at_end
 
 subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
                            n_times, times, rows, n_rows, status)
@@ -212,7 +172,7 @@ end subroutine gauss_solution
 
 subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
                                cosines, omega0, n_times, times, method, step, rows, n_rows, &
-                               status, evaluations)
+                               status, steps, evaluations)
   ! Improved Euler, three-term Taylor, Runge-Kutta: whole steps, the last before a time shorter.
   !f2py threadsafe
   use fixed_step, only: fixed_step_rows
@@ -232,35 +192,13 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   real(8), intent(out) :: rows(3, n_times)
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status
+  integer(4), intent(out) :: steps
   integer(4), intent(out) :: evaluations
 
   call fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                       omega0, n_times, times, method, step, rows, n_rows, status, evaluations)
+                       omega0, n_times, times, method, step, rows, n_rows, status, steps, &
+                       evaluations)
 end subroutine fixed_step_solution
-
-subroutine fixed_step_at_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                             cosines, omega0, t_end, method, n_steps, omega, status)
-  ! The same at one time in equal steps, into an array that is there already.
-  !f2py threadsafe
-  use fixed_step, only: fixed_step_end
-  implicit none
-  real(8), intent(in) :: coefficients(3)
-  real(8), intent(in) :: m_constant(3)
-  real(8), intent(in) :: m_rate(3)
-  integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)
-  integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)
-  real(8), intent(in) :: omega0(3)
-  real(8), intent(in) :: t_end
-  integer(4), intent(in) :: method
-  integer(4), intent(in) :: n_steps
-  real(8), intent(inout) :: omega(3)
-  integer(4), intent(out) :: status
-
-  call fixed_step_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                      omega0, t_end, method, n_steps, omega, status)
-end subroutine fixed_step_at_end
 
 subroutine solve_packed(packed, n_packed, omega, omega0, t_end)
   ! A prepared solver's call: see fortran/modern/prepared.f90 for what is packed. What never changes

@@ -11,8 +11,9 @@ from pyharness.listing import PROGRAMS, Listing
 from pyharness.scene import Scene, Wave
 from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 
-_ENDED = ("complete", "stopped", "overflow")
-_GAVE_UP = 4
+# The status codes of fortran/statuses.f90, and what a user reads.
+COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP = range(5)
+ENDS = ("complete", "stopped", "overflow", "refused", "gave up")
 
 
 def extension() -> ModuleType:
@@ -72,7 +73,7 @@ def run(
         velocity=results[:, 5:8] if velocity else None,
         steps=n_rows,
         evaluations=evaluations,
-        ended=_ENDED[status],
+        ended=ENDS[status],
         stop=Stop(n_rows, STOP_VARIABLES[variable - 1], quotient) if variable else None,
         ier=None if listing.program == "runge-kutta" else ier[:n_rows],
     )
@@ -134,7 +135,7 @@ def taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory
     rows, n_rows, status, steps = extension().taylor_rows(
         *normalized(scene), scene.omega, times, tolerance
     )
-    if status == _GAVE_UP:
+    if status == GAVE_UP:
         raise InputError(
             f"taylor gave up after {steps} steps; take a shorter time or a larger tolerance"
         )

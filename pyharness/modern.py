@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.errors import InputError
-from pyharness.kernels import extension, normalized
+from pyharness.kernels import COMPLETE, GAVE_UP, REFUSED, extension, normalized
 from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
@@ -17,7 +17,6 @@ Solver = Callable[[Scene, Sequence[float], float], Trajectory]
 FIXED_STEP = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
 MOST_STAGES = 8
 
-_COMPLETE, _OVERFLOW, _REFUSED, _GAVE_UP = 0, 2, 3, 4
 # Right-hand sides of all trial steps of Gauss collocation together, some ten seconds.
 _MOST_EVALUATIONS = 200_000_000
 # Two solutions that differ by so many units in the last place will not get closer.
@@ -46,12 +45,12 @@ def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Traje
         rows, n_rows, status = extension().torque_free_solution(
             scene.euler_coefficients, scene.omega, times
         )
-    if status == _REFUSED:
+    if status == REFUSED:
         raise InputError(
             "closed-form: no bounded motion, or a disturbance too faint to square; allowed: "
             "coefficients A, B, C not all of one sign, none of them zero between equal signs"
         )
-    if status == _GAVE_UP:
+    if status == GAVE_UP:
         raise InputError(
             f"closed-form: at t = {times[n_rows]:g} s the phase is beyond 1e15 radians and has "
             "no digit left; take a shorter time"
@@ -67,17 +66,16 @@ def fixed_step(name: str) -> Solver:
     number = FIXED_STEP[name]
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        rows, n_rows, status, evaluations = extension().fixed_step_solution(
+        rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(
             scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
             scene.step_size,
         )  # fmt: skip
-        if status == _GAVE_UP:
+        if status == GAVE_UP:
             raise InputError(
                 f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {scene.step_size:g} s "
                 "are too many; take a larger step or a shorter time"
             )
-        per_step = 4 if name == "rk4" else 2
-        return _trajectory(times, rows, n_rows, status, evaluations // per_step, evaluations)
+        return _trajectory(times, rows, n_rows, status, steps, evaluations)
 
     return solve
 
@@ -114,7 +112,7 @@ def gauss(stages: int) -> Solver:
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
                 error = 2.0 * difference / (4.0**stages - 1.0)
                 close = error <= tolerance * scale or difference <= _ROUNDING * scale
-                if (close and found.status == _COMPLETE) or found.blows_up(before):
+                if (close and found.status == COMPLETE) or found.blows_up(before):
                     count = _steps(times, step)
                     return _trajectory(times, found.rows, n, found.status, count, spent)
             before = found
@@ -133,7 +131,7 @@ class _Solution:
 
     def blows_up(self, coarser: "_Solution") -> bool:
         """Whether it ended where the coarser one did, with an omega that grows as steps fall."""
-        if _COMPLETE in (self.status, coarser.status):
+        if COMPLETE in (self.status, coarser.status):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
         return largest > 1.5 * before > 1e3 * float(np.abs(self.rows[:, : self.n_rows]).max())
@@ -158,5 +156,5 @@ def _trajectory(
     times: Sequence[float], rows: Array, n_rows: int, status: int, steps: int, evaluations: int
 ) -> Trajectory:
     time = np.array(times[:n_rows], dtype=float)
-    ended = "complete" if status == _COMPLETE else "overflow"
+    ended = "complete" if status == COMPLETE else "overflow"
     return Trajectory(time, time, rows.T[:n_rows], None, steps, evaluations, ended)

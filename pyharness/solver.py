@@ -11,12 +11,11 @@ from typing import Self
 import numpy as np
 
 from pyharness.errors import InputError, unknown
-from pyharness.kernels import extension, normalized
+from pyharness.kernels import ENDS, extension, normalized
 from pyharness.plan import EITHER, Plan, plan
 from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
-_STATUS = {0: "complete", 2: "overflow", 3: "refused", 4: "gave up"}
 # Places in the packed array: see fortran/modern/prepared.f90.
 _STATUS_AT, _STEPS_AT, _WAVES_AT = 14, 15, 16
 _CODES = {
@@ -73,7 +72,7 @@ class Solver(partial[Array]):
     @property
     def status(self) -> str:
         """How the last call ended: complete, overflow, refused or gave up."""
-        return _STATUS[int(self.args[0][_STATUS_AT])]
+        return ENDS[int(self.args[0][_STATUS_AT])]
 
     @property
     def steps(self) -> int:

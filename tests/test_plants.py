@@ -20,6 +20,7 @@ from tests.plants import plant
 FORTRAN = Path(__file__).parent.parent / "fortran"
 SOURCES = (
     "kinds",
+    "statuses",
     "original/listing",
     "original/linear_solver",
     "original/deck",

@@ -4,9 +4,6 @@ module euler_equations
   implicit none(type, external)
   private
 
-  integer, parameter, public :: COMPLETE = 0 !! every time was reached
-  integer, parameter, public :: OVERFLOW = 2 !! an angular velocity was not finite
-  integer, parameter, public :: GAVE_UP = 4  !! more steps would be needed than are allowed
   integer, parameter, public :: MOST_ORDER = 28
   integer :: order_
   real(dp), parameter, public :: INVERSE(MOST_ORDER) = &

@@ -2,6 +2,7 @@ module fixed_step
   !! The methods of III.2 in steps of one size: improved Euler (eq. 29), three terms of the
   !! Taylor series (eq. 30), classical Runge-Kutta (eq. 31).
   use kinds, only: dp
+  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
   use torque_law, only: torque_at, torque_rate_at
   implicit none(type, external)
   private
@@ -9,19 +10,16 @@ module fixed_step
   integer, parameter, public :: IMPROVED_EULER = 1
   integer, parameter, public :: TAYLOR_3 = 2
   integer, parameter, public :: RUNGE_KUTTA_4 = 3
-  integer, parameter :: COMPLETE = 0          ! every row is a result
-  integer, parameter :: OVERFLOW = 2          ! an angular velocity left the range of numbers
-  integer, parameter :: GAVE_UP = 4           ! too many steps
   real(dp), parameter :: MOST_STEPS = 4e8_dp  ! four right-hand sides a step are counted
   real(dp), parameter :: EXCESS = 1e-6_dp     ! of a step, rather than one step more
 
-  public :: fixed_step_rows, fixed_step_end
+  public :: fixed_step_rows
 
 contains
 
   pure subroutine fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
                                   cosines, omega0, n_times, times, method, step, rows, n_rows, &
-                                  status, evaluations)
+                                  status, steps, evaluations)
     !! Angular velocity at each of `times`, which lead away from 0: as many whole steps as fit
     !! between two of them, then a shorter one (or the last one longer by up to EXCESS).
     real(dp), intent(in) :: coefficients(3)        !! A, B, C
@@ -39,26 +37,26 @@ contains
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
     integer, intent(out) :: n_rows                 !! rows that hold a result
     integer, intent(out) :: status                 !! COMPLETE, OVERFLOW or GAVE_UP
+    integer, intent(out) :: steps                  !! taken
     integer, intent(out) :: evaluations            !! right-hand sides
     real(dp) :: y(3)
     real(dp) :: begin
     real(dp) :: h
     real(dp) :: n_steps
-    real(dp) :: steps
     integer :: i
 
     n_rows = 0
     status = GAVE_UP
+    steps = 0
     evaluations = 0
-    steps = 0.0_dp
     y = omega0
     begin = 0.0_dp
     do i = 1, n_times
       h = sign(step, times(i) - begin)
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
-      steps = steps + n_steps
-      if (.not. steps <= MOST_STEPS) return
-      evaluations = evaluations + per_step(method)*int(n_steps)
+      if (.not. steps + n_steps <= MOST_STEPS) return
+      steps = steps + int(n_steps)
+      evaluations = per_step(method)*steps
       call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
                    method, begin, h, int(n_steps) - 1, y)
       begin = begin + h*(n_steps - 1.0_dp)
@@ -74,30 +72,6 @@ contains
     end do
     status = COMPLETE
   end subroutine fixed_step_rows
-
-  pure subroutine fixed_step_end(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                                 cosines, omega0, t_end, method, n_steps, omega, status)
-    !! Angular velocity at one time, in a number of equal steps.
-    real(dp), intent(in) :: coefficients(3)
-    real(dp), intent(in) :: m_constant(3)
-    real(dp), intent(in) :: m_rate(3)
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)
-    real(dp), intent(in) :: omega0(3)
-    real(dp), intent(in) :: t_end                  !! s
-    integer, intent(in) :: method
-    integer, intent(in) :: n_steps                 !! 1 or more
-    real(dp), intent(out) :: omega(3)              !! rad/s
-    integer, intent(out) :: status                 !! COMPLETE or OVERFLOW
-
-    omega = omega0
-    call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, method, &
-                 0.0_dp, t_end/real(n_steps, dp), n_steps, omega)
-    status = COMPLETE
-    if (.not. all(abs(omega) <= huge(t_end))) status = OVERFLOW
-  end subroutine fixed_step_end
 
   pure integer function per_step(method)
     !! Right-hand sides in a step; the derivative of one counts as another.

@@ -6,12 +6,10 @@ module gauss_collocation
   use gauss_tables, only: MOST_STAGES, NODES, WEIGHTS, WEIGHTS_LOW, MATRIX, &
                           MATRIX_LOW, ONWARD
   use torque_law, only: torque_at
+  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
   implicit none(type, external)
   private
 
-  integer, parameter :: COMPLETE = 0            ! every row is a result
-  integer, parameter :: OVERFLOW = 2            ! an angular velocity left the range of numbers
-  integer, parameter :: GAVE_UP = 4             ! no convergence, or too many evaluations
   integer, parameter :: MOST_ITERATIONS = 60
   integer, parameter :: MOST_EVALUATIONS = 2000000000
   real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling

@@ -2,10 +2,11 @@ module prepared
   !! One door for a solver that was prepared: all that does not change lies packed in one array,
   !! so that a call from Python converts three arguments and not fourteen.
   use, intrinsic :: iso_fortran_env, only: int64
-  use fixed_step, only: fixed_step_end, IMPROVED_EULER, RUNGE_KUTTA_4, TAYLOR_3
+  use fixed_step, only: fixed_step_rows, IMPROVED_EULER, RUNGE_KUTTA_4, TAYLOR_3
   use gauss_collocation, only: gauss_rows
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
+  use statuses, only: COMPLETE, REFUSED
   use torque_free, only: sphere_rows, torque_free_end
   implicit none(type, external)
   private
@@ -34,9 +35,6 @@ module prepared
   integer, parameter :: QUICK_OR_SERIES = 8 ! whichever takes fewer operations
   integer, parameter :: GAUSS = 10
 
-  real(dp), parameter :: MOST_STEPS = 1e9_dp
-  integer, parameter :: GAVE_UP = 4
-
   public :: solve_prepared
 
 contains
@@ -51,13 +49,13 @@ contains
     real(dp) :: times(1)
     real(dp) :: rows(3, 1)
     real(dp) :: reached(4)
-    real(dp) :: whole
     integer :: sines
     integer :: cosines
     integer :: cosines_at
     integer :: n_rows
     integer :: ended
     integer :: count
+    integer :: evaluations
 
     sines = int(packed(N_SINES))
     cosines = int(packed(N_COSINES))
@@ -72,27 +70,24 @@ contains
                        packed(cosines_at), omega0, 1, times, rows, n_rows, ended)
       omega = rows(:, 1)
     case (SERIES, QUICK, QUICK_OR_SERIES)
-      ended = 1
+      ended = REFUSED
       if (int(packed(METHOD)) /= SERIES) then
         call quick_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
                          t_end, int(packed(METHOD)) - QUICK, omega, ended, count)
       end if
-      if (ended /= 0 .and. int(packed(METHOD)) /= QUICK) then
+      if (ended /= COMPLETE .and. int(packed(METHOD)) /= QUICK) then
         call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                           packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
                           1, times, rows, n_rows, ended, count)
         omega = rows(:, 1)
       end if
     case (EULER_STEPS:RUNGE_KUTTA_STEPS)
-      whole = max(1.0_dp, aint(abs(t_end)/packed(STEP) + (1.0_dp - 1e-6_dp)))
-      ended = GAVE_UP
-      if (whole <= MOST_STEPS) then
-        count = int(whole)
-        call fixed_step_end(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                            packed(WAVES), cosines, packed(cosines_at), omega0, t_end, &
-                            fixed_method(int(packed(METHOD))), count, omega, ended)
-      end if
+      call fixed_step_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
+                           packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
+                           fixed_method(int(packed(METHOD))), packed(STEP), rows, n_rows, ended, &
+                           count, evaluations)
+      omega = rows(:, 1)
     case default
       call gauss_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                       packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
@@ -103,7 +98,7 @@ contains
     packed(STATUS) = real(ended, dp)
     packed(STEPS) = real(count, dp)
     ! Not ieee_value: that module ties the binary to libgfortran.
-    if (ended /= 0) omega = transfer(huge(0_int64), 1.0_dp)
+    if (ended /= COMPLETE) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
 
   pure integer function fixed_method(code)

@@ -4,13 +4,10 @@ module scaled_runge_kutta
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
+  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
   implicit none(type, external)
   private
 
-  integer, parameter :: COMPLETE = 0
-  integer, parameter :: OVERFLOW = 2
-  integer, parameter :: REFUSED = 3          ! coefficients that can not be scaled
-  integer, parameter :: GAVE_UP = 4
   integer, parameter :: MOST_WAVES = 8
   integer, parameter :: MOST_TRIES = 40
   integer, parameter :: EXACT_AGAIN = 64     ! steps until sine and cosine are computed afresh

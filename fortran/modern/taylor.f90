@@ -3,9 +3,9 @@ module taylor
   !! Terms are held with the power of the step in them, so a step ends with a plain sum.
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
-  use euler_equations, only: COMPLETE, GAVE_UP, INVERSE, MOST_ORDER, OVERFLOW, torque_t, &
-                             torque_terms
+  use euler_equations, only: INVERSE, MOST_ORDER, torque_t, torque_terms
   use kinds, only: dp
+  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
   implicit none(type, external)
   private
 

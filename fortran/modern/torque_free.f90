@@ -4,13 +4,9 @@ module torque_free
   !! A symmetric body under constant torque is left to the series: its form needs Fresnel
   !! integrals of arguments that overflow as M3 -> 0, and is slower than a Taylor step.
   use kinds, only: dp
+  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
   implicit none(type, external)
   private
-
-  integer, parameter, public :: COMPLETE = 0 !! every row is a result
-  integer, parameter, public :: OVERFLOW = 2 !! an angular velocity left the range of the numbers
-  integer, parameter, public :: REFUSED = 3  !! the scene has no closed form here
-  integer, parameter, public :: GAVE_UP = 4  !! so large a phase that no digit of it is left
 
   integer, parameter :: STEADY = 0           ! rates do not change: linear in time
   integer, parameter :: SEPARATRIX = 1       ! hyperbolic functions

@@ -5,10 +5,6 @@ module deck
   implicit none(type, external)
   private
 
-  integer, parameter, public :: COMPLETE = 0 !! all steps were run
-  integer, parameter, public :: STOPPED = 1  !! the Lipschitz test ended the run
-  integer, parameter, public :: OVERFLOW = 2 !! an angular velocity was not finite
-
   type, public :: deck_t
     logical :: by_moments             !! body holds I1, I2, I3; else A, B, C
     real(dp) :: body(3)               !! kg m2; or without unit

@@ -3,10 +3,10 @@ module four_term_program
   !! omega = omega(0) + c1 t + c2 t**2 + c3 t**3 + c4 t**4, residual zero at .2, .4, .6, .8 DT.
   !! Faithful in every operation and its order; the margin names the card.
   use kinds, only: dp
-  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
-                  COMPLETE, OVERFLOW
+  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite
   use linear_solver, only: leqt1f
   use listing_flags, only: listing_t
+  use statuses, only: COMPLETE, OVERFLOW
   implicit none(type, external)
   private
 

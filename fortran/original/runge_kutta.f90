@@ -3,9 +3,9 @@ module runge_kutta_program
   !! The stop test is the thesis's use of the Lipschitz condition, eq. 19.
   !! Faithful in every operation and its order; the margin names the card.
   use kinds, only: dp
-  use deck, only: deck_t, stop_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
-                  COMPLETE, STOPPED, OVERFLOW
+  use deck, only: deck_t, stop_t, euler_coefficients, normalized_torque, accelerations, is_finite
   use listing_flags, only: listing_t
+  use statuses, only: COMPLETE, OVERFLOW, STOPPED
   implicit none(type, external)
   private
 

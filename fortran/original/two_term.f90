@@ -3,10 +3,10 @@ module two_term_program
   !! omega = omega(0) + c1 t + c2 t**2 (eq. 34), residual zero at T1 and T2 (eq. 36).
   !! Faithful in every operation and its order; the margin names the card.
   use kinds, only: dp
-  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
-                  COMPLETE, OVERFLOW
+  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite
   use linear_solver, only: leqt1f
   use listing_flags, only: listing_t
+  use statuses, only: COMPLETE, OVERFLOW
   implicit none(type, external)
   private
 

@@ -26,6 +26,15 @@ static solver *chosen = taylor_solve_plain;
 static quick_solver *chosen_quick = quick_solve_plain;
 static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
 
+/* All of x86-64-v3 that a processor with AVX2 may lack, or that a virtual machine may hide. */
+#define HAS_AVX2                                                                               \
+  (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&                          \
+   __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2"))
+#define HAS_AVX512                                                                             \
+  (HAS_AVX2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&      \
+   __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&                 \
+   __builtin_cpu_supports("avx512vl"))
+
 /* Take a level, or the best below it that the processor has; return the one taken. */
 int choose_level(int highest)
 {
@@ -34,12 +43,11 @@ int choose_level(int highest)
   level = 0;
 #ifdef WITH_LEVELS
   __builtin_cpu_init();
-  if (highest >= 2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("fma")) {
+  if (highest >= 2 && HAS_AVX512) {
     chosen = taylor_solve_avx512;
     chosen_quick = quick_solve_avx512;
     level = 2;
-  } else if (highest >= 1 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+  } else if (highest >= 1 && HAS_AVX2) {
     chosen = taylor_solve_avx2;
     chosen_quick = quick_solve_avx2;
     level = 1;

@@ -1,0 +1,21 @@
+"""The instruction sets that the kernels are compiled for, and which of them this processor has."""
+
+import platform
+
+import numpy as np
+
+from pyharness import _build
+
+LEVELS = ("plain", "avx2", "avx512")
+BEST = len(LEVELS) - 1
+# NumPy's names for them, new and old.
+_NAMES = ({"X86_V3", "AVX2"}, {"X86_V4", "AVX512_SKX"})
+
+
+def level_here() -> int:
+    """Return the highest level due, by NumPy's word on the processor and not by levels.c's."""
+    if _build.COMPILER != "gcc" or platform.machine().lower() not in ("x86_64", "amd64"):
+        return 0
+    simd = np.show_config(mode="dicts")["SIMD Extensions"]
+    found = {*simd["baseline"], *simd["found"]}
+    return sum(not names.isdisjoint(found) for names in _NAMES)

@@ -122,7 +122,7 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
                            n_times, times, rows, n_rows, status)
   ! Closed form of a sphere under the torque law of a scene.
   !f2py threadsafe
-  use torque_free, only: sphere_rows
+  use sphere, only: sphere_rows
   implicit none
   real(8), intent(in) :: m_constant(3)        ! all torque over moment
   real(8), intent(in) :: m_rate(3)

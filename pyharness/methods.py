@@ -261,7 +261,7 @@ METHODS = {
         Method(
             "closed-form",
             "known solution: sphere, or any body without torque by elliptic functions",
-            "fortran/modern/torque_free.f90; Jacobi 1849",
+            "fortran/modern/torque_free.f90, sphere.f90; Jacobi 1849",
             1e-14,
             _modern("closed_form"),
         ),

@@ -6,8 +6,9 @@ module prepared
   use gauss_collocation, only: gauss_rows
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
+  use sphere, only: sphere_rows
   use statuses, only: COMPLETE, REFUSED
-  use torque_free, only: sphere_rows, torque_free_end
+  use torque_free, only: torque_free_end
   implicit none(type, external)
   private
 

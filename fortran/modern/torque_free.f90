@@ -1,10 +1,11 @@
 module torque_free
-  !! Closed forms of equations 13-15: any torque-free body by Jacobi's elliptic functions, and
-  !! the sphere under the torque law of a scene. Cost and error do not depend on the time.
+  !! Closed form of equations 13-15 without torque, by Jacobi's elliptic functions. Neither cost
+  !! nor error depends on the time.
   !! A symmetric body under constant torque is left to the series: its form needs Fresnel
   !! integrals of arguments that overflow as M3 -> 0, and is slower than a Taylor step.
   use kinds, only: dp
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
+  use two_words, only: scaled, sine_cosine, square_root, two_product, two_sum
   implicit none(type, external)
   private
 
@@ -13,12 +14,9 @@ module torque_free
   integer, parameter :: ELLIPTIC = 2
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
-  integer, parameter :: i8 = selected_int_kind(18)
-  integer(i8), parameter :: UPPER_BITS = -134217728_i8 ! all but the last 27 bits
   real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
   real(dp), parameter :: FLAT = 4e-9_dp       ! a difference whose square no longer counts
   real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
-  real(dp), parameter :: SMALL_PHASE = 1e6_dp ! up to it one term corrects sine and cosine
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
 
   type :: orbit_t
@@ -40,7 +38,7 @@ module torque_free
     real(dp) :: lower(MOST_LEVELS)   !! a(n) b(n-1)
   end type orbit_t
 
-  public :: torque_free_rows, torque_free_end, sphere_rows
+  public :: torque_free_rows, torque_free_end
 
 contains
 
@@ -333,114 +331,6 @@ contains
     omega(orbit%axes(3)) = w(3)
   end subroutine evaluate
 
-  pure subroutine sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
-                              n_times, times, rows, n_rows, status)
-    !! Angular velocity of a sphere, or of any body with A = B = C = 0: omega0 and the integral
-    !! of the torque over the moment.
-    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
-    real(dp), intent(in) :: m_rate(3)              !! 1/s3
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
-    real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
-    integer, intent(in) :: n_times
-    real(dp), intent(in) :: times(n_times)         !! s, in any order
-    real(dp), intent(out) :: rows(3, n_times)      !! rad/s
-    integer, intent(out) :: n_rows                 !! rows that hold a result
-    integer, intent(out) :: status                 !! COMPLETE or OVERFLOW
-    real(dp) :: total(3)
-    real(dp) :: rest(3)    ! what rounding took off the total
-    real(dp) :: t
-    real(dp) :: sine       ! of half the angle
-    real(dp) :: cosine
-    real(dp) :: quotient   ! sine over half the angle
-    integer :: i
-    integer :: k
-
-    n_rows = 0
-    status = COMPLETE
-    do i = 1, n_times
-      t = times(i)
-      total = omega0
-      rest = 0.0_dp
-      call add(total, rest, m_constant, t)
-      call add(total, rest, m_rate, 0.5_dp*t*t)
-      do k = 1, n_sines
-        call half_angle(sines(4, k), t, sine, cosine, quotient)
-        call add(total, rest, sines(1:3, k), t*(sine*quotient))
-      end do
-      do k = 1, n_cosines
-        call half_angle(cosines(4, k), t, sine, cosine, quotient)
-        call add(total, rest, cosines(1:3, k), t*(cosine*quotient))
-      end do
-      total = total + rest
-      if (.not. all(abs(total) <= huge(t))) then
-        status = OVERFLOW
-        return
-      end if
-      rows(:, i) = total
-      n_rows = i
-    end do
-  end subroutine sphere_rows
-
-  pure subroutine add(total, rest, amplitude, factor)
-    !! Add amplitude times factor to total + rest.
-    real(dp), intent(inout) :: total(3)
-    real(dp), intent(inout) :: rest(3)
-    real(dp), intent(in) :: amplitude(3)
-    real(dp), intent(in) :: factor
-    real(dp) :: term
-    real(dp) :: term_low
-    real(dp) :: sum_high
-    real(dp) :: sum_low
-    integer :: axis
-
-    do axis = 1, 3
-      if (.not. abs(amplitude(axis)) > 0.0_dp) cycle
-      call two_product(amplitude(axis), factor, term, term_low)
-      call two_sum(total(axis), term, sum_high, sum_low)
-      total(axis) = sum_high
-      if (abs(sum_high) <= huge(factor)) rest(axis) = rest(axis) + (sum_low + term_low)
-    end do
-  end subroutine add
-
-  pure subroutine half_angle(frequency, t, sine, cosine, quotient)
-    !! Sine and cosine of frequency t/2, and the sine over it.
-    real(dp), intent(in) :: frequency
-    real(dp), intent(in) :: t
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
-    real(dp), intent(out) :: quotient
-    real(dp) :: angle
-    real(dp) :: angle_low
-
-    call two_product(frequency, 0.5_dp*t, angle, angle_low)
-    call sine_cosine(angle, angle_low, sine, cosine)
-    quotient = 1.0_dp
-    if (abs(angle) > 0.0_dp) quotient = sine/angle
-  end subroutine half_angle
-
-  pure subroutine sine_cosine(angle, angle_low, sine, cosine)
-    !! Sine and cosine of angle + angle_low.
-    real(dp), intent(in) :: angle
-    real(dp), intent(in) :: angle_low
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
-    real(dp) :: s
-    real(dp) :: c
-
-    s = sin(angle)
-    c = cos(angle)
-    if (abs(angle) <= SMALL_PHASE) then
-      sine = s + c*angle_low
-      cosine = c - s*angle_low
-    else
-      sine = s*cos(angle_low) + c*sin(angle_low)
-      cosine = c*cos(angle_low) - s*sin(angle_low)
-    end if
-  end subroutine sine_cosine
-
   pure subroutine bring_near_one(x, power)
     !! Divide by the power of two that brings the largest of x into [1/2, 1).
     real(dp), intent(inout) :: x(3)
@@ -453,67 +343,5 @@ contains
     power = exponent(largest)
     x = scale(x, -power)
   end subroutine bring_near_one
-
-  pure subroutine square_root(x, x_low, root, root_low)
-    !! Square root of x + x_low to twice the working digits.
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: x_low
-    real(dp), intent(out) :: root
-    real(dp), intent(out) :: root_low
-    real(dp) :: square
-    real(dp) :: square_low
-
-    root = sqrt(x)
-    call two_product(root, root, square, square_low)
-    root_low = ((x - square) + (x_low - square_low))/(root + root)
-  end subroutine square_root
-
-  pure subroutine scaled(x, x_low, factor, y, y_low)
-    !! (x + x_low) factor to twice the working digits.
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: x_low
-    real(dp), intent(in) :: factor
-    real(dp), intent(out) :: y
-    real(dp), intent(out) :: y_low
-
-    call two_product(x, factor, y, y_low)
-    y_low = y_low + x_low*factor
-  end subroutine scaled
-
-  pure subroutine two_sum(x, y, total, rest)
-    !! x + y = total + rest, exactly (Knuth).
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: y
-    real(dp), intent(out) :: total
-    real(dp), intent(out) :: rest
-    real(dp) :: s
-    real(dp) :: part
-
-    s = x + y
-    part = s - x
-    rest = (x - (s - part)) + (y - part)
-    total = s
-  end subroutine two_sum
-
-  pure subroutine two_product(x, y, product, rest)
-    !! x y = product + rest up to 2**-106 of it (Dekker, halves cut off by their bits).
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: y
-    real(dp), intent(out) :: product
-    real(dp), intent(out) :: rest
-    real(dp) :: xh
-    real(dp) :: xl
-    real(dp) :: yh
-    real(dp) :: yl
-    real(dp) :: p
-
-    xh = transfer(iand(transfer(x, UPPER_BITS), UPPER_BITS), x)
-    yh = transfer(iand(transfer(y, UPPER_BITS), UPPER_BITS), y)
-    xl = x - xh
-    yl = y - yh
-    p = x*y
-    rest = (((xh*yh - p) + xh*yl) + xl*yh) + xl*yl
-    product = p
-  end subroutine two_product
 
 end module torque_free

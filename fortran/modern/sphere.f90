@@ -1,0 +1,101 @@
+module sphere
+  !! Closed form of the sphere under the torque law of a scene: the integral of the torque.
+  use kinds, only: dp
+  use statuses, only: COMPLETE, OVERFLOW
+  use two_words, only: sine_cosine, two_product, two_sum
+  implicit none(type, external)
+  private
+
+  public :: sphere_rows
+
+contains
+
+  pure subroutine sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
+                              n_times, times, rows, n_rows, status)
+    !! Angular velocity of a sphere, or of any body with A = B = C = 0: omega0 and the integral
+    !! of the torque over the moment.
+    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
+    real(dp), intent(in) :: m_rate(3)              !! 1/s3
+    integer, intent(in) :: n_sines
+    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
+    integer, intent(in) :: n_cosines
+    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
+    integer, intent(in) :: n_times
+    real(dp), intent(in) :: times(n_times)         !! s, in any order
+    real(dp), intent(out) :: rows(3, n_times)      !! rad/s
+    integer, intent(out) :: n_rows                 !! rows that hold a result
+    integer, intent(out) :: status                 !! COMPLETE or OVERFLOW
+    real(dp) :: total(3)
+    real(dp) :: rest(3)    ! what rounding took off the total
+    real(dp) :: t
+    real(dp) :: sine       ! of half the angle
+    real(dp) :: cosine
+    real(dp) :: quotient   ! sine over half the angle
+    integer :: i
+    integer :: k
+
+    n_rows = 0
+    status = COMPLETE
+    do i = 1, n_times
+      t = times(i)
+      total = omega0
+      rest = 0.0_dp
+      call add(total, rest, m_constant, t)
+      call add(total, rest, m_rate, 0.5_dp*t*t)
+      do k = 1, n_sines
+        call half_angle(sines(4, k), t, sine, cosine, quotient)
+        call add(total, rest, sines(1:3, k), t*(sine*quotient))
+      end do
+      do k = 1, n_cosines
+        call half_angle(cosines(4, k), t, sine, cosine, quotient)
+        call add(total, rest, cosines(1:3, k), t*(cosine*quotient))
+      end do
+      total = total + rest
+      if (.not. all(abs(total) <= huge(t))) then
+        status = OVERFLOW
+        return
+      end if
+      rows(:, i) = total
+      n_rows = i
+    end do
+  end subroutine sphere_rows
+
+  pure subroutine add(total, rest, amplitude, factor)
+    !! Add amplitude times factor to total + rest.
+    real(dp), intent(inout) :: total(3)
+    real(dp), intent(inout) :: rest(3)
+    real(dp), intent(in) :: amplitude(3)
+    real(dp), intent(in) :: factor
+    real(dp) :: term
+    real(dp) :: term_low
+    real(dp) :: sum_high
+    real(dp) :: sum_low
+    integer :: axis
+
+    do axis = 1, 3
+      if (.not. abs(amplitude(axis)) > 0.0_dp) cycle
+      call two_product(amplitude(axis), factor, term, term_low)
+      call two_sum(total(axis), term, sum_high, sum_low)
+      total(axis) = sum_high
+      if (abs(sum_high) <= huge(factor)) rest(axis) = rest(axis) + (sum_low + term_low)
+    end do
+  end subroutine add
+
+  pure subroutine half_angle(frequency, t, sine, cosine, quotient)
+    !! Sine and cosine of frequency t/2, and the sine over it.
+    real(dp), intent(in) :: frequency
+    real(dp), intent(in) :: t
+    real(dp), intent(out) :: sine
+    real(dp), intent(out) :: cosine
+    real(dp), intent(out) :: quotient
+    real(dp) :: angle
+    real(dp) :: angle_low
+
+    call two_product(frequency, 0.5_dp*t, angle, angle_low)
+    call sine_cosine(angle, angle_low, sine, cosine)
+    quotient = 1.0_dp
+    if (abs(angle) > 0.0_dp) quotient = sine/angle
+  end subroutine half_angle
+
+end module sphere

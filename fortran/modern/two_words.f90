@@ -1,0 +1,97 @@
+module two_words
+  !! Numbers of two words: what rounding takes off the first is in the second.
+  use kinds, only: dp
+  implicit none(type, external)
+  private
+
+  integer, parameter :: i8 = selected_int_kind(18)
+  integer(i8), parameter :: UPPER_BITS = -134217728_i8 ! all but the last 27 bits
+  real(dp), parameter :: SMALL_PHASE = 1e6_dp ! up to it one term corrects sine and cosine
+
+  public :: scaled, sine_cosine, square_root, two_product, two_sum
+
+contains
+
+  pure subroutine sine_cosine(angle, angle_low, sine, cosine)
+    !! Sine and cosine of angle + angle_low.
+    real(dp), intent(in) :: angle
+    real(dp), intent(in) :: angle_low
+    real(dp), intent(out) :: sine
+    real(dp), intent(out) :: cosine
+    real(dp) :: s
+    real(dp) :: c
+
+    s = sin(angle)
+    c = cos(angle)
+    if (abs(angle) <= SMALL_PHASE) then
+      sine = s + c*angle_low
+      cosine = c - s*angle_low
+    else
+      sine = s*cos(angle_low) + c*sin(angle_low)
+      cosine = c*cos(angle_low) - s*sin(angle_low)
+    end if
+  end subroutine sine_cosine
+
+  pure subroutine square_root(x, x_low, root, root_low)
+    !! Square root of x + x_low to twice the working digits.
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: x_low
+    real(dp), intent(out) :: root
+    real(dp), intent(out) :: root_low
+    real(dp) :: square
+    real(dp) :: square_low
+
+    root = sqrt(x)
+    call two_product(root, root, square, square_low)
+    root_low = ((x - square) + (x_low - square_low))/(root + root)
+  end subroutine square_root
+
+  pure subroutine scaled(x, x_low, factor, y, y_low)
+    !! (x + x_low) factor to twice the working digits.
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: x_low
+    real(dp), intent(in) :: factor
+    real(dp), intent(out) :: y
+    real(dp), intent(out) :: y_low
+
+    call two_product(x, factor, y, y_low)
+    y_low = y_low + x_low*factor
+  end subroutine scaled
+
+  pure subroutine two_sum(x, y, total, rest)
+    !! x + y = total + rest, exactly (Knuth).
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: y
+    real(dp), intent(out) :: total
+    real(dp), intent(out) :: rest
+    real(dp) :: s
+    real(dp) :: part
+
+    s = x + y
+    part = s - x
+    rest = (x - (s - part)) + (y - part)
+    total = s
+  end subroutine two_sum
+
+  pure subroutine two_product(x, y, product, rest)
+    !! x y = product + rest up to 2**-106 of it (Dekker, halves cut off by their bits).
+    real(dp), intent(in) :: x
+    real(dp), intent(in) :: y
+    real(dp), intent(out) :: product
+    real(dp), intent(out) :: rest
+    real(dp) :: xh
+    real(dp) :: xl
+    real(dp) :: yh
+    real(dp) :: yl
+    real(dp) :: p
+
+    xh = transfer(iand(transfer(x, UPPER_BITS), UPPER_BITS), x)
+    yh = transfer(iand(transfer(y, UPPER_BITS), UPPER_BITS), y)
+    xl = x - xh
+    yl = y - yh
+    p = x*y
+    rest = (((xh*yh - p) + xh*yl) + xl*yh) + xl*yl
+    product = p
+  end subroutine two_product
+
+end module two_words

@@ -1,0 +1,95 @@
+"""Views of checks: a line for each failure and a summary by kind, JSON, JUnit's XML."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from pyharness.build import Build
+from pyharness.checks import Check
+from pyharness.tables import aligned, short, wrapped
+
+_MOST_FAILURES = 50
+
+
+def failure_lines(checks: Sequence[Check]) -> list[str]:
+    """Return two lines for each check that failed: what is wrong, and how to see it again."""
+    failed = [check for check in checks if not check.passed]
+    lines = []
+    for check in failed[:_MOST_FAILURES]:
+        found = "" if check.value is None else f" {short(check.value)}"
+        allowed = "" if check.limit is None else f" > {short(check.limit)}"
+        note = f" ({check.note})" if check.note else ""
+        lines += wrapped(f"FAILED {check.id}{found}{allowed}{note}")
+        # Whole, however long: it is there to be copied.
+        lines.append(f"  {check.replay}")
+    if len(failed) > _MOST_FAILURES:
+        lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")
+    return lines
+
+
+def checks_table(title: Sequence[str], checks: Sequence[Check], depth: int = 1) -> str:
+    """Return the failures, then a row for each group of checks that share `depth` parts."""
+    groups: dict[str, list[Check]] = {}
+    for check in checks:
+        groups.setdefault("/".join(check.id.split("/")[:depth]), []).append(check)
+    rows = []
+    for name, members in groups.items():
+        judged = [check for check in members if check.limit]
+        worst = max(judged, key=_share, default=None)
+        failed = sum(not check.passed for check in members)
+        share = "-" if worst is None else short(_share(worst))
+        rows.append([name, str(len(members)), str(failed), share])
+    failures = failure_lines(checks)
+    lines = [line for each in title for line in wrapped(each)]
+    lines += [""] if title else []
+    lines += [*failures, ""] if failures else []
+    lines += aligned(["checks", "made", "failed", "worst/limit"], rows, left=1)
+    lines += ["", verdict(checks)]
+    return "\n".join(lines) + "\n"
+
+
+def verdict(checks: Sequence[Check]) -> str:
+    """Say in a line how many checks were made and how many failed."""
+    failed = sum(not check.passed for check in checks)
+    return f"{len(checks)} checks, {failed} failed" if failed else f"{len(checks)} checks, all well"
+
+
+def checks_record(checks: Sequence[Check], build: Build, **extra: Any) -> dict[str, Any]:
+    """Return the record of `verify` and `stress`."""
+    from pyharness.records import SCHEMA
+
+    return {
+        "schema": SCHEMA,
+        "checks": [asdict(check) for check in checks],
+        "passed": all(check.passed for check in checks),
+        **extra,
+        "build": asdict(build),
+    }
+
+
+def junit_text(name: str, checks: Sequence[Check]) -> str:
+    """Return the XML that services for continuous integration read."""
+    from xml.etree import ElementTree as xml
+
+    suite = xml.Element(
+        "testsuite",
+        name=name,
+        tests=str(len(checks)),
+        failures=str(sum(not check.passed for check in checks)),
+        errors="0",
+        skipped="0",
+    )
+    for check in checks:
+        case = xml.SubElement(suite, "testcase", classname=f"{name}.{check.kind}", name=check.id)
+        if not check.passed:
+            message = f"{short(check.value)}, limit {short(check.limit)}"
+            failure = xml.SubElement(case, "failure", message=check.note or message)
+            failure.text = f"{message}\n{check.replay}"
+    xml.indent(suite)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + xml.tostring(suite, "unicode") + "\n"
+
+
+def _share(check: Check) -> float:
+    if check.value is None or not check.limit:
+        return 0.0
+    return abs(check.value) / check.limit

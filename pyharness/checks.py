@@ -1,0 +1,62 @@
+"""Checks: what was held against what, whether it passed, and the command that replays it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Check:
+    """One comparison.
+
+    Attributes
+    ----------
+    id : str
+        Kind, subject and circumstance, joined by slashes, as in ``cells/two-term/case-3/...``;
+        no two checks of a run have the same.
+    passed : bool
+        Whether all is as it should be.
+    value : float or None
+        What was found; None where there is no one number.
+    limit : float or None
+        What `value` must not exceed; None where the check is yes or no, or only describes.
+    replay : str
+        The command that makes this check alone.
+    note : str
+        What is wrong, or what was seen, in a few words.
+    """
+
+    id: str
+    passed: bool
+    value: float | None
+    limit: float | None
+    replay: str
+    note: str = ""
+
+    @property
+    def kind(self) -> str:
+        """The first part of the name."""
+        return self.id.partition("/")[0]
+
+
+def bounded(id: str, value: float, limit: float, replay: str, note: str = "") -> Check:
+    """Return the check that `value` does not exceed `limit`; NaN does."""
+    return Check(id, not math.isnan(value) and value <= limit, value, limit, replay, note)
+
+
+def described(id: str, value: float | None, replay: str, note: str = "") -> Check:
+    """Return a finding without a bound, which can't fail."""
+    return Check(id, True, value, None, replay, note)
+
+
+def selected(id: str, only: Sequence[str]) -> bool:
+    """Whether a check is asked for: all are where nothing is named, else whole leading parts.
+
+    ``cells/two-term`` selects ``cells/two-term/case-3``, not ``cells/two-terms``.
+    """
+    return not only or any(id == each or id.startswith(each + "/") for each in only)
+
+
+def may_hold(id: str, only: Sequence[str]) -> bool:
+    """Whether checks below or above `id` are asked for: what no one asks for is not computed."""
+    return selected(id, only) or any(each.startswith(id + "/") for each in only)

@@ -71,6 +71,27 @@ def read_scene(path: str | Path) -> Scene:
         raise InputError(f"{where}: {error}") from None
 
 
+def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
+    """Return a scene as the text of a file that `read_scene` reads back to the last bit.
+
+    `comments` are lines at its head.
+    """
+    import json
+
+    body = "moments" if scene.moments is not None else "coefficients"
+    law = scene.torque
+    lines = [f"# {line}" for line in comments]
+    lines += [f"name = {json.dumps(scene.name)}", "[body]"]
+    lines += [f"{body} = {list(scene.moments or scene.coefficients or ())}"]
+    lines += ["[initial]", f"omega = {list(scene.omega)}"]
+    lines += ["[torque]", f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
+    for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
+        each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
+        lines.append(f"{name} = [{', '.join(each)}]")
+    lines += ["[run]", f"step_size = {scene.step_size!r}", f"steps = {scene.steps}"]
+    return "\n".join(lines) + "\n"
+
+
 def _scene(data: dict[str, Any], default_name: str) -> Scene:
     _check_keys(data, ("name", *_TABLES), "top level")
     tables: dict[str, dict[str, Any]] = {}

@@ -1,0 +1,1 @@
+"""The trials of `stress`, one to a module; each has a `TRIAL`."""

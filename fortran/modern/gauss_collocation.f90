@@ -116,6 +116,8 @@ contains
     real(dp) :: increment
     real(dp) :: total
     real(dp) :: part
+    real(dp) :: back
+    real(dp) :: rest
     integer :: axis
     integer :: iteration
     integer :: k
@@ -164,10 +166,16 @@ contains
         part = part + WEIGHTS_LOW(k, stages)*f(k, axis)
         increment = increment + WEIGHTS(k, stages)*f(k, axis)
       end do
-      increment = h*(increment + part) + carry(axis)
+      ! The low words are finer than the last place of the sum: what it can't hold is carried.
+      increment = h*increment
+      part = carry(axis) + h*part
+      total = increment + part
+      back = total - increment
+      rest = (increment - (total - back)) + (part - back)
+      increment = total
       total = y(axis) + increment
-      part = total - y(axis)
-      carry(axis) = (y(axis) - (total - part)) + (increment - part)
+      back = total - y(axis)
+      carry(axis) = ((y(axis) - (total - back)) + (increment - back)) + rest
       y(axis) = total
       if (.not. abs(total) <= huge(total)) status = OVERFLOW
     end do

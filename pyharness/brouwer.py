@@ -159,8 +159,11 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     """Bound rounding and truncation of a step of Gauss collocation.
 
     Each node's sum has s + 3 roundings of the rates and one of the state; the iteration carries
-    them on by the inverse of 1 - h A J. The quadrature leaves out (s!)**4 / (2s)!**2 of the
-    Taylor term 2s + 1, and quadratic invariants are conserved whatever the step.
+    them on by the inverse of 1 - h A J. Quadratic invariants are conserved whatever the step.
+
+    Truncation is the integral of the propagator times the defect, which vanishes at the nodes:
+    by their orthogonality only the power s of the rest counts, by Leibniz's rule a sum over the
+    derivatives j of the propagator, (h J)**j / j!, and the Taylor terms 2s + 1 - j.
     """
     from pyharness.family_tableau import tableau
 
@@ -176,13 +179,17 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     state = body.largest
     at_node = step * spread * ((stages + 3.0) * rate + stiffness * state) * resolvent
     total = step * ((stages + 4.0) * rate + stiffness * (state + at_node))
-    factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2
-    left_out = factor * taylor_term(body, scene, step, 2 * stages + 1) / state
-    return Noise(step, ROUNDING * total / state, left_out, conserves=True)
+    factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2 / (2 * stages + 1)
+    terms = _term_sizes(body, scene, step, 2 * stages + 1)
+    left_out = factor * sum(
+        (step * stiffness) ** j / math.factorial(j) * (2 * stages + 1 - j) * terms[-1 - j]
+        for j in range(stages + 1)
+    )
+    return Noise(step, ROUNDING * total / state, left_out / state, conserves=True)
 
 
-def taylor_term(body: Orbit, scene: Scene, step: float, order: int) -> float:
-    """Return the largest Taylor term of an order along the motion, for a step (rad/s)."""
+def _term_sizes(body: Orbit, scene: Scene, step: float, order: int) -> list[float]:
+    """Return the largest Taylor terms 0 ... order along the motion, for a step (rad/s)."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -190,7 +197,7 @@ def taylor_term(body: Orbit, scene: Scene, step: float, order: int) -> float:
         for j in range(k):
             value += np.roll(terms[j], -1, 1) * np.roll(terms[k - 1 - j], -2, 1)
         terms.append(a * value * (step / k))
-    return float(np.abs(terms[-1]).max())
+    return [float(np.abs(each).max()) for each in terms]
 
 
 def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, float]:
@@ -218,7 +225,7 @@ def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, fl
     }
 
 
-def exponent(steps: Sequence[float], found: Array) -> float:
+def exponent(steps: Sequence[float] | Array, found: Array) -> float:
     """Return the power of the number of steps with which the mean square over the starts grows.
 
     `found` has a row for each start and a column for each number of steps.

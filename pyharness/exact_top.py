@@ -75,7 +75,7 @@ def torque_free_top(
 
 
 def jacobi(u: Decimal, rest: Decimal) -> tuple[Decimal, Decimal, Decimal]:
-    """Return sn, cn, dn of `u` at the parameter 1 - rest, 0 < rest <= 1, in the context's digits."""
+    """Return sn, cn, dn of `u` at the parameter 1 - rest, with 0 < rest <= 1."""
     moduli = []
     complement = rest.sqrt()
     square = 1 - rest

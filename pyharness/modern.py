@@ -112,7 +112,8 @@ def gauss(stages: int) -> Solver:
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
                 error = 2.0 * difference / (4.0**stages - 1.0)
                 close = error <= tolerance * scale or difference <= _ROUNDING * scale
-                if (close and found.status == COMPLETE) or found.blows_up(before):
+                bound = _reachable(scene, torque, reached)
+                if (close and found.status == COMPLETE) or found.blows_up(before, bound):
                     count = _steps(times, step)
                     return _trajectory(times, found.rows, n, found.status, count, spent)
             before = found
@@ -129,12 +130,23 @@ class _Solution:
     status: int
     evaluations: int
 
-    def blows_up(self, coarser: "_Solution") -> bool:
-        """Whether it ended where the coarser one did, with an omega that grows as steps fall."""
+    def blows_up(self, coarser: "_Solution", reachable: float) -> bool:
+        """Whether it ended where the coarser one did, with an omega that grows as steps fall.
+
+        A torque alone makes omega `reachable`; what is far beyond it comes from the products.
+        """
         if COMPLETE in (self.status, coarser.status):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
-        return largest > 1.5 * before > 1e3 * float(np.abs(self.rows[:, : self.n_rows]).max())
+        known = float(np.abs(self.rows[:, : self.n_rows]).max(initial=reachable))
+        return largest > 1.5 * before > 1e3 * known
+
+
+def _reachable(scene: Scene, torque: Sequence[Array], time: float) -> float:
+    """Return the omega that the start and the torque's impulse add up to (rad/s)."""
+    constant, rate, sines, cosines = (np.abs(each) for each in torque)
+    push = constant.max() + abs(time) * rate.max() + sines[:3].sum() + cosines[:3].sum()
+    return max(map(abs, scene.omega)) + float(push) * abs(time)
 
 
 def _steps(times: Sequence[float], step: float) -> int:

@@ -225,14 +225,21 @@ def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, fl
     }
 
 
+def root_mean_square(found: Array) -> Array:
+    """Return the size of errors over the starts, rows of `found`, for each number of steps.
+
+    A start that did not go so far, NaN, does not count.
+    """
+    return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
+
+
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
     """Return the power of the number of steps with which the mean square over the starts grows.
 
     `found` has a row for each start and a column for each number of steps.
     """
-    size = np.sqrt((np.asarray(found) ** 2).mean(axis=0))
-    slope = np.polyfit(np.log(np.asarray(steps)), np.log(np.maximum(size, 1e-300)), 1)[0]
-    return float(slope)
+    size = np.log(np.maximum(root_mean_square(found), 1e-300))
+    return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:

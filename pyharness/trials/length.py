@@ -34,6 +34,8 @@ STARTS = 12
 _FIT_FROM = 10**2.5
 # Midway between what chance makes of rounding and what a preference does.
 _HALFWAY = 0.25
+# A phase error (rad) beyond which its linear measure says only that it is large.
+_LOST = 0.1
 
 # Of fortran/modern/taylor.f90: the part of omega that the last two terms may have, and how often
 # that before a step is taken again.
@@ -261,7 +263,8 @@ def _described(
 ) -> Iterator[Outcome]:
     for what, error in brouwer.errors(scene, body, time, row).items():
         id = f"length/{name}/{motion}/{where}/{what}"
-        yield Outcome(described(id, error, replay(id)), scene)
+        lost = what == "phase" and abs(error) > _LOST
+        yield Outcome(described(id, error, replay(id), "lost" if lost else ""), scene)
 
 
 TRIAL = Trial(

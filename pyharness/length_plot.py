@@ -1,0 +1,117 @@
+"""The picture of Brouwer's law: `python -m pyharness.length_plot FILE.svg`; its rows as CSV."""
+
+import io
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pyharness.brouwer import LAWS, root_mean_square
+from pyharness.errors import InputError
+from pyharness.output import check_writable, write_files
+from pyharness.tables import csv_text
+from pyharness.trajectory import Array
+from pyharness.trials.length import CONTENDERS, MOTIONS, measured, orbit_of
+
+_SHOWN = ("energy", "phase")
+_STYLES: dict[str, dict[str, Any]] = {
+    "taylor": {"linestyle": "-", "marker": "o", "color": "#1040a0"},
+    "gauss-8": {"linestyle": (0, (6, 1.5)), "marker": "s", "color": "#3a86c8"},
+    "gauss-4": {"linestyle": (0, (1, 1.5)), "marker": "^", "color": "#b02018"},
+}
+_REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The error of one method over the number of steps, its bound, and by how many starts."""
+
+    motion: str
+    method: str
+    what: str
+    steps: Array
+    error: Array
+    limits: Array
+    starts: Array
+
+
+def curves() -> Iterator[Curve]:
+    """Measure every method on every motion, as the trial does."""
+    for motion, scene in MOTIONS.items():
+        for method, contender in CONTENDERS.items():
+            for what, found, steps, limits in measured(contender, scene, orbit_of(motion)):
+                starts = (~np.isnan(found)).sum(axis=0)
+                error = root_mean_square(found)
+                yield Curve(motion, method, what, steps, error, np.array(limits), starts)
+
+
+def picture(found: list[Curve], path: str) -> dict[str, bytes]:
+    """Draw energy and phase of each motion; content by path, with CSV."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.0, 8.0), layout="constrained")
+    axes = figure.subplots(len(_SHOWN), len(MOTIONS), squeeze=False, sharex=True, sharey="row")
+    for row, what in enumerate(_SHOWN):
+        for column, motion in enumerate(MOTIONS):
+            one = axes[row, column]
+            own = [each for each in found if (each.motion, each.what) == (motion, what)]
+            for each in own:
+                style = _STYLES[each.method]
+                many = each.starts > 1
+                one.loglog(
+                    each.steps[many], each.error[many], label=each.method, markersize=4, **style
+                )
+                # One start alone: open, and not joined to what twelve came to.
+                alone = style | {"linestyle": "", "markerfacecolor": "none"}
+                one.loglog(each.steps[~many], each.error[~many], markersize=5, **alone)
+                one.loglog(each.steps, each.limits, color=style["color"], linewidth=0.5)
+            ends = np.array([1e2, 1e7])
+            begin = min(each.error[0] for each in own)
+            for power, line in ((LAWS[what], "--"), (LAWS[what] + 0.5, ":")):
+                law = begin * (ends / ends[0]) ** power
+                label = f"power {power:g}: " + ("chance" if line == "--" else "a preference")
+                one.loglog(ends, law, line, color="#707070", linewidth=1.0, label=label)
+            one.grid(visible=True, linewidth=0.3)
+            one.set_title(f"{motion}: {what}", fontsize=10)
+            one.legend(fontsize=8, loc="upper left")
+            if row == len(_SHOWN) - 1:
+                one.set_xlabel("steps")
+        axes[row, 0].set_ylabel("error of phase (rad)" if what == "phase" else "relative error")
+    figure.suptitle(
+        "Errors over many starts of one motion; open: of one start. Thin: the bounds.", fontsize=10
+    )
+    buffer = io.BytesIO()
+    form = Path(path).suffix.lstrip(".").lower()
+    with matplotlib.rc_context(_REPRODUCIBLE):
+        figure.savefig(
+            buffer, format=form, dpi=100, metadata={"Date": None} if form == "svg" else None
+        )
+    rows = [
+        [
+            each.motion,
+            each.method,
+            each.what,
+            f"{n:.0f}",
+            repr(float(e)),
+            repr(float(limit)),
+            str(count),
+        ]
+        for each in found
+        for n, e, limit, count in zip(each.steps, each.error, each.limits, each.starts, strict=True)
+    ]
+    numbers = csv_text(("motion", "method", "what", "steps", "error", "limit", "starts"), rows)
+    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("usage: python -m pyharness.length_plot FILE.svg (or .png, .pdf)")
+    try:
+        check_writable(sys.argv[1], "FILE")
+        write_files(picture(list(curves()), sys.argv[1]), "FILE")
+    except InputError as error:
+        sys.exit(f"length_plot: {error}")

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
 
         check_folder(folder, (), "--save")
 
-    outcomes = []
+    outcomes: list[Outcome] = []
     for outcome in stress(only):
         shared.progress(f"{len(outcomes) + 1}: {outcome.check.id}")
         outcomes.append(outcome)

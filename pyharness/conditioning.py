@@ -66,7 +66,11 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     if path.ended != "complete":
         raise InputError(f"conditioning: the solution leaves every bound before t = {time:g} s")
     omega = np.vstack([scene.omega, path.omega])
-    return _along(scene, times, omega)
+    with np.errstate(all="ignore"):
+        found = _along(scene, times, omega)
+    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
+        raise InputError("conditioning: the flow amplifies beyond binary64")
+    return found
 
 
 def _nodes(scene: Scene, time: float) -> Array:
@@ -83,7 +87,8 @@ def _nodes(scene: Scene, time: float) -> Array:
         with np.errstate(over="ignore"):
             largest = float(np.abs(_jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
-        if wanted > _MOST_NODES:
+        # NaN where numbers so large meet that their product has no meaning.
+        if not wanted <= _MOST_NODES:
             raise InputError("conditioning: too long a time for so fast a motion")
         if count >= wanted:
             return times

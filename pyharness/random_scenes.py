@@ -133,7 +133,7 @@ def _extreme(source: random.Random) -> Scene:
     def any_size() -> float:
         if source.random() < 0.1:
             return float(source.choice((0.0, -0.0)))
-        return source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-300.0, 300.0)
+        return float(source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-300.0, 300.0))
 
     law = TorqueLaw(_triple([any_size() for _ in range(3)]))
     return Scene(

@@ -69,13 +69,17 @@ def recorded() -> Iterator[Recorded]:
         scene = case_scene(case)
         for program in PROGRAMS:
             for label in ("original", "corrected"):
-                command = f"python -m pyharness run --case {case} --program {program} --listing {label}"
+                command = (
+                    f"python -m pyharness run --case {case} --program {program} --listing {label}"
+                )
                 yield Recorded(program, f"case-{case}/{label}", command, scene, None)
         for name in _RECORDED_METHODS:
             if name == "closed-form" and closed_form(scene) is None:
                 continue
             tolerance = max(METHODS[name].finest, _TOLERANCE)
-            command = f"python -m pyharness run --case {case} --method {name} --tolerance {tolerance:g}"
+            command = (
+                f"python -m pyharness run --case {case} --method {name} --tolerance {tolerance:g}"
+            )
             stated = None if tolerance == 1.0 else tolerance
             yield Recorded(name, f"case-{case}", command, scene, stated)
 

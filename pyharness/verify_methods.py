@@ -25,7 +25,7 @@ from pyharness.trajectory import Array
 _TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 # Of solve_ivp no more is asked than it answers in a second.
 _SCIPY_TOLERANCES = (1e-6, 1e-9)
-_TIMES = (0.3, 1.0, 3.0)
+_LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
 _PREPARED = ("auto", "taylor", "quick", "closed-form")
 _FINEST_QUICK = 1e-7
@@ -73,7 +73,8 @@ def methods(chosen: Selection) -> Iterator[Check]:
         ]
         if names:
             scene = case_scene(case)
-            standard = _standard(scene, _TIMES)
+            # All results of the case, close together, and one far from them.
+            standard = _standard(scene, (*scene.times(), _LATER))
             for name, tolerance, id in names:
                 yield _held(id, replay(id), scene, name, tolerance, standard)
 

@@ -112,7 +112,7 @@ def gauss(stages: int) -> Solver:
                 scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
                 # Where an interval has as many steps as before, the difference tells nothing.
-                known = float((counts / previous).min()) ** (2 * stages) - 1.0
+                known = float((counts / previous).min(initial=2.0)) ** (2 * stages) - 1.0
                 allowed = max(tolerance * scale * known / 2.0, _ROUNDING * scale)
                 close = known > 0.0 and difference <= allowed
                 if (close and found.status == COMPLETE) or found.blows_up(before, start):
@@ -146,8 +146,9 @@ class _Solution:
 
 
 def _counts(times: Sequence[float], step: float) -> Array:
-    """Return the steps that the kernel takes to each time: equal ones, `step` at the most."""
+    """Return the steps that the kernel takes to each time but 0: equal, `step` at the most."""
     lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
+    lengths = lengths[lengths > 0.0]
     with np.errstate(over="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 

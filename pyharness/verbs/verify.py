@@ -20,6 +20,11 @@ def declare(parser: shared.Parser) -> None:
     )
     parser.add_argument("--seed", metavar="S", help="of the random draws (default: the week)")
     parser.add_argument("--draws", metavar="N", help=f"random draws (default {DRAWS})")
+    parser.add_argument(
+        "--self-test",
+        action="store_true",
+        help="plant faults, and report which check catches which",
+    )
     parser.add_argument("--update", action="store_true", help="write the golden record anew")
     parser.add_argument(
         "--record", metavar="DIR", help="the golden record (default: the checkout's)"
@@ -36,6 +41,9 @@ def run(options: argparse.Namespace) -> int:
     if options.update:
         shared.refuse(options, "--update", ("only", "seed", "draws", "format", "out"))
         return _update(chosen.record)
+    if options.self_test:
+        shared.refuse(options, "--self-test", ("only", "draws"))
+        return _self_test(options, chosen, form)
     checks = []
     for check in verify(chosen):
         checks.append(check)
@@ -44,7 +52,30 @@ def run(options: argparse.Namespace) -> int:
     shared.progress("")
     if not checks:
         raise InputError(f"--only {options.only}: no such check; the kinds are {', '.join(KINDS)}")
-    shared.emit(_shown(checks, chosen, form), options.out)
+    if form != "table":
+        text = _machine_text(checks, form, chosen.seed)
+    else:
+        text = checks_table(_title(chosen), checks)
+    shared.emit(text, options.out)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _self_test(options: argparse.Namespace, chosen: Selection, form: str) -> int:
+    from pyharness.check_tables import self_test_table
+    from pyharness.plants import PLANTS
+    from pyharness.self_test import as_check, self_test
+
+    found = []
+    for caught in self_test(chosen.seed, chosen.record):
+        found.append(caught)
+        shared.progress(f"{len(found)} of {len(PLANTS) + 1}: {as_check(caught).id}")
+    shared.progress("")
+    checks = [as_check(caught) for caught in found]
+    if form == "table":
+        text = self_test_table(_title(chosen), found)
+    else:
+        text = _machine_text(checks, form, chosen.seed)
+    shared.emit(text, options.out)
     return 0 if all(check.passed for check in checks) else 1
 
 
@@ -63,18 +94,20 @@ def _selection(options: argparse.Namespace) -> Selection:
     return Selection(only=only, draws=draws, record=record, **changes)
 
 
-def _shown(checks: list[Check], chosen: Selection, form: str) -> str:
-    if form == "json":
-        from pyharness.build import build
-        from pyharness.records import json_text
-
-        return json_text(checks_record(checks, build(), seed=chosen.seed))
-    if form == "junit":
-        return junit_text("verify", checks)
+def _title(chosen: Selection) -> list[str]:
     title = [f"seed of the random draws: {chosen.seed}"] if chosen.may_ask("random") else []
     if chosen.may_ask("golden") and not chosen.record.is_dir():
-        title.append("no golden record is here (it stands in the checkout): not compared")
-    return checks_table(title, checks)
+        title.append("there is no golden record here (it stands in the checkout): not compared")
+    return title
+
+
+def _machine_text(checks: list[Check], form: str, seed: str) -> str:
+    if form == "junit":
+        return junit_text("verify", checks)
+    from pyharness.build import build
+    from pyharness.records import json_text
+
+    return json_text(checks_record(checks, build(), seed=seed))
 
 
 def _update(record: Path) -> int:

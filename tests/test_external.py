@@ -261,11 +261,12 @@ def _spoiled(change: Callable[[np.ndarray], None]) -> Callable[..., object]:
     return solve
 
 
-def test_no_number_at_all_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    """NaN in the first component must not hide behind two that are right."""
+@pytest.mark.parametrize("axis", range(3))
+def test_no_number_at_all_is_caught(axis: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """NaN in one component must not hide behind two that are right."""
 
     def spoil(omega: np.ndarray) -> None:
-        omega[:, 0] = np.nan
+        omega[:, axis] = np.nan
 
     changed = replace(METHODS["gauss-8"], solve=_spoiled(spoil))  # type: ignore[arg-type]
     monkeypatch.setitem(METHODS, "gauss-8", changed)

@@ -89,7 +89,7 @@ def gauss(stages: int) -> Solver:
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
         torque = normalized(scene)[1:]
-        scale = start = max(map(abs, scene.omega)) or 1.0
+        scale = start = max(map(abs, scene.omega))
         step, spent, reached = _first_step(scene, times), 0, 0.0
         before: _Solution | None = None
         counts = previous = _counts(times, step)

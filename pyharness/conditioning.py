@@ -84,7 +84,7 @@ def _nodes(scene: Scene, time: float) -> Array:
         times = np.linspace(0.0, time, count + 1)
         path = solve(scene, times[1:].tolist(), "taylor", 1e-13)
         omega = np.vstack([scene.omega, path.omega])
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
             largest = float(np.abs(_jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
         # NaN where numbers so large meet that their product has no meaning.

@@ -12,16 +12,24 @@ import numpy as np
 
 from pyharness.original.collocation import collocation_matrix
 from pyharness.original.linear_solver import SINGULAR, leqt1f
+from pyharness.rational import (
+    Exact,
+    absolute,
+    fractions,
+    gamma,
+    inverse,
+    magnitudes,
+    norm,
+    product,
+    times,
+)
 from pyharness.trajectory import Array
-
-Exact = list[list[Fraction]]
 
 # Where the residual is zero, in parts of the step.
 PARTS = {
     "two-term": (Fraction(1, 3), Fraction(2, 3)),
     "four-term": (Fraction(1, 5), Fraction(2, 5), Fraction(3, 5), Fraction(4, 5)),
 }
-_UNIT = Fraction(1, 2**53)
 
 
 @dataclass(frozen=True)
@@ -93,13 +101,13 @@ def solved(program: str, step: float) -> Solved:
     )
     twin, twin_ier = leqt1f(matrix, sides)
     differing = int((np.array(twin) != found.T).sum()) + (ier != twin_ier)
-    exact = _fractions(matrix)
-    inverse = _inverse(exact)
+    exact = fractions(matrix)
+    solver = inverse(exact)
     columns = [max(abs(row[j]) for row in exact) for j in range(len(exact))]
     scaled = [[x / s for x, s in zip(row, columns, strict=True)] for row in exact]
-    scaled_inverse = [[x * s for x in row] for row, s in zip(inverse, columns, strict=True)]
-    condition = float(_norm(exact) * _norm(inverse))
-    scaled_condition = float(_norm(scaled) * _norm(scaled_inverse))
+    scaled_inverse = [[x * s for x in row] for row, s in zip(solver, columns, strict=True)]
+    condition = float(norm(exact) * norm(solver))
+    scaled_condition = float(norm(scaled) * norm(scaled_inverse))
     if ier == SINGULAR:
         nothing = float("nan")
         return Solved(
@@ -107,18 +115,18 @@ def solved(program: str, step: float) -> Solved:
             nothing, nothing, nothing, nothing, nothing,
         )  # fmt: skip
     lower, upper = _triangles(factors)
-    order = _order(exact, _product(lower, upper))
-    sizes = _product(_magnitudes(lower), _magnitudes(upper))
-    growth = _norm([[x / s for x, s in zip(row, columns, strict=True)] for row in sizes])
+    order = _order(exact, product(lower, upper))
+    sizes = product(magnitudes(lower), magnitudes(upper))
+    growth = norm([[x / s for x, s in zip(row, columns, strict=True)] for row in sizes])
     # The bounds are on the rows as they stand in the matrix.
     sizes = [sizes[order.index(i)] for i in range(len(exact))]
     yardstick = np.linalg.solve(np.array(matrix), np.array(sides).T)
-    judge = _Judge(exact, inverse, sizes, step)
+    judge = _Judge(exact, solver, sizes, step)
     errors = [judge.errors(x, b) for x, b in zip(found.T.tolist(), sides, strict=True)]
     usual = [judge.errors(x, b) for x, b in zip(yardstick.T.tolist(), sides, strict=True)]
     residual, forward, increment, increment_error = np.array(errors).max(axis=0).tolist()
     return Solved(
-        ier, differing, condition, scaled_condition, float(growth / _norm(scaled)), order,
+        ier, differing, condition, scaled_condition, float(growth / norm(scaled)), order,
         _pivoting(exact, order, sizes), residual, forward, increment, increment_error,
         max(each[1] for each in usual),
     )  # fmt: skip
@@ -167,12 +175,12 @@ def declared_singular_below(program: str) -> float:
 class _Judge:
     """Errors of solutions of one system over their bounds."""
 
-    def __init__(self, matrix: Exact, inverse: Exact, sizes: Exact, step: float) -> None:
+    def __init__(self, matrix: Exact, solver: Exact, sizes: Exact, step: float) -> None:
         count = len(matrix)
-        self._matrix, self._inverse, self._sizes = matrix, inverse, sizes
-        self._gamma = _gamma(3 * count)
+        self._matrix, self._solver, self._sizes = matrix, solver, sizes
+        self._gamma = gamma(3 * count)
         # Up to three roundings in a power, one in its product with c, n in the sum.
-        self._adding = _gamma(count + 4)
+        self._adding = gamma(count + 4)
         self._step = Fraction(step)
         self._powers = [self._step**k for k in range(1, count + 1)]
 
@@ -180,11 +188,11 @@ class _Judge:
         """Return residual, forward and increment over their bounds, and the increment's error."""
         x = [Fraction(each) for each in found]
         b = [Fraction(each) for each in side]
-        allowed = [self._gamma * each for each in _times(self._sizes, _absolute(x))]
-        left = [abs(p - q) for p, q in zip(_times(self._matrix, x), b, strict=True)]
-        truth = _times(self._inverse, b)
+        allowed = [self._gamma * each for each in times(self._sizes, absolute(x))]
+        left = [abs(p - q) for p, q in zip(times(self._matrix, x), b, strict=True)]
+        truth = times(self._solver, b)
         wrong = [abs(p - q) for p, q in zip(truth, x, strict=True)]
-        reach = _times(_magnitudes(self._inverse), allowed)
+        reach = times(magnitudes(self._solver), allowed)
         total = 0.0
         power = h = float(self._step)
         for c in found:
@@ -194,7 +202,7 @@ class _Judge:
             p * (r + self._adding * abs(q)) for p, q, r in zip(self._powers, x, reach, strict=True)
         )
         missed = abs(Fraction(total) - wanted)
-        size = self._step * max(_absolute(b))
+        size = self._step * max(absolute(b))
         return (
             _largest_share(left, allowed),
             _largest_share(wrong, reach),
@@ -211,7 +219,7 @@ def _pivoting(matrix: Exact, order: Sequence[int], sizes: Exact) -> tuple[float,
         best = max(candidates.values())
         shortfall = max(shortfall, 1 - candidates[chosen] / best)
         # Two candidates, each wrong by the rounding of its sum and of its scale.
-        wrong = max(scale[i] * sizes[i][j] for i in candidates) * _gamma(len(matrix) + 2)
+        wrong = max(scale[i] * sizes[i][j] for i in candidates) * gamma(len(matrix) + 2)
         allowed = max(allowed, 2 * wrong / best)
     return float(shortfall), float(allowed)
 
@@ -237,65 +245,19 @@ def _columns(
 
 
 def _row_scales(matrix: Exact) -> list[Fraction]:
-    return [1 / max(_absolute(row)) for row in matrix]
+    return [1 / max(absolute(row)) for row in matrix]
 
 
-def _order(matrix: Exact, product: Exact) -> tuple[int, ...]:
+def _order(matrix: Exact, multiplied: Exact) -> tuple[int, ...]:
     """Return which row of the matrix each row of L U is."""
     return tuple(
-        min(range(len(matrix)), key=lambda i: abs(matrix[i][1] - row[1])) for row in product
+        min(range(len(matrix)), key=lambda i: abs(matrix[i][1] - row[1])) for row in multiplied
     )
 
 
 def _triangles(factors: Array) -> tuple[Exact, Exact]:
     lower = np.tril(factors, -1) + np.eye(len(factors))
-    return _fractions(lower.tolist()), _fractions(np.triu(factors).tolist())
-
-
-def _inverse(matrix: Exact) -> Exact:
-    count = len(matrix)
-    rows = [[*row, *(Fraction(int(i == j)) for j in range(count))] for i, row in enumerate(matrix)]
-    for j in range(count):
-        pivot = max(range(j, count), key=lambda i: abs(rows[i][j]))
-        rows[j], rows[pivot] = rows[pivot], rows[j]
-        rows[j] = [x / rows[j][j] for x in rows[j]]
-        for i in range(count):
-            if i != j:
-                rows[i] = [x - rows[i][j] * y for x, y in zip(rows[i], rows[j], strict=True)]
-    return [row[count:] for row in rows]
-
-
-def _fractions(matrix: Sequence[Sequence[float]]) -> Exact:
-    return [[Fraction(x) for x in row] for row in matrix]
-
-
-def _gamma(count: int) -> Fraction:
-    return count * _UNIT / (1 - count * _UNIT)
-
-
-def _absolute(values: Sequence[Fraction]) -> list[Fraction]:
-    return [abs(x) for x in values]
-
-
-def _magnitudes(matrix: Exact) -> Exact:
-    return [_absolute(row) for row in matrix]
-
-
-def _norm(matrix: Exact) -> Fraction:
-    return max(sum(_absolute(row), Fraction(0)) for row in matrix)
-
-
-def _product(first: Exact, second: Exact) -> Exact:
-    columns = list(zip(*second, strict=True))
-    return [[_dot(row, column) for column in columns] for row in first]
-
-
-def _times(matrix: Exact, vector: Sequence[Fraction]) -> list[Fraction]:
-    return [_dot(row, vector) for row in matrix]
-
-
-def _dot(first: Sequence[Fraction], second: Sequence[Fraction]) -> Fraction:
-    return sum((x * y for x, y in zip(first, second, strict=True)), Fraction(0))
+    return fractions(lower.tolist()), fractions(np.triu(factors).tolist())
 
 
 def _share(error: Fraction, bound: Fraction) -> float:

@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 
 from pyharness.collocation_matrices import PARTS
 from pyharness.listing import Listing
-from pyharness.original.runge_kutta import __name__ as _RUNGE_KUTTA
-from pyharness.rational import Exact, inverse, product
+from pyharness.rational import Exact, inverse, product, times
 
 Complex = NDArray[np.complex128]
 Coefficients = NDArray[np.object_]
 
 _HIGHEST = 5
-assert _RUNGE_KUTTA
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +105,18 @@ def collocation(points: Sequence[Fraction]) -> Amplification:
     estimate = fitted([constant] * count, points)
     (end,) = fitted([_times_z(x) for x in estimate], [Fraction(1)])
     return Amplification(np.array([[end]], dtype=object))
+
+
+def weight_of_squares(listing: Listing, step: int) -> Fraction:
+    """Return what a collocation program integrates s**2 over a step to, in steps cubed.
+
+    Along the first estimate the right-hand side is F + s J F + s**2 Q(F): the true weight is 1/3.
+    """
+    moved = step if listing.has("dt-accumulates") else 1
+    points = [part * moved for part in PARTS[listing.program]]
+    matrix = [[(j + 1) * point**j for j in range(len(points))] for point in points]
+    c = times(inverse(matrix), [point * point for point in points])
+    return sum(c, Fraction(0))
 
 
 def _runge_kutta(listing: Listing) -> Amplification:

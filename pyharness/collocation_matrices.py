@@ -15,6 +15,7 @@ from pyharness.original.linear_solver import SINGULAR, leqt1f
 from pyharness.rational import (
     Exact,
     absolute,
+    dot,
     fractions,
     gamma,
     inverse,
@@ -139,6 +140,45 @@ def last_pivot(program: str) -> Fraction:
     matrix = [[(j + 1) * (part * step) ** j for j in range(len(parts))] for part in parts]
     *_, (chosen, candidates) = _columns(matrix)
     return candidates[chosen] / step ** (len(parts) - 1)
+
+
+def solver_roundings(program: str) -> tuple[float, float]:
+    """Return how far solving moves the result of a step, in units of 2**-53 of step times rate.
+
+    By 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4), which no step
+    changes as long as 1 is the largest of each row.
+
+    Returns
+    -------
+    constant, varying : float
+        For a rate that is the same at all points, where only c1 is not zero, and for each
+        whole by which rates at the points may differ from it.
+    """
+    step = Fraction(1, 1000)
+    parts = PARTS[program]
+    count = len(parts)
+    matrix = [[(j + 1) * (part * step) ** j for j in range(count)] for part in parts]
+    reach = magnitudes(inverse(matrix))
+    powers = [step**k for k in range(1, count + 1)]
+    sizes = product(reach, _factor_sizes(matrix))
+    constant = dot(powers, [row[0] for row in sizes])
+    varying = dot(powers, [sum(row, Fraction(0)) for row in product(sizes, reach)])
+    return 3 * count * float(constant / step), 3 * count * float(varying / step)
+
+
+def _factor_sizes(matrix: Exact) -> Exact:
+    """Return abs(L) abs(U), the rows as they stand in the matrix."""
+    order = [chosen for chosen, _ in _columns(matrix)]
+    rows = [list(matrix[i]) for i in order]
+    sizes = [[Fraction(0)] * len(rows) for _ in rows]
+    for j, pivot in enumerate(rows):
+        for i in range(j, len(rows)):
+            factor = rows[i][j] / pivot[j]
+            for k in range(j, len(rows)):
+                sizes[order[i]][k] += abs(factor * pivot[k])
+            if i > j:
+                rows[i] = [x - factor * y for x, y in zip(rows[i], pivot, strict=True)]
+    return sizes
 
 
 def singular_below(program: str) -> float:

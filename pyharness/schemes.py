@@ -107,14 +107,12 @@ def constant(omega: Array) -> Array:
     return result
 
 
-def collocation(program: str, sizes: bool = False) -> Scheme:
-    """Return that of a collocation program; with `sizes` with the sizes of its weights."""
+def collocation(program: str) -> Scheme:
+    """Return that of a collocation program."""
     parts = PARTS[program]
     matrix = [[(j + 1) * part**j for j in range(len(parts))] for part in parts]
     solver = inverse(matrix)
     weights = [float(sum(row[i] for row in solver)) for i in range(len(parts))]
-    if sizes:
-        weights = [float(sum(abs(row[i]) for row in solver)) for i in range(len(parts))]
 
     def scheme(on: Arithmetic, omega: Array) -> Array:
         slope = on.times_step(on.rate(omega))
@@ -161,6 +159,17 @@ def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
     return np.asarray(omega + (first + 2.0 * (second + third) + fourth) / 6.0)
 
 
+def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
+    """Return the first step of the Runge-Kutta program as punched."""
+    first = on.times_step(on.rate(omega))
+    at = omega + 0.5 * first
+    second = on.times_step(on.rate(at))
+    at = at + 0.5 * second
+    third = on.times_step(on.rate(at))
+    fourth = on.times_step(on.rate(at + third))
+    return np.asarray(omega + (first + 2.0 * (second + third) + fourth) / 6.0)
+
+
 def improved_euler(on: Arithmetic, omega: Array) -> Array:
     """Return a step of equation 29."""
     first = on.times_step(on.rate(omega))
@@ -197,22 +206,6 @@ def gauss(stages: int) -> Scheme:
         return np.asarray(omega + sum(b * k for b, k in zip(weights, slopes, strict=True)))
 
     return scheme
-
-
-def solver_roundings(program: str) -> float:
-    """Return how many roundings of a rate a step may be wrong by for solving its system.
-
-    By theorem 9.4 of Higham 2002: 3n abs(powers) abs(inverse) abs(L) abs(U) abs(inverse), which
-    no step changes as long as the pivots are the same rows.
-    """
-    parts = PARTS[program]
-    count = len(parts)
-    matrix = [[(j + 1) * part**j for j in range(count)] for part in parts]
-    solver = np.abs(np.array(inverse(matrix), dtype=float))
-    # abs(L) abs(U) is at most 2**(n-1) times the largest element of each column, and n of them.
-    largest = np.abs(np.array(matrix, dtype=float)).max(axis=0)
-    sizes = np.tile(count * 2.0 ** (count - 1) * largest, (count, 1))
-    return float(3.0 * count * (solver @ sizes @ solver).sum())
 
 
 FIXED_STEP = {

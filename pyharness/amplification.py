@@ -22,6 +22,9 @@ Complex = NDArray[np.complex128]
 Coefficients = NDArray[np.object_]
 
 _HIGHEST = 5
+# A boundary nearer than that is the origin itself.
+NEAREST = 2.0**-4
+_NOTHING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +47,7 @@ class Amplification:
     def at(self, z: Complex) -> Complex:
         """Return the matrices at many z, shape (..., m, m)."""
         powers = np.stack([z**k for k in range(_HIGHEST)], axis=-1)
-        return np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float))
+        return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
 
     def radius(self, z: Complex) -> NDArray[np.float64]:
         """Return the largest size of an eigenvalue at many z."""
@@ -97,9 +100,7 @@ def collocation(points: Sequence[Fraction]) -> Amplification:
 
     def fitted(rates: Sequence[Coefficients], times: Sequence[Fraction]) -> list[Coefficients]:
         c = solver @ np.array(rates, dtype=object)
-        return [
-            _one(1, 0)[0] + sum(each * t ** (k + 1) for k, each in enumerate(c)) for t in times
-        ]
+        return [_one(1, 0)[0] + sum(each * t ** (k + 1) for k, each in enumerate(c)) for t in times]
 
     constant = _times_z(_one(1, 0)[0])
     estimate = fitted([constant] * count, points)
@@ -169,3 +170,37 @@ def _polynomial_text(coefficients: Coefficients) -> str:
             size = str(c) if c != 1 or not k else ""
             terms.append(f"{size} {power}".strip())
     return " + ".join(terms) or "0"
+
+
+def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
+    """Return how far along a direction disturbances do not grow, and the slope there.
+
+    Parameters
+    ----------
+    matrix : Amplification
+        Of a step.
+    direction : complex
+        -1 or 1j: z is a positive number times this.
+
+    Returns
+    -------
+    distance, slope : float
+        Distance 0 where they grow from the beginning; the slope is that of the largest
+        eigenvalue beyond the distance.
+    """
+
+    def grows(distance: float) -> bool:
+        return float(matrix.radius(np.array(distance * direction))) > 1.0 + _NOTHING
+
+    low = NEAREST
+    if grows(low):
+        return 0.0, 1.0
+    while not grows(low + NEAREST):
+        low += NEAREST
+    high = low + NEAREST
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    beyond = high * (1.0 + 1e-6)
+    rise = float(matrix.radius(np.array(beyond * direction))) - 1.0
+    return high, rise / (beyond - high)

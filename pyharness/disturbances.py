@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from pyharness import methods
-from pyharness.amplification import amplification, weight_of_squares
+from pyharness.amplification import NEAREST, amplification, boundary, weight_of_squares
 from pyharness.collocation_matrices import points, solver_roundings
 from pyharness.conditioning import ROUNDING
 from pyharness.listing import Listing
@@ -28,6 +28,7 @@ _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
 _LONGEST = 40.0
 # Of omega: how far neighbours lie that a derivative is taken from.
 _REACH = 2.0**-2
+_GROWTH_STEPS = 64
 # Sizes of the weights of all points, wherever they lie: largest where points far beyond the
 # step are extrapolated to its beginning, by 2, -1 or by 4, -6, 4, -1.
 _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
@@ -141,6 +142,40 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     units = _LONGEST * (1.0 + weights * rate)
     units += varying * (rate + weights * moved * abs(z) ** 2)
     return Probe(np.array([found]), np.array([derived]), ROUNDING * units)
+
+
+def observed_boundary(listing: Listing, direction: complex) -> Probe:
+    """Find by bisection where the disturbance of a spinning top begins to grow.
+
+    Where a second vector is kept, growth is that of the change from step to step: beside what
+    stays it would not be seen.
+    """
+    matrix = amplification(listing)
+    expected, slope = boundary(matrix, direction)
+
+    def grows(distance: float) -> bool:
+        # Along -1 the disturbance lies on the eigenvector that decays, exactly.
+        second = distance if direction.real else -distance
+        start = (1.0, -1.0 if direction.real else 0.0, 1.0)
+        scene = Scene(
+            "top", start, coefficients=(distance, second, 0.0), step_size=1.0, steps=_GROWTH_STEPS
+        )
+        rows = np.vstack([scene.omega, _run(scene, listing)])[:, :2]
+        if len(rows) <= _GROWTH_STEPS:
+            return True
+        if matrix.size > 1:
+            rows = np.diff(rows, axis=0)
+        return bool(np.square(rows[-1]).sum() > np.square(rows[0]).sum())
+
+    low, high = NEAREST, 8.0
+    if grows(low):
+        low = high = 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    top = Scene("top", (1.0, 1.0, 1.0), coefficients=(expected, expected, 0.0), step_size=1.0)
+    unit = float(_units(top, listing.program, np.ones(3))[:2].max())
+    return Probe(np.array([high]), np.array([expected]), 2.0 * ROUNDING * unit / slope)
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:

@@ -253,6 +253,8 @@ def spacing(count: int) -> Sequence[Fraction]:
     """
     square = math.factorial(count) ** 2
     return [
-        Fraction((-1) ** (i + 1) * square, i * math.factorial(count - i) * math.factorial(count + i))
+        Fraction(
+            (-1) ** (i + 1) * square, i * math.factorial(count - i) * math.factorial(count + i)
+        )
         for i in range(1, count + 1)
     ]

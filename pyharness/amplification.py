@@ -10,6 +10,7 @@ step: its matrix has two rows, for U(1) and for the result.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from pyharness.collocation_matrices import PARTS
 from pyharness.listing import Listing
 from pyharness.rational import Exact, inverse, product, times
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 Coefficients = NDArray[np.object_]
 
 _HIGHEST = 5
@@ -52,6 +53,13 @@ class Amplification:
     def radius(self, z: Complex) -> NDArray[np.float64]:
         """Return the largest size of an eigenvalue at many z."""
         return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
+
+    def moving(self) -> "Amplification":
+        """Return the matrix without the result, where that only stays and gathers the rest."""
+        column = self.coefficients[:, -1]
+        if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
+            return Amplification(self.coefficients[:-1, :-1])
+        return self
 
     def of(self, matrix: Exact) -> Exact:
         """Return the matrix of a step for a system, from hJ of n rows: m n rows, exact."""

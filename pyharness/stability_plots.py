@@ -18,7 +18,6 @@ _STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#806000", "linestyle": (0, (2, 3)), "linewidth": 1.1},
 )
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
-# Below it a growth of 1 is rounding.
 _LEAST = 1e-13
 
 
@@ -88,7 +87,7 @@ def _numbers(found: Regions) -> bytes:
     head = ["distance", *(each.name for each in found.regions)]
     columns = [each.growth.tolist() for each in found.regions]
     rows = [
-        [f"{distance:.6g}", *(f"{value:.6g}" for value in values)]
+        [f"{distance:.6g}", *(f"{value:.3g}" for value in values)]
         for distance, *values in zip(found.distances.tolist(), *columns, strict=True)
     ]
     return csv_text(head, rows).encode()

@@ -12,6 +12,7 @@ from pyharness.trajectory import Array
 _REAL = (-4.6, 1.4, 301)
 _IMAGINARY = (-3.6, 3.6, 361)
 _DISTANCES = (1e-3, 4.0, 181)
+_HIDDEN = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,8 @@ class Region:
     radius : ndarray, shape (imaginary, real)
         Largest eigenvalue over the plane, of what does not merely stay.
     growth : ndarray
-        Largest eigenvalue less 1 on the imaginary axis, at the distances.
+        Largest eigenvalue less 1 on the imaginary axis, at the distances; 0 where rounding hides
+        it.
     """
 
     name: str
@@ -73,7 +75,12 @@ def regions() -> Regions:
     distances = np.geomspace(low, high, count)
     plane = real[None, :] + 1j * imaginary[:, None]
     found = tuple(
-        Region(name, matrix.moving().radius(plane), matrix.radius(1j * distances) - 1.0)
+        Region(name, matrix.moving().radius(plane), _growth(matrix, distances))
         for name, matrix in matrices().items()
     )
     return Regions(real, imaginary, distances, found)
+
+
+def _growth(matrix: Amplification, distances: Array) -> Array:
+    growth = matrix.radius(1j * distances) - 1.0
+    return np.where(np.abs(growth) < _HIDDEN, 0.0, growth)

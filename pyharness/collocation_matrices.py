@@ -181,14 +181,21 @@ def _factor_sizes(matrix: Exact) -> Exact:
     return sizes
 
 
-def singular_below(program: str) -> float:
+def singular_below(program: str, bits: int = 53) -> float:
     """Return the step at and below which LEQT1F must declare singular (s).
 
-    N + pivot equals N in binary64 up to half a unit in the last place of N, and a tie goes to N,
-    which is even.
+    N + pivot equals N up to half a unit in the last place of N, and a tie goes to N, which is
+    even. N is a power of 2, whose last place is 2**(1 - bits) of it.
+
+    Parameters
+    ----------
+    program : str
+        A collocation program.
+    bits : int
+        Of the significand, in an arithmetic that rounds to nearest.
     """
     count = len(PARTS[program])
-    half_unit = Fraction(float(np.spacing(float(count)))) / 2
+    half_unit = count * Fraction(1, 2**bits)
     return math.pow(half_unit / last_pivot(program), 1.0 / (count - 1))
 
 

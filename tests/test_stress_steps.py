@@ -20,6 +20,7 @@ from pyharness.disturbances import complex_step, moving_step
 from pyharness.divergence import divergence
 from pyharness.listing import Listing, corrected, original
 from pyharness.original import collocation
+from pyharness.original.linear_solver import leqt1f
 from pyharness.scene import Scene
 from pyharness.scene_file import case_scene
 from pyharness.schemes import FIXED_STEP, TERMS, Numbers, Series, local_error, spacing
@@ -57,6 +58,17 @@ def test_programs_meet_the_singularity_that_was_foretold() -> None:
     assert checks["matrices/four-term/corrected/ier-1e-06"].note == "IER = 129 in 300 of 300 steps"
     assert singular_below("four-term") == pytest.approx(1.9073e-5, rel=1e-4)
     assert singular_below("two-term") == pytest.approx(1.5 * 2.0**-52, rel=1e-12)
+
+
+def test_in_24_bits_the_four_term_matrix_is_singular_at_the_step_of_the_thesis() -> None:
+    """The solver in NumPy's binary32, against the rule in fractions."""
+    step = singular_below("four-term", bits=24)
+    assert step == pytest.approx(0.0155, rel=1e-3)
+    for factor, expected in ((0.01 / step, 129), (0.999, 129), (1.001, 0)):
+        points = collocation_matrices.points("four-term", factor * step)
+        matrix = np.array(collocation.collocation_matrix(points), dtype=np.float32)
+        _, ier = leqt1f([list(row) for row in matrix], [[np.float32(1.0)] * 4])  # type: ignore[list-item]
+        assert ier == expected
 
 
 def _compiled(monkeypatch: pytest.MonkeyPatch, old: str, new: str, ulps: int = 0) -> None:

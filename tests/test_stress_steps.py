@@ -21,6 +21,7 @@ from pyharness.divergence import divergence
 from pyharness.listing import Listing, corrected, original
 from pyharness.original import collocation
 from pyharness.original.linear_solver import leqt1f
+from pyharness.plants import plant_in_twin
 from pyharness.scene import Scene
 from pyharness.scene_file import case_scene
 from pyharness.schemes import FIXED_STEP, TERMS, Numbers, Series, local_error, spacing
@@ -29,7 +30,6 @@ from pyharness.stability_regions import regions
 from pyharness.step_errors import Forecaster, path
 from pyharness.stress import stress
 from pyharness.trajectory import Trajectory
-from tests.plants import plant
 
 FIGURES = Path(__file__).parent.parent / "docs/figures"
 
@@ -209,7 +209,7 @@ def test_a_wrong_coefficient_is_caught(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    planted = plant(program, file, old, new, tmp_path)
+    planted = plant_in_twin(program, file, old, new, tmp_path)
     monkeypatch.setitem(methods.PROGRAM_REGISTRY, program, planted)
     names = [f"regions/{program}/corrected/{each}" for each in broken]
     assert sorted(_failed(*names)) == sorted(names)
@@ -320,7 +320,9 @@ def test_differences_are_exact_for_polynomials() -> None:
 def test_a_wrong_weight_is_caught_by_small_steps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    planted = plant("runge-kutta", "runge_kutta.py", "(dt / 6.0)", "(dt / 6.0000001)", tmp_path)
+    planted = plant_in_twin(
+        "runge-kutta", "runge_kutta.py", "(dt / 6.0)", "(dt / 6.0000001)", tmp_path
+    )
     monkeypatch.setitem(methods.PROGRAM_REGISTRY, "runge-kutta", planted)
     broken = "step-size/runge-kutta/case-5/corrected/1e-03"
     assert _failed(broken) == [broken]

@@ -66,7 +66,11 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     if path.ended != "complete":
         raise InputError(f"conditioning: the solution leaves every bound before t = {time:g} s")
     omega = np.vstack([scene.omega, path.omega])
-    return _along(scene, times, omega)
+    with np.errstate(all="ignore"):
+        found = _along(scene, times, omega)
+    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
+        raise InputError("conditioning: the flow amplifies beyond binary64")
+    return found
 
 
 def _nodes(scene: Scene, time: float) -> Array:
@@ -80,10 +84,11 @@ def _nodes(scene: Scene, time: float) -> Array:
         times = np.linspace(0.0, time, count + 1)
         path = solve(scene, times[1:].tolist(), "taylor", 1e-13)
         omega = np.vstack([scene.omega, path.omega])
-        with np.errstate(over="ignore"):
-            largest = float(np.abs(_jacobians(scene, omega)).sum(axis=2).max())
+        with np.errstate(all="ignore"):
+            largest = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
-        if wanted > _MOST_NODES:
+        # NaN where numbers so large meet that their product has no meaning.
+        if not wanted <= _MOST_NODES:
             raise InputError("conditioning: too long a time for so fast a motion")
         if count >= wanted:
             return times
@@ -95,7 +100,7 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     middle = 0.5 * (omega[1:] + omega[:-1])
     largest = float(np.abs(omega).max()) or 1.0
     # Between nodes the Jacobian hardly changes: its exponential is the propagator.
-    pieces = _exponentials(steps[:, None, None] * _jacobians(scene, middle))
+    pieces = exponentials(steps[:, None, None] * jacobians(scene, middle))
     propagator = np.eye(3)
     norms = np.empty(len(times))
     norms[-1] = 1.0
@@ -112,7 +117,7 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     return Conditioning(amplification, _ROUNDINGS * ROUNDING * data, largest)
 
 
-def _exponentials(small: Array) -> Array:
+def exponentials(small: Array) -> Array:
     """Return the exponentials of matrices below 1 in norm, to seven digits."""
     total = np.broadcast_to(np.eye(3), small.shape)
     for k in range(8, 0, -1):
@@ -120,7 +125,7 @@ def _exponentials(small: Array) -> Array:
     return total
 
 
-def _jacobians(scene: Scene, omega: Array) -> Array:
+def jacobians(scene: Scene, omega: Array) -> Array:
     """Return the derivatives of equations 13-15 at each omega, shape (n, 3, 3)."""
     a, b, c = scene.euler_coefficients
     x, y, z = omega.T

@@ -4,7 +4,7 @@ import argparse
 
 from pyharness import options as shared
 from pyharness.check_tables import checks_record, checks_table, junit_text
-from pyharness.errors import unknown
+from pyharness.errors import InputError, unknown
 from pyharness.stress import TRIALS, Outcome, stress, trial, worst
 
 FORMATS = ("table", "json", "junit")
@@ -19,6 +19,9 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--save", metavar="DIR", help="where the worst inputs go, as scene files (default: worst)"
     )
+    parser.add_argument(
+        "--plot", metavar="FILE", help="draw the regions of stability; with --only regions"
+    )
     parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
 
@@ -30,6 +33,8 @@ def run(options: argparse.Namespace) -> int:
     for each in only:
         if each.partition("/")[0] not in TRIALS:
             raise unknown("trial", each.partition("/")[0], TRIALS, "--only")
+    if options.plot is not None and {each.partition("/")[0] for each in only} != {"regions"}:
+        raise InputError("--plot draws the regions of stability; give --only regions with it")
     shared.check_outputs(options)
     folder = options.save or _FOLDER
     # One check alone is a replay: its input has been saved before.
@@ -39,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
 
         check_folder(folder, (), "--save")
 
-    outcomes = []
+    outcomes: list[Outcome] = []
     for outcome in stress(only):
         shared.progress(f"{len(outcomes) + 1}: {outcome.check.id}")
         outcomes.append(outcome)
@@ -49,6 +54,11 @@ def run(options: argparse.Namespace) -> int:
     checks = [outcome.check for outcome in outcomes]
     if saves:
         _save(folder, outcomes)
+    if options.plot is not None:
+        from pyharness.stability_plots import regions_picture
+        from pyharness.stability_regions import regions
+
+        shared.write(regions_picture(regions(), options.plot), "--plot")
     if form == "json":
         from pyharness.build import build
         from pyharness.records import json_text

@@ -13,7 +13,7 @@ from pyharness.exact_top import axial_top
 from pyharness.listing import PROGRAMS, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
 from pyharness.reference import reference
-from pyharness.scene import Scene, TorqueLaw
+from pyharness.scene import Scene, TorqueLaw, Triple
 from pyharness.solver import prepare
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
@@ -109,11 +109,11 @@ def _spun(frequency: float, steps: int = 100) -> Scene:
     return Scene("axial wave", _START, moments=(40.0, 40.0, 20.0), torque=law, steps=steps)
 
 
-def _huge(size: float) -> Circumstance:
+def _huge(size: float, start: Triple = _START) -> Circumstance:
     """Take a constant torque, for some fifty radians of the motion that it makes."""
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
     time = math.sqrt(4e3 / size)
-    scene = Scene("huge torque", _START, moments=_BODY, torque=law, steps=6)
+    scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
     return Circumstance(scene, time, programs=size == 1e6)
 
 
@@ -152,6 +152,8 @@ CIRCUMSTANCES = {
     "no-digits-1e22": _no_digits(1e22, 2e23, sphere=True),
     "averaged-1e16": _no_digits(1e16, 10.0, sphere=False),
     **{f"huge-{size:.0e}": _huge(size) for size in (1e6, 1e9, 1e12)},
+    # Growth to 1e8 times the start, by the torque alone: no blow-up.
+    "huge-from-rest": _huge(1e4, (1e-6, 0.0, 0.0)),
     **{f"tiny-{size:.0e}": _tiny(size) for size in (1e-12, 1e-100, 1e-300, 5e-324)},
     "resonant": _resonant((40.0, 40.0, 20.0)),
     "resonant-nearly": _resonant((40.0, 40.0 * (1.0 + 1e-7), 20.0)),

@@ -90,6 +90,7 @@ def gauss(stages: int) -> Solver:
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
         torque = normalized(scene)[1:]
         scale = max(map(abs, scene.omega))
+        start = max(scale, _driven(scene, times[-1]))
         step, spent, reached = _first_step(scene, times), 0, 0.0
         before: _Solution | None = None
         counts = previous = _counts(times, step)
@@ -115,8 +116,7 @@ def gauss(stages: int) -> Solver:
                 known = float((counts / previous).min(initial=2.0)) ** (2 * stages) - 1.0
                 allowed = max(tolerance * scale * known / 2.0, _ROUNDING * scale)
                 close = known > 0.0 and difference <= allowed
-                bound = _reachable(scene, torque, reached)
-                if (close and found.status == COMPLETE) or found.blows_up(before, bound):
+                if (close and found.status == COMPLETE) or found.blows_up(before, start):
                     count = int(counts.sum())
                     return _trajectory(times, found.rows, n, found.status, count, spent)
             before, previous = found, counts
@@ -134,23 +134,17 @@ class _Solution:
     status: int
     evaluations: int
 
-    def blows_up(self, coarser: "_Solution", reachable: float) -> bool:
+    def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Whether it ended where the coarser one did, with an omega that grows as steps fall.
 
-        A torque alone makes omega `reachable`; what is far beyond it comes from the products.
+        `start` is the omega of the beginning, or what torque alone would make of it: there may
+        be no row.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
-        so_far = float(np.abs(self.rows[:, : self.n_rows]).max(initial=reachable))
+        so_far = float(np.abs(self.rows[:, : self.n_rows]).max(initial=start))
         return largest > 1.5 * before > 1e3 * so_far
-
-
-def _reachable(scene: Scene, torque: Sequence[Array], time: float) -> float:
-    """Return the omega that the start and the torque's impulse add up to (rad/s)."""
-    constant, rate, sines, cosines = (np.abs(each) for each in torque)
-    push = constant.max() + abs(time) * rate.max() + sines[:3].sum() + cosines[:3].sum()
-    return max(map(abs, scene.omega)) + float(push) * abs(time)
 
 
 def _counts(times: Sequence[float], step: float) -> Array:
@@ -172,6 +166,14 @@ def _first_step(scene: Scene, times: Sequence[float]) -> float:
     for waves in (scene.torque.sines, scene.torque.cosines):
         rate = max([rate, *(abs(frequency) for _, frequency in waves)])
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
+
+
+def _driven(scene: Scene, time: float) -> float:
+    """Return the largest omega that torque alone gives until `time` (rad/s)."""
+    _, constant, rate, sines, cosines = normalized(scene)
+    torque = np.abs(constant) + np.abs(rate * time)
+    torque += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
+    return float(torque.max()) * abs(time)
 
 
 def _trajectory(

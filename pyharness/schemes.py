@@ -216,8 +216,7 @@ FIXED_STEP = {
         FixedStep("runge-kutta", 4, runge_kutta_4, 1.0),
         FixedStep("improved-euler", 2, improved_euler, 1.0),
         FixedStep("taylor-3", 2, taylor_3, 1.0),
-        # Half a step of torque is added to omega and taken away again in each stage.
-        FixedStep("rk4", 4, runge_kutta_4, 8.0),
+        FixedStep("rk4", 4, runge_kutta_4, 1.0),
         FixedStep("gauss-1", 2, gauss(1), 1.0),
         FixedStep("gauss-2", 4, gauss(2), 1.0),
         FixedStep("gauss-4", 8, gauss(4), 1.0),

@@ -21,6 +21,8 @@ MOST_STAGES = 8
 _MOST_EVALUATIONS = 200_000_000
 # Two solutions that differ by so many units in the last place will not get closer.
 _ROUNDING = 16 * 2.0**-53
+# Of the range of numbers (rad/s): a solution that reached it twice leaves it.
+_NEAR_THE_END = 1e300
 
 
 def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
@@ -112,7 +114,7 @@ def gauss(stages: int) -> Solver:
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
                 error = 2.0 * difference / (4.0**stages - 1.0)
                 close = error <= tolerance * scale or difference <= _ROUNDING * scale
-                if (close and found.status == COMPLETE) or found.blows_up(before):
+                if (close and found.status == COMPLETE) or found.blows_up(before, scale):
                     count = _steps(times, step)
                     return _trajectory(times, found.rows, n, found.status, count, spent)
             before = found
@@ -129,12 +131,16 @@ class _Solution:
     status: int
     evaluations: int
 
-    def blows_up(self, coarser: "_Solution") -> bool:
-        """Whether it ended where the coarser one did, with an omega that grows as steps fall."""
+    def blows_up(self, coarser: "_Solution", scale: float) -> bool:
+        """Whether it ended where the coarser one did, at an omega without bound.
+
+        One that grows as steps fall, far beyond `scale`, the largest so far (rad/s); or one at
+        the end of the range of numbers.
+        """
         if COMPLETE in (self.status, coarser.status):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
-        return largest > 1.5 * before > 1e3 * float(np.abs(self.rows[:, : self.n_rows]).max())
+        return largest > 1.5 * before > 1e3 * scale or min(largest, before) > _NEAR_THE_END
 
 
 def _steps(times: Sequence[float], step: float) -> int:

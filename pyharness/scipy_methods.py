@@ -58,17 +58,23 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             return _LARGEST_PHASE - rate * abs(time) * max(map(abs, omega))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
-        with np.errstate(all="ignore"):
-            result = solve_ivp(
-                counted,
-                (0.0, times[-1]),
-                scene.omega,
-                method=name,
-                t_eval=times,
-                events=phase_left,
-                rtol=step_tolerance,
-                atol=step_tolerance * (largest or 1.0),
-            )
+        try:
+            with np.errstate(all="ignore"):
+                result = solve_ivp(
+                    counted,
+                    (0.0, times[-1]),
+                    scene.omega,
+                    method=name,
+                    t_eval=times,
+                    events=phase_left,
+                    rtol=step_tolerance,
+                    atol=step_tolerance * (largest or 1.0),
+                )
+        except ValueError as error:
+            # Radau's linear algebra refuses what has left the range of numbers.
+            if "infs or NaNs" not in str(error):
+                raise
+            return rows_trajectory([], np.empty((0, 3)), evaluations, len(times), "overflow")
         rows = result.y.T if len(result.t) else np.empty((0, 3))
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))

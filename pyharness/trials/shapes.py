@@ -1,6 +1,5 @@
 """Needles, coins, flat plates, and moments that no body has."""
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -11,6 +10,8 @@ from pyharness.trials.truth import ALL, describe_programs, hold_methods, in_step
 
 _OMEGA = (0.3, 1.0, -0.6)
 _RADIANS = 20.0
+# Every moment about every axis, and both senses of the order.
+_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
 _BODIES: dict[str, Triple] = {
     # In the ratio 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, and as far from symmetry as a body may be.
     "needle": (1.0, 1.0, 1e-12),
@@ -32,10 +33,8 @@ _BODIES: dict[str, Triple] = {
 def circumstances() -> Iterator[tuple[str, Scene, float]]:
     """Return name, scene and time of each input."""
     for name, moments in _BODIES.items():
-        for axes in itertools.permutations(range(3)):
+        for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)
-            if (first, second, third) == moments and axes != (0, 1, 2):
-                continue
             order = "".join(str(axis + 1) for axis in axes)
             scene = Scene(f"{name} {order}", _OMEGA, moments=(first, second, third))
             time = _RADIANS / _rate(scene)

@@ -28,7 +28,7 @@ ALL = promises.METHODS
 
 # Beyond it the linearised flow says little: only what the motion conserves is held.
 LINEAR = 0.01
-_ROWS = 20  # of a program's run that are held against the truth
+_ROWS = 10  # of a program's run that are held against the truth
 
 
 @dataclass(frozen=True, eq=False)

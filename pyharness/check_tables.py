@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pyharness.build import Build
 from pyharness.checks import Check
 from pyharness.tables import aligned, short, wrapped
+
+if TYPE_CHECKING:
+    from pyharness.self_test import Caught
 
 _MOST_FAILURES = 50
 
@@ -46,6 +49,24 @@ def checks_table(title: Sequence[str], checks: Sequence[Check], depth: int = 1) 
     lines += aligned(["checks", "made", "failed", "worst/limit"], rows, left=1)
     lines += ["", verdict(checks)]
     return "\n".join(lines) + "\n"
+
+
+def self_test_table(title: Sequence[str], found: Sequence["Caught"]) -> str:
+    """Return a paragraph for each plant: the fault, and how many checks of each kind caught it."""
+    lines = [line for each in title for line in wrapped(each)]
+    lines += [""] if title else []
+    for caught in found:
+        name, fault = "none", "no fault: nothing may fail"
+        if caught.plant is not None:
+            name, fault = caught.plant.name, caught.plant.fault
+        counts = ", ".join(f"{kind} {count}" for kind, count in caught.failed.items())
+        told = f"caught by {counts} ({caught.example})" if counts else "nothing fails"
+        lines += wrapped(f"{'' if caught.passed else 'FAILED '}{name}: {fault}")
+        lines += wrapped(f"  {told}")
+    missed = sum(not caught.passed for caught in found)
+    plants = len(found) - 1
+    end = f"{missed} not as it should be" if missed else "each caught by more than the record"
+    return "\n".join([*lines, "", f"{plants} plants and a control: {end}"]) + "\n"
 
 
 def verdict(checks: Sequence[Check]) -> str:

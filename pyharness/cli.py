@@ -19,6 +19,7 @@ VERBS = {
     "family": "the weighted residual methods: orders derived, and orders measured",
     "plan": "what a scene needs, what is therefore not computed, and why",
     "bench": "run time against error: ours, the programs, and other people's integrators",
+    "verify": "bits between languages, error against the truth, and what changed since recorded",
     "stress": "numerical stability tried to breaking, each trial with a bound derived beforehand",
     "doctor": "what is built, with what, and what is missing",
 }

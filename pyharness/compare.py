@@ -24,7 +24,7 @@ from pyharness.trajectory import Array, Trajectory
 # the largest |omega|), and must come within half an order of the program's own.
 _SMALL_CHANGE = 1e-3
 _MOST_HALVINGS = 8
-_ORDER_SLACK = 0.5
+ORDER_SLACK = 0.5
 # Rounding: so many units in the last place of the largest |omega| per step.
 _ROUNDING = 8.0 * 2.0**-53
 _TIMING_BATCHES = 3
@@ -198,6 +198,17 @@ def measured_order(
     bool
         Whether the program misses the reference by more than its order allows.
     """
+
+    def omega(finer: Scene) -> Array:
+        return program.run(finer, listing, may_stop=False, velocity=False).omega
+
+    return order_of(scene, omega, program.order, truth)
+
+
+def order_of(
+    scene: Scene, solution: Callable[[Scene], Array], due: int, truth: Reference
+) -> tuple[float | None, bool]:
+    """Measure the order of anything that solves a scene in its own steps; see `measured_order`."""
     n = len(truth.time)
     if n < scene.steps:
         return None, False  # the solution itself leaves every bound
@@ -210,8 +221,7 @@ def measured_order(
             finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
         except InputError:
             return None, False  # does not fit in memory
-        run = program.run(finer, listing, may_stop=False, velocity=False)
-        omega = run.omega[parts - 1 :: parts]
+        omega = solution(finer)[parts - 1 :: parts]
         if len(omega) < n:
             continue  # overflow: the step is far too large
         error = float(np.abs(omega - truth.omega).max())
@@ -219,7 +229,7 @@ def measured_order(
             return None, False
         if previous is not None and np.abs(omega - previous).max() < _SMALL_CHANGE * scale:
             order = math.log2(previous_error / error)
-            return order, order < program.order - _ORDER_SLACK
+            return order, order < due - ORDER_SLACK
         previous, previous_error = omega, error
     return None, True
 

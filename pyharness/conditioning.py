@@ -81,7 +81,11 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     omega, complete = _path(scene, times)
     if not complete:
         raise InputError(f"conditioning: the solution leaves every bound before t = {time:g} s")
-    return _along(scene, times, omega)
+    with np.errstate(all="ignore"):
+        found = _along(scene, times, omega)
+    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
+        raise InputError("conditioning: the flow amplifies beyond binary64")
+    return found
 
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
@@ -106,7 +110,8 @@ def _nodes(scene: Scene, time: float) -> Array:
         with np.errstate(over="ignore"):
             largest = float(np.abs(_jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
-        if wanted > _MOST_NODES:
+        # NaN where numbers so large meet that their product has no meaning.
+        if not wanted <= _MOST_NODES:
             raise InputError("conditioning: too long a time for so fast a motion")
         if count >= wanted:
             return times

@@ -85,18 +85,19 @@ def fixed_step(name: str) -> Solver:
 def gauss(stages: int) -> Solver:
     """Return the solver by Gauss collocation, steps halved until two solutions agree.
 
-    The error of the finer one is taken to be that of two solutions whose steps differ by two:
-    their difference over 2**order - 1, and twice that for safety.
+    The error of the finer one is taken to be their difference over ratio**order - 1, where their
+    steps differ by that ratio, and twice that for safety.
     """
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
         torque = normalized(scene)[1:]
-        scale = max(map(abs, scene.omega)) or 1.0
+        scale = start = max(map(abs, scene.omega)) or 1.0
         step, spent, reached = _first_step(scene, times), 0, 0.0
         before: _Solution | None = None
+        counts = previous = _counts(times, step)
         while True:
             # Each step takes two iterations at the least.
-            if spent + 2.0 * stages * _steps(times, step) > _MOST_EVALUATIONS:
+            if spent + 2.0 * stages * float(counts.sum()) > _MOST_EVALUATIONS:
                 raise InputError(
                     f"gauss-{stages} gave up at t = {reached:.6g} s after {spent} right-hand "
                     "sides; take a shorter time, a larger tolerance or more stages"
@@ -112,13 +113,16 @@ def gauss(stages: int) -> Solver:
                 n = found.n_rows
                 scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
-                error = 2.0 * difference / (4.0**stages - 1.0)
-                close = error <= tolerance * scale or difference <= _ROUNDING * scale
-                if (close and found.status == COMPLETE) or found.blows_up(before, scale):
-                    count = _steps(times, step)
+                # Where an interval has as many steps as before, the difference tells nothing.
+                known = float((counts / previous).min(initial=2.0)) ** (2 * stages) - 1.0
+                allowed = max(tolerance * scale * known / 2.0, _ROUNDING * scale)
+                close = known > 0.0 and difference <= allowed
+                if (close and found.status == COMPLETE) or found.blows_up(before, start):
+                    count = int(counts.sum())
                     return _trajectory(times, found.rows, n, found.status, count, spent)
-            before = found
+            before, previous = found, counts
             step *= 0.5
+            counts = _counts(times, step)
 
     return solve
 
@@ -131,31 +135,37 @@ class _Solution:
     status: int
     evaluations: int
 
-    def blows_up(self, coarser: "_Solution", scale: float) -> bool:
+    def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Whether it ended where the coarser one did, at an omega without bound.
 
-        One that grows as steps fall, far beyond `scale`, the largest so far (rad/s); or one at
-        the end of the range of numbers.
+        That grows as steps fall, or is at the end of the range of numbers. `start` is the largest omega at the beginning, where there may be no row.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
-        return largest > 1.5 * before > 1e3 * scale or min(largest, before) > _NEAR_THE_END
+        so_far = float(np.abs(self.rows[:, : self.n_rows]).max(initial=start))
+        return largest > 1.5 * before > 1e3 * so_far or min(largest, before) > _NEAR_THE_END
 
 
-def _steps(times: Sequence[float], step: float) -> int:
-    """Return the steps that the kernel takes: equal ones between times, `step` at the most."""
-    lengths = (abs(t1 - t0) for t0, t1 in itertools.pairwise((0.0, *times)))
-    return sum(max(1, math.floor(min(length / step, 1e18) + (1.0 - 1e-6))) for length in lengths)
+def _counts(times: Sequence[float], step: float) -> Array:
+    """Return the steps that the kernel takes to each time but 0: equal, `step` at the most."""
+    lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
+    lengths = lengths[lengths > 0.0]
+    with np.errstate(over="ignore"):
+        return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
 def _first_step(scene: Scene, times: Sequence[float]) -> float:
-    """Return a step in which the phase grows by about a half."""
+    """Return a step in which the phase grows by about a half, a whole part of the shortest way.
+
+    Equal intervals have then twice as many steps when it is halved.
+    """
+    lengths = [abs(t1 - t0) for t0, t1 in itertools.pairwise((0.0, *times)) if t1 != t0]
+    shortest = min(lengths, default=1.0)
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
     for waves in (scene.torque.sines, scene.torque.cosines):
         rate = max([rate, *(abs(frequency) for _, frequency in waves)])
-    end = abs(times[-1]) or 1.0
-    return max(1e-300, min(end, 0.5 / rate)) if rate else end
+    return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
 
 
 def _trajectory(

@@ -13,9 +13,9 @@ from pyharness import kernels
 from pyharness.agreement import differences
 from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, Listing, corrected, original
+from pyharness.plants import plant_in_twin
 from pyharness.reference import reference
 from pyharness.scene_file import case_scene
-from tests.plants import plant
 
 FORTRAN = Path(__file__).parent.parent / "fortran"
 SOURCES = (
@@ -74,7 +74,7 @@ TWIN_PLANTS = {
 def test_fault_in_a_twin_is_caught(name: str, tmp_path: Path) -> None:
     """By the bits in every case, and by the truth where the fault is larger than rounding."""
     program, file, old, new, shows_in_truth = TWIN_PLANTS[name]
-    planted = plant(program, file, old, new, tmp_path)
+    planted = plant_in_twin(program, file, old, new, tmp_path)
     scene = case_scene(5)
     listing = corrected(program)
     assert differences(kernels.run(scene, listing), planted.run(scene, listing)), "bits"
@@ -86,7 +86,7 @@ def test_fault_in_a_twin_is_caught(name: str, tmp_path: Path) -> None:
 def test_twin_without_a_fault_is_not_caught(tmp_path: Path) -> None:
     """The control: the same machinery without a plant raises no alarm."""
     for program in PROGRAMS:
-        planted = plant(program, "equations.py", "m[2] + c", "m[2] + c", tmp_path)
+        planted = plant_in_twin(program, "equations.py", "m[2] + c", "m[2] + c", tmp_path)
         scene = case_scene(5)
         listing = corrected(program)
         assert differences(kernels.run(scene, listing), planted.run(scene, listing)) == []

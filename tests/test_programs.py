@@ -9,13 +9,13 @@ import pytest
 
 from pyharness import kernels
 from pyharness.agreement import differences, distance
+from pyharness.cells import all_cells, all_listings
 from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, corrected, names_of, original, subset
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
-from tests.cells import all_cells, all_listings
 from tests.divergences import divergences
 
 

@@ -1,0 +1,311 @@
+"""Plants: one fault at a time, put where it would be made, to see which check catches it.
+
+A plant is made in the running process and gone when its context ends; the compiled programs are
+altered at their door, the twins in a copy of their text.
+"""
+
+import importlib
+import itertools
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from pyharness import kernels, original
+from pyharness import reference as truth
+from pyharness.listing import Listing, entries
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
+from pyharness.scene import Scene
+from pyharness.trajectory import Array, Trajectory
+
+_COUNT = itertools.count()
+
+
+@dataclass(frozen=True)
+class PlantedTwin(Program):
+    """A program with a faulty twin, which also stands for the compiled program where `both`."""
+
+    module: ModuleType
+    both: bool = True
+
+    def run(
+        self,
+        scene: Scene,
+        listing: Listing,
+        implementation: str = "fortran",
+        lipschitz: float = 500.0,
+        may_stop: bool = True,
+        velocity: bool = True,
+    ) -> Trajectory:
+        """Run the faulty twin, or the compiled program as it is."""
+        if self.both or implementation == "python":
+            trajectory: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
+            return trajectory
+        return super().run(scene, listing, implementation, lipschitz, may_stop, velocity)
+
+
+def plant_in_twin(
+    program: str, file: str, old: str, new: str, folder: Path, both: bool = True
+) -> PlantedTwin:
+    """Copy the twins into `folder`, replace `old` by `new` in one file, import the copy."""
+    package = f"planted_{next(_COUNT)}"
+    target = folder / package
+    ignore = shutil.ignore_patterns("__pycache__")
+    assert original.__file__ is not None
+    shutil.copytree(Path(original.__file__).parent, target, ignore=ignore)
+    for path in target.glob("*.py"):
+        text = path.read_text().replace("pyharness.original", package)
+        if path.name == file:
+            assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times in {file}"
+            text = text.replace(old, new)
+        path.write_text(text)
+    sys.path.insert(0, str(folder))
+    try:
+        importlib.invalidate_caches()
+        module = importlib.import_module(f"{package}.{program.replace('-', '_')}")
+    finally:
+        sys.path.remove(str(folder))
+    known = PROGRAM_REGISTRY[program]
+    return PlantedTwin(known.name, known.order, known.source, module, both)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A fault.
+
+    Attributes
+    ----------
+    name : str
+        Short, without blanks.
+    fault : str
+        What is wrong, and where.
+    planted : callable
+        Returns the context in which it is so.
+    """
+
+    name: str
+    fault: str
+    planted: Callable[[], AbstractContextManager[Any]]
+
+
+@contextmanager
+def _twin(program: str, file: str, old: str, new: str, both: bool) -> Iterator[None]:
+    with tempfile.TemporaryDirectory() as folder:
+        faulty = plant_in_twin(program, file, old, new, Path(folder), both)
+        with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
+            yield
+
+
+def _compiled(change: Callable[[Trajectory], Trajectory]) -> AbstractContextManager[Any]:
+    """Change what the compiled programs return."""
+    run = kernels.run
+
+    def faulty(scene: Scene, *rest: Any) -> Trajectory:
+        return change(run(scene, *rest))
+
+    return patch.object(kernels, "run", faulty)
+
+
+def _compiled_scene(change: Callable[[Scene], Scene]) -> AbstractContextManager[Any]:
+    """Change what the compiled programs are given; their labels stay."""
+    run = kernels.run
+
+    def faulty(scene: Scene, *rest: Any) -> Trajectory:
+        found, labels = run(change(scene), *rest), run(scene, *rest)
+        if found.steps != labels.steps:
+            return found
+        return replace(found, time=labels.time, recorded_time=labels.recorded_time)
+
+    return patch.object(kernels, "run", faulty)
+
+
+def _both(change: Callable[[Program, Scene, tuple[Any, ...]], Trajectory]) -> Any:
+    """Change what a program returns in either language."""
+    run = Program.run
+
+    def faulty(self: Program, scene: Scene, *rest: Any, **named: Any) -> Trajectory:
+        def again(other: Scene) -> Trajectory:
+            return run(self, other, *rest, **named)
+
+        return change(self, scene, (again,))
+
+    return patch.object(Program, "run", faulty)
+
+
+def _method(
+    name: str, change: Callable[[Scene, Sequence[float], Callable[..., Trajectory]], Trajectory]
+) -> AbstractContextManager[Any]:
+    """Change what a method does."""
+    known = METHODS[name]
+
+    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        return change(scene, times, lambda s, t: known.solve(s, t, tolerance))
+
+    return patch.dict(METHODS, {name: replace(known, solve=solve)})
+
+
+def _swapped(run: Trajectory) -> Trajectory:
+    return replace(run, omega=run.omega[:, [1, 0, 2]])
+
+
+def _one_ulp(run: Trajectory) -> Trajectory:
+    if len(run.omega) < 20:
+        return run
+    omega = run.omega.copy()
+    omega[17, 1] = np.nextafter(omega[17, 1], np.inf)
+    return replace(run, omega=omega)
+
+
+def _velocity_sign(run: Trajectory) -> Trajectory:
+    return run if run.velocity is None else replace(run, velocity=run.velocity * [1.0, 1.0, -1.0])
+
+
+def _half_step_label(run: Trajectory) -> Trajectory:
+    n = len(run.recorded_time)
+    half = 0.5 * float(run.recorded_time[0]) if n else 0.0
+    return replace(run, recorded_time=run.recorded_time - half)
+
+
+def _stale() -> Callable[[Trajectory], Trajectory]:
+    """Return the result of the call before where it has as many rows."""
+    before: dict[int, Trajectory] = {}
+
+    def change(run: Trajectory) -> Trajectory:
+        old = before.get(len(run.omega), run)
+        before[len(run.omega)] = run
+        return old
+
+    return change
+
+
+def _stale_method(name: str) -> AbstractContextManager[Any]:
+    change = _stale()
+    return _method(name, lambda scene, times, solve: change(solve(scene, times)))
+
+
+def _stale_solver() -> AbstractContextManager[Any]:
+    """Every second call of a prepared solver does nothing, so that its buffers are left."""
+    entry = kernels.extension().solve_packed
+    calls = itertools.count()
+
+    def faulty(packed: Array, omega: Array, *rest: Any) -> Array:
+        if next(calls) % 2 == 0:
+            result: Array = entry(packed, omega, *rest)
+            return result
+        return omega
+
+    import pyharness.solver as room
+
+    return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
+
+
+def _half_step(scene: Scene) -> Scene:
+    return replace(scene, step_size=0.5 * scene.step_size)
+
+
+def _half_step_both(program: Program, scene: Scene, runs: tuple[Any, ...]) -> Trajectory:
+    (run,) = runs
+    found: Trajectory = run(_half_step(scene))
+    return replace(found, time=2.0 * found.time, recorded_time=2.0 * found.recorded_time)
+
+
+def _label_both(program: Program, scene: Scene, runs: tuple[Any, ...]) -> Trajectory:
+    (run,) = runs
+    found: Trajectory = run(scene)
+    return replace(found, time=found.time - 0.5 * scene.step_size)
+
+
+def _shifted(scene: Scene, times: Sequence[float], solve: Callable[..., Trajectory]) -> Trajectory:
+    """Solve half a step later: energy and momentum are conserved as they should be."""
+    half = 0.5 * scene.step_size if times[-1] >= 0.0 else -0.5 * scene.step_size
+    found = solve(scene, [t + half for t in times])
+    time = np.array(times[: len(found.time)], dtype=float)
+    return replace(found, time=time, recorded_time=time)
+
+
+def _wrong_card() -> AbstractContextManager[Any]:
+    """Let the compiled programs read one flag in place of its neighbour."""
+    known = [entry["flag"] for entry in entries() if entry["kind"] == "defect"]
+    flags = Listing.flags.fget  # type: ignore[attr-defined]
+
+    def wrong(self: Listing) -> int:
+        bits = flags(self)
+        first, second = (bits >> known[k] & 1 for k in (0, 1))
+        kept = bits & ~(1 << known[0] | 1 << known[1])
+        return int(kept | first << known[1] | second << known[0])
+
+    return patch.object(Listing, "flags", property(wrong))
+
+
+def _sign_in_kernels() -> AbstractContextManager[Any]:
+    normalized = kernels.normalized
+
+    def faulty(scene: Scene) -> tuple[Array, ...]:
+        coefficients, *rest = normalized(scene)
+        return (coefficients * [1.0, 1.0, -1.0], *rest)
+
+    return patch.object(kernels, "normalized", faulty)
+
+
+def _sign_in_reference() -> AbstractContextManager[Any]:
+    coefficients = truth._coefficients
+
+    def faulty(scene: Scene) -> Any:
+        a, b, c = coefficients(scene)
+        return [a, b, -c]
+
+    return patch.object(truth, "_coefficients", faulty)
+
+
+_SIGN = ("equations.py", "m[2] + c * u[0]", "m[2] - c * u[0]")
+
+PLANTS = (
+    Plant(
+        "sign-in-twin",
+        "a sign in the third equation of a twin",
+        lambda: _twin("four-term", *_SIGN, both=False),
+    ),
+    Plant(
+        "sign-in-both",
+        "a sign in the third equation, in both languages alike",
+        lambda: _twin("two-term", *_SIGN, both=True),
+    ),
+    Plant("sign-in-series", "a sign in what the Taylor kernel is given", _sign_in_kernels),
+    Plant("sign-in-reference", "a sign in the reference itself", _sign_in_reference),
+    Plant("axis-in-fortran", "two axes of the compiled programs change places",
+          lambda: _compiled(_swapped)),
+    Plant("axis-in-method", "two axes of the closed form change places",
+          lambda: _method("closed-form", lambda scene, times, solve:
+                          _swapped(solve(scene, times)))),
+    Plant("wrong-card", "the compiled programs mend another card than the one named", _wrong_card),
+    Plant("half-step-in-fortran", "the compiled programs take half a step",
+          lambda: _compiled_scene(_half_step)),
+    Plant("half-step-in-both", "half a step in both languages, labelled as a whole one",
+          lambda: _both(_half_step_both)),
+    Plant("ulp-in-fortran", "one unit in the last place of one result",
+          lambda: _compiled(_one_ulp)),
+    Plant("velocity-in-fortran", "a sign in the velocity", lambda: _compiled(_velocity_sign)),
+    Plant("stale-fortran", "the result of the run before", lambda: _compiled(_stale())),
+    Plant("stale-method", "the Taylor method answers with the result before",
+          lambda: _stale_method("taylor")),
+    Plant("stale-solver", "a prepared solver leaves in its buffer what was there", _stale_solver),
+    Plant("label-in-fortran", "TIME shifted by half a step",
+          lambda: _compiled(_half_step_label)),
+    Plant("label-in-both", "the time of every row shifted by half a step, in both languages",
+          lambda: _both(_label_both)),
+    Plant("label-of-method", "a motion half a step late, energy and momentum conserved",
+          lambda: _method("closed-form", _shifted)),
+    Plant("count-in-fortran", "one right-hand side too many in the count",
+          lambda: _compiled(lambda run: replace(run, evaluations=run.evaluations + 1))),
+    Plant("scipy", "another SciPy, whose results are wrong in the fourth digit",
+          lambda: _method("dop853", lambda scene, times, solve:
+                          replace(run := solve(scene, times), omega=run.omega * 1.0001))),
+)  # fmt: skip

@@ -1,0 +1,49 @@
+"""What to verify: which checks, which random draws, which record."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pyharness.checks import may_hold, selected
+from pyharness.random_scenes import weekly_seed
+
+DRAWS = 1000
+RECORD = Path(__file__).parent.parent / "tests" / "golden"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What to verify.
+
+    Attributes
+    ----------
+    only : sequence of str
+        Leading parts of names, as in ``cells/two-term``; all where empty.
+    seed : str
+        Of the random draws; by default the week.
+    draws : int
+        How many of them.
+    record : Path
+        The folder of the golden record, by default that of the checkout.
+    thin : bool
+        A part that touches every kind, for `verify --self-test`.
+    """
+
+    only: Sequence[str] = ()
+    seed: str = field(default_factory=weekly_seed)
+    draws: int = DRAWS
+    record: Path = RECORD
+    thin: bool = False
+
+    def asks(self, id: str) -> bool:
+        """Whether the check of that name is asked for."""
+        return selected(id, self.only)
+
+    def may_ask(self, id: str) -> bool:
+        """Whether a check below that name may be asked for."""
+        return may_hold(id, self.only)
+
+
+def replay(id: str) -> str:
+    """Return the command that repeats one check."""
+    return f"python -m pyharness verify --only {id}"

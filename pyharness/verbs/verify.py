@@ -1,0 +1,122 @@
+"""`verify`: bits between languages, error against the truth, and what changed."""
+
+import argparse
+from pathlib import Path
+
+from pyharness import options as shared
+from pyharness.check_tables import checks_record, checks_table, junit_text
+from pyharness.checks import Check
+from pyharness.errors import InputError, unknown
+from pyharness.selection import DRAWS, RECORD, Selection
+from pyharness.verify import KINDS, verify
+
+FORMATS = ("table", "json", "junit")
+
+
+def declare(parser: shared.Parser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--only", metavar="ID,...", help=f"kinds, or checks by name: {', '.join(KINDS)}"
+    )
+    parser.add_argument("--seed", metavar="S", help="of the random draws (default: the week)")
+    parser.add_argument("--draws", metavar="N", help=f"random draws (default {DRAWS})")
+    parser.add_argument(
+        "--self-test",
+        action="store_true",
+        help="plant faults, and report which check catches which",
+    )
+    parser.add_argument("--update", action="store_true", help="write the golden record anew")
+    parser.add_argument(
+        "--record", metavar="DIR", help="the golden record (default: the checkout's)"
+    )
+    parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
+    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Verify and show; 1 where something is not as it should be."""
+    form = shared.chosen_format(options, FORMATS)
+    chosen = _selection(options)
+    shared.check_outputs(options)
+    if options.update:
+        shared.refuse(options, "--update", ("only", "seed", "draws", "format", "out"))
+        return _update(chosen.record)
+    if options.self_test:
+        shared.refuse(options, "--self-test", ("only", "draws"))
+        return _self_test(options, chosen, form)
+    checks = []
+    for check in verify(chosen):
+        checks.append(check)
+        if len(checks) % 20 == 0 or check.kind != "cells":
+            shared.progress(f"{len(checks)}: {check.id}")
+    shared.progress("")
+    if not checks:
+        raise InputError(f"--only {options.only}: no such check; the kinds are {', '.join(KINDS)}")
+    if form != "table":
+        text = _machine_text(checks, form, chosen.seed)
+    else:
+        text = checks_table(_title(chosen), checks)
+    shared.emit(text, options.out)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _self_test(options: argparse.Namespace, chosen: Selection, form: str) -> int:
+    from pyharness.check_tables import self_test_table
+    from pyharness.plants import PLANTS
+    from pyharness.self_test import as_check, self_test
+
+    found = []
+    for caught in self_test(chosen.seed, chosen.record):
+        found.append(caught)
+        shared.progress(f"{len(found)} of {len(PLANTS) + 1}: {as_check(caught).id}")
+    shared.progress("")
+    checks = [as_check(caught) for caught in found]
+    if form == "table":
+        text = self_test_table(_title(chosen), found)
+    else:
+        text = _machine_text(checks, form, chosen.seed)
+    shared.emit(text, options.out)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _selection(options: argparse.Namespace) -> Selection:
+    only = shared.names(options.only)
+    for each in only:
+        if each.partition("/")[0] not in KINDS:
+            raise unknown("kind", each.partition("/")[0], KINDS, "--only")
+    draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
+    if draws < 0:
+        raise InputError(f"--draws: {draws}; allowed: 0 or more")
+    changes = {} if options.seed is None else {"seed": options.seed}
+    record = RECORD if options.record is None else Path(options.record)
+    if options.record is not None and not options.update and not record.is_dir():
+        raise InputError(f"--record '{options.record}': is not a folder; verify --update makes one")
+    return Selection(only=only, draws=draws, record=record, **changes)
+
+
+def _title(chosen: Selection) -> list[str]:
+    title = [f"seed of the random draws: {chosen.seed}"] if chosen.may_ask("random") else []
+    if chosen.may_ask("golden") and not chosen.record.is_dir():
+        title.append("there is no golden record here (it stands in the checkout): not compared")
+    return title
+
+
+def _machine_text(checks: list[Check], form: str, seed: str) -> str:
+    if form == "junit":
+        return junit_text("verify", checks)
+    from pyharness.build import build
+    from pyharness.records import json_text
+
+    return json_text(checks_record(checks, build(), seed=seed))
+
+
+def _update(record: Path) -> int:
+    from pyharness.golden import update
+    from pyharness.output import check_folder, write_folder
+
+    check_folder(str(record), (), "--record")
+    files, news = update(record)
+    write_folder(str(record), files, "--record")
+    lines = news or ["nothing moved"]
+    shared.emit("".join(f"{line}\n" for line in [*lines, f"{len(files)} files in {record}"]), None)
+    return 0

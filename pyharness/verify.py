@@ -1,0 +1,49 @@
+"""Verify: bits between languages, error against the truth, and what changed since it was recorded.
+
+Each kind of check is the first part of its name:
+
+cells
+    program x case x listing x reading: Fortran against twin, bit for bit over the whole
+    trajectory, counters and stop.
+methods, prepared
+    modern methods against the reference, within the tolerance that they were given.
+orders
+    mended programs against `solve_ivp`, fixed-step methods against the reference: the power with
+    which the error falls as the step is halved.
+random
+    all of these in scenes drawn from a seed, half of them nasty.
+external
+    published figures that nobody here computed.
+golden
+    trajectories as they were recorded.
+"""
+
+from collections.abc import Callable, Iterator
+
+from pyharness.checks import Check
+from pyharness.golden import golden
+from pyharness.selection import Selection
+from pyharness.verify_methods import methods, orders, prepared, random_methods
+from pyharness.verify_programs import cells, random_programs
+
+
+def _random(chosen: Selection) -> Iterator[Check]:
+    yield from random_programs(chosen)
+    yield from random_methods(chosen)
+
+
+KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
+    "cells": cells,
+    "methods": methods,
+    "prepared": prepared,
+    "orders": orders,
+    "random": _random,
+    "golden": golden,
+}
+
+
+def verify(chosen: Selection) -> Iterator[Check]:
+    """Make the checks asked for, one after another."""
+    for kind, checks in KINDS.items():
+        if chosen.may_ask(kind):
+            yield from checks(chosen)

@@ -1,0 +1,242 @@
+"""Methods against the truth: within their tolerance, and with their order."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.checks import Check, bounded, described
+from pyharness.compare import ORDER_SLACK, measured_order, order_of
+from pyharness.conditioning import conditioning
+from pyharness.contenders import FIXED_STEP
+from pyharness.errors import InputError
+from pyharness.listing import PROGRAMS, corrected
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.plan import closed_form
+from pyharness.random_scenes import Draw, draw
+from pyharness.reference import Reference, reference
+from pyharness.scene import Scene
+from pyharness.scene_file import case_numbers, case_scene
+from pyharness.selection import Selection, replay
+from pyharness.solver import prepare
+from pyharness.trajectory import Array
+
+_TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
+# Of solve_ivp no more is asked than it answers in a second.
+_SCIPY_TOLERANCES = (1e-6, 1e-9)
+_LATER = 3.0
+_ENDS = (1.0, 3.0, -1.0)
+_PREPARED = ("auto", "taylor", "quick", "closed-form")
+_FINEST_QUICK = 1e-7
+# The truth that solve_ivp gives is asked for as finely as it goes.
+_IVP, _IVP_TOLERANCE = "dop853", 7e-13
+# A method is tried in every so many of the random draws: the truth costs a tenth of a second.
+_EVERY = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Standard:
+    """The truth at some times, and what no method can be blamed for.
+
+    Attributes
+    ----------
+    truth : Reference
+        Its last time is the furthest from 0.
+    scale : float
+        Largest abs(omega) on the way (rad/s).
+    amplification : float
+        What a tolerance is multiplied by.
+    rounding : float
+        What rounding, amplified by the flow, and the truth's own error may add, over `scale`.
+    """
+
+    truth: Reference
+    scale: float
+    amplification: float
+    rounding: float
+
+    def limit(self, tolerance: float) -> float:
+        """Return the error allowed, over `scale`."""
+        return min(2.0, tolerance * self.amplification + self.rounding)
+
+
+def methods(chosen: Selection) -> Iterator[Check]:
+    """Hold every method that states an error against the reference, in every case."""
+    for case in (4, 5) if chosen.thin else case_numbers():
+        names = [
+            (name, tolerance, id)
+            for name, method in METHODS.items()
+            if method.finest < 1.0 and name != "reference"
+            for tolerance in _tolerances(name, method.finest, chosen.thin)
+            if chosen.asks(id := f"methods/{name}/case-{case}/{tolerance:.1e}")
+        ]
+        if names:
+            scene = case_scene(case)
+            # All results of the case, close together, and one far from them.
+            standard = _standard(scene, (*scene.times(), _LATER))
+            for name, tolerance, id in names:
+                yield _held(id, replay(id), scene, name, tolerance, standard)
+
+
+def prepared(chosen: Selection) -> Iterator[Check]:
+    """Hold prepared solvers against the reference, forward and backward."""
+    for case in (4, 5) if chosen.thin else case_numbers():
+        scene = case_scene(case)
+        forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
+        for t_end in _ENDS:
+            names = [
+                (name, tolerance, id)
+                for name in forms
+                for tolerance in ((1e-6,) if chosen.thin else _TOLERANCES)
+                if not (name == "quick" and tolerance < _FINEST_QUICK)
+                and chosen.asks(id := f"prepared/{name}/case-{case}/{t_end:g}/{tolerance:.1e}")
+            ]
+            if names:
+                standard = _standard(scene, (t_end,))
+                for name, tolerance, id in names:
+                    yield _held_prepared(id, replay(id), scene, name, tolerance, standard)
+
+
+def orders(chosen: Selection) -> Iterator[Check]:
+    """Measure the order of mended programs against `solve_ivp`, of methods against the reference.
+
+    The value is what is missing to the order that is due.
+    """
+    for case in (5,) if chosen.thin else case_numbers():
+        scene = case_scene(case)
+        asks = {name: chosen.asks(f"orders/{name}/case-{case}") for name in _ORDERED}
+        if any(asks[name] for name in PROGRAMS):
+            truth = _by_ivp(scene)
+            for name in filter(asks.get, PROGRAMS):
+                program = PROGRAM_REGISTRY[name]
+                found = measured_order(scene, program, corrected(name), truth)
+                yield _order(f"orders/{name}/case-{case}", program.order, *found)
+        if any(asks[name] for name in FIXED_STEP):
+            truth = reference(scene, scene.times())
+            for name in filter(asks.get, FIXED_STEP):
+                found = order_of(scene, _steps_of(name), FIXED_STEP[name][0], truth)
+                yield _order(f"orders/{name}/case-{case}", FIXED_STEP[name][0], *found)
+
+
+_ORDERED = (*PROGRAMS, *FIXED_STEP)
+
+
+def random_methods(chosen: Selection) -> Iterator[Check]:
+    """Hold methods against the reference in scenes drawn from the seed.
+
+    Half of them are nasty: the limit grants what the flow amplifies.
+    """
+    for number in range(0, 12, 3) if chosen.thin else range(0, chosen.draws, _EVERY - 1):
+        if not chosen.may_ask(f"random/{number}"):
+            continue
+        drawn = draw(chosen.seed, number)
+        names = [name for name in _random_names(drawn) if chosen.asks(f"random/{number}/{name}")]
+        if names:
+            yield from _random(chosen, drawn, number, names)
+
+
+def _random_names(drawn: Draw) -> list[str]:
+    names = ["auto", "taylor", f"gauss-{drawn.stages}", "prepared"]
+    return [*names, "closed-form"] if closed_form(drawn.scene) else names
+
+
+def _random(chosen: Selection, drawn: Draw, number: int, names: Sequence[str]) -> Iterator[Check]:
+    scene = drawn.scene
+    time = scene.step_size * scene.steps * (-1.0 if drawn.backward else 1.0)
+    try:
+        standard = _standard(scene, (time,), amplified=True)
+    except InputError as refusal:
+        # Nothing to hold it against: a run-away, or too fast a motion for any truth.
+        id = f"random/{number}/no-truth"
+        again = f"{replay(f'random/{number}')} --seed {chosen.seed}"
+        yield described(id, None, again, f"{scene.name}: {refusal}")
+        return
+    for name in names:
+        id = f"random/{number}/{name}"
+        again = f"{replay(id)} --seed {chosen.seed}"
+        if name == "prepared":
+            tolerance = drawn.tolerance
+            yield _held_prepared(id, again, scene, "auto", tolerance, standard)
+        else:
+            tolerance = max(drawn.tolerance, METHODS[name].finest)
+            yield _held(id, again, scene, name, tolerance, standard)
+
+
+def _standard(scene: Scene, times: Sequence[float], amplified: bool = False) -> Standard:
+    """Return the truth at `times` with its limits.
+
+    In the cases a tolerance is meant as it stands, and nothing but rounding is granted to the
+    flow; `amplified` grants the flow's amplification of errors made on the way too.
+    """
+    flow = conditioning(scene, times[-1])
+    # The reference's steps are good to 1e-22: where the flow amplifies more, more is asked.
+    truth = reference(scene, times, precise=flow.amplification > 1e3)
+    rounding = flow.rounding + truth.error / flow.largest
+    return Standard(truth, flow.largest, flow.amplification if amplified else 1.0, rounding)
+
+
+def _held(
+    id: str, again: str, scene: Scene, name: str, tolerance: float, standard: Standard
+) -> Check:
+    """Return the check that a method keeps a tolerance at all times of the truth.
+
+    A closed form has to refuse where there is none.
+    """
+    has_form = name != "closed-form" or closed_form(scene) is not None
+    times = standard.truth.time
+    try:
+        run = solve(scene, times.tolist(), name, tolerance)
+    except InputError as refusal:
+        return Check(id, not has_form, None, None, again, f"refused: {refusal}")
+    if not has_form:
+        return Check(id, False, None, None, again, "solved what has no closed form")
+    if run.ended != "complete" or not np.array_equal(run.time, times):
+        return Check(id, False, None, None, again, f"{run.ended}, other times than asked for")
+    error = float(np.abs(run.omega - standard.truth.omega).max()) / standard.scale
+    return bounded(id, error, standard.limit(tolerance), again)
+
+
+def _held_prepared(
+    id: str, again: str, scene: Scene, name: str, tolerance: float, standard: Standard
+) -> Check:
+    """Return the check that a prepared solver keeps a tolerance at the end."""
+    solver = prepare(scene, name, tolerance)
+    start, t_end = np.array(scene.omega), float(standard.truth.time[-1])
+    # Another start before it: nothing of that may be left.
+    solver(start[::-1].copy(), 0.5 * t_end)
+    found = solver(start, t_end)
+    if name == "quick" and solver.status == "refused":
+        return described(id, None, again, "refused: no body that can be scaled")
+    error = float(np.abs(found - standard.truth.omega[-1]).max()) / standard.scale
+    note = solver.status if math.isnan(error) else ""
+    return bounded(id, error, standard.limit(tolerance), again, note)
+
+
+def _tolerances(name: str, finest: float, thin: bool) -> list[float]:
+    if name in SCIPY_METHODS:
+        return [_SCIPY_TOLERANCES[0]] if thin else list(_SCIPY_TOLERANCES)
+    if thin:
+        return [max(finest, 1e-9)]
+    return [*(each for each in _TOLERANCES if each > finest), finest]
+
+
+def _order(id: str, due: int, order: float | None, misses: bool) -> Check:
+    if order is None:
+        note = "does not settle" if misses else "rounding from the start"
+        return Check(id, not misses, None, ORDER_SLACK, replay(id), note)
+    return Check(id, not misses, due - order, ORDER_SLACK, replay(id), f"order {order:.2f}")
+
+
+def _steps_of(name: str) -> Callable[[Scene], Array]:
+    def run(scene: Scene) -> Array:
+        return solve(scene, scene.times(), name, 1.0).omega
+
+    return run
+
+
+def _by_ivp(scene: Scene) -> Reference:
+    """Return what `solve_ivp` takes for the truth, good to its tolerance."""
+    run = solve(scene, scene.times(), _IVP, _IVP_TOLERANCE)
+    largest = float(np.abs(run.omega).max())
+    return Reference(run.time, run.omega, None, "solve_ivp", _IVP_TOLERANCE * largest)

@@ -1,0 +1,76 @@
+"""Fortran against twin: the same bits in every cell, and in scenes drawn at random."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pyharness.agreement import differences, distance
+from pyharness.cells import all_cells, cell_name
+from pyharness.checks import Check
+from pyharness.facts import facts
+from pyharness.listing import Listing
+from pyharness.methods import PROGRAM_REGISTRY
+from pyharness.random_scenes import draw
+from pyharness.scene import Scene
+from pyharness.scene_file import case_scene
+from pyharness.selection import Selection, replay
+from pyharness.trajectory import Trajectory
+
+
+def cells(chosen: Selection) -> Iterator[Check]:
+    """Hold Fortran against twin in every program, case, subset of defects and reading."""
+    divergences = facts("divergences")["divergence"]
+    listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
+    for listing, case in all_cells():
+        name = cell_name(listing, case)
+        id = f"cells/{name}"
+        if not chosen.asks(id) or (chosen.thin and not _is_thin(listing, case)):
+            continue
+        scene = case_scene(case)
+        program = PROGRAM_REGISTRY[listing.program]
+        compiled, twin = program.run(scene, listing), program.run(scene, listing, "python")
+        yield agreement(id, replay(id), scene, compiled, twin, name in listed)
+
+
+def random_programs(chosen: Selection) -> Iterator[Check]:
+    """Hold Fortran against twin in scenes, listings and steps drawn from the seed."""
+    for number in range(12 if chosen.thin else chosen.draws):
+        id = f"random/{number}/program"
+        if not chosen.asks(id):
+            continue
+        drawn = draw(chosen.seed, number)
+        program = PROGRAM_REGISTRY[drawn.listing.program]
+        compiled, twin = (
+            program.run(drawn.scene, drawn.listing, language, drawn.lipschitz, drawn.may_stop)
+            for language in ("fortran", "python")
+        )
+        again = f"{replay(id)} --seed {chosen.seed}"
+        yield agreement(id, again, drawn.scene, compiled, twin)
+
+
+def agreement(
+    id: str,
+    again: str,
+    scene: Scene,
+    compiled: Trajectory,
+    twin: Trajectory,
+    is_listed: bool = False,
+) -> Check:
+    """Return the check that two implementations of a program agree to the last bit.
+
+    A listed divergence that no longer occurs fails, as an unexpected one does.
+    """
+    found = differences(compiled, twin)
+    if not np.array_equal(compiled.time, np.arange(1, compiled.steps + 1) * scene.step_size):
+        found.append("time is not n h")
+    note = ", ".join(found)
+    if is_listed:
+        note = f"listed: {note}" if found else "a listed divergence that no longer occurs"
+    passed = bool(found) == is_listed
+    limit = None if is_listed else 0.0
+    return Check(id, passed, distance(compiled, twin), limit, again, note)
+
+
+def _is_thin(listing: Listing, case: int) -> bool:
+    few = len(listing.defects) <= 1 or listing.label == "original"
+    return case in (3, 7) and few and len(listing.readings) <= 1

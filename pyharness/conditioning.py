@@ -107,7 +107,7 @@ def _nodes(scene: Scene, time: float) -> Array:
     while True:
         times = np.linspace(0.0, time, count + 1)
         omega, _ = _path(scene, times)
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
             largest = float(np.abs(_jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
         # NaN where numbers so large meet that their product has no meaning.

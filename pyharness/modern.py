@@ -138,7 +138,8 @@ class _Solution:
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Whether it ended where the coarser one did, at an omega without bound.
 
-        That grows as steps fall, or is at the end of the range of numbers. `start` is the largest omega at the beginning, where there may be no row.
+        That grows as steps fall, or is at the end of the range of numbers. `start` is the
+        largest omega at the beginning, where there may be no row.
         """
         if COMPLETE in (self.status, coarser.status):
             return False

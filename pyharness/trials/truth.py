@@ -260,7 +260,7 @@ def describe_programs(
             run = PROGRAM_REGISTRY[program].run(scene, listing, may_stop=False, velocity=False)
             found = run.omega[every - 1 :: every]
             n = min(len(found), len(wanted))
-            error = float(np.abs(found[:n] - wanted[:n]).max(initial=0.0)) / scale
+            error = float(np.abs(found[:n] - wanted[:n]).max()) / scale if n else None
             note = "" if run.ended == "complete" else f"{run.ended} after {run.steps} steps"
             yield Outcome(described(id, error, replay(id), note), scene)
 

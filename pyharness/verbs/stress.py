@@ -3,8 +3,8 @@
 import argparse
 
 from pyharness import options as shared
-from pyharness.check_tables import checks_record, checks_table, junit_text
-from pyharness.errors import unknown
+from pyharness.check_tables import checks_record, junit_text
+from pyharness.errors import InputError, unknown
 from pyharness.stress import TRIALS, Outcome, stress, trial, worst
 
 FORMATS = ("table", "json", "junit")
@@ -19,6 +19,7 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--save", metavar="DIR", help="where the worst inputs go, as scene files (default: worst)"
     )
+    parser.add_argument("--plot", metavar="FILE", help="draw one trial, with its numbers as CSV")
     parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
 
@@ -30,6 +31,8 @@ def run(options: argparse.Namespace) -> int:
     for each in only:
         if each.partition("/")[0] not in TRIALS:
             raise unknown("trial", each.partition("/")[0], TRIALS, "--only")
+    if options.plot is not None and len(_chosen(only)) != 1:
+        raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")
     shared.check_outputs(options)
     folder = options.save or _FOLDER
     # One check alone is a replay: its input has been saved before.
@@ -57,18 +60,22 @@ def run(options: argparse.Namespace) -> int:
     elif form == "junit":
         text = junit_text("stress", checks)
     else:
-        text = checks_table(_head(only), checks, depth=2)
+        from pyharness.stress_tables import stress_table
+
+        text = stress_table([trial(name) for name in _chosen(only)], checks)
+    if options.plot is not None:
+        from pyharness.stress_plots import stress_picture
+
+        name = _chosen(only)[0]
+        picture = stress_picture(trial(name), checks, options.plot)
+        shared.write(picture, "--plot")
     shared.emit(text, options.out)
     return 0 if all(check.passed for check in checks) else 1
 
 
-def _head(only: list[str]) -> list[str]:
+def _chosen(only: list[str]) -> list[str]:
     names = {each.partition("/")[0] for each in only} or set(TRIALS)
-    return [
-        f"{name}: {trial(name).title}. Bound: {trial(name).bound}"
-        for name in TRIALS
-        if name in names
-    ]
+    return [name for name in TRIALS if name in names]
 
 
 def _save(folder: str, outcomes: list[Outcome]) -> None:

@@ -118,9 +118,7 @@ def _panel(axes: "Axes", name: str, checks: Sequence[Check], places: dict[str, f
     for kind in dict.fromkeys(map(_kind, places)):
         own_places = [place for each, place in places.items() if _kind(each) == kind]
         middle = 0.5 * (min(own_places) + max(own_places))
-        axes.text(
-            middle, 1.01, kind, fontsize=7, ha="center", transform=axes.get_xaxis_transform()
-        )
+        axes.text(middle, 1.01, kind, fontsize=7, ha="center", transform=axes.get_xaxis_transform())
     if axes.get_legend_handles_labels()[1]:
         axes.legend(fontsize=6, loc="upper left", ncols=2, framealpha=0.7)
 

@@ -91,7 +91,11 @@ def tolerances(name: str, least: float, radians: float, amplification: float) ->
         if least <= each <= LADDER[-1] and _cost(name, each, radians, amplification) <= _most(name)
     ]
     chosen = {*allowed[:1], *({COARSE} & set(allowed))}
-    if not chosen and least <= LADDER[-1] and _cost(name, LADDER[-1], radians, amplification) <= _PATIENCE * _most(name):
+    if (
+        not chosen
+        and least <= LADDER[-1]
+        and _cost(name, LADDER[-1], radians, amplification) <= _PATIENCE * _most(name)
+    ):
         chosen = {LADDER[-1]}
     return sorted(chosen)
 
@@ -113,9 +117,9 @@ def _cost(name: str, tolerance: float, radians: float, amplification: float) -> 
     if name in GAUSS:
         stages = int(name[-1])
         # The error of steps of z radians each, amplified: radians z**order.
-        z = (tolerance / (max(radians, 1.0) * amplification)) ** (0.5 / stages)
+        z = math.pow(tolerance / (max(radians, 1.0) * amplification), 0.5 / stages)
         return 12.0 * stages * radians / min(z, 1.0)
     if name in SCIPY:
-        z = (tolerance / (30.0 * max(1.0, radians / RADIANS[_SCIPY_NAMES[name]]))) ** (1.0 / (_ORDERS[name] + 1))
-        return _STAGES[name] * radians / z
+        a_step = tolerance / (30.0 * max(1.0, radians / RADIANS[_SCIPY_NAMES[name]]))
+        return _STAGES[name] * radians / math.pow(a_step, 1.0 / (_ORDERS[name] + 1))
     return 0.0

@@ -173,7 +173,7 @@ def _held(
     made = made_on_the_way(name, scene, truth, tolerance)
     if truth.exact and (name == "closed-form" or name == "auto"):
         # It makes no errors on the way: beside its own there is the rounding of A, B and C.
-        limit = made + truth.data + truth.error / flow.largest
+        limit = (made or 0.0) + truth.data + truth.error / flow.largest
     elif made is None:
         # It claims no error in steps of this size, only that it conserves.
         limit = math.inf
@@ -197,9 +197,7 @@ def _held(
         yield bounded(drift_id, drift, most, replay(drift_id))
 
 
-def made_on_the_way(
-    name: str, scene: Scene, truth: Truth, tolerance: float | None
-) -> float | None:
+def made_on_the_way(name: str, scene: Scene, truth: Truth, tolerance: float | None) -> float | None:
     """Return the sum of the errors that a method promises to make, over the largest omega.
 
     None where it promises none.
@@ -230,8 +228,9 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
             [(q * abs(Fraction(float(w))), q * Fraction(float(w)) ** 2) for q, w in pairs]
             for pairs in (zip(weights, scene.omega, strict=True), zip(weights, omega, strict=True))
         )
-        change = abs(sum(s for _, s in after) - sum(s for _, s in before))
-        slope = max(sum(f for f, _ in before), sum(f for f, _ in after))
+        zero = Fraction(0)
+        change = abs(sum((s for _, s in after), zero) - sum((s for _, s in before), zero))
+        slope = max(sum((f for f, _ in before), zero), sum((f for f, _ in after), zero))
         if change:
             worst = max(worst, change / (2 * slope * big))
     return float(worst)

@@ -108,7 +108,7 @@ def _nodes(scene: Scene, time: float) -> Array:
         times = np.linspace(0.0, time, count + 1)
         omega, _ = _path(scene, times)
         with np.errstate(all="ignore"):
-            largest = float(np.abs(_jacobians(scene, omega)).sum(axis=2).max())
+            largest = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
         # NaN where numbers so large meet that their product has no meaning.
         if not wanted <= _MOST_NODES:
@@ -123,7 +123,7 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     middle = 0.5 * (omega[1:] + omega[:-1])
     largest = float(np.abs(omega).max()) or 1.0
     # Between nodes the Jacobian hardly changes: its exponential is the propagator.
-    pieces = _exponentials(steps[:, None, None] * _jacobians(scene, middle))
+    pieces = exponentials(steps[:, None, None] * jacobians(scene, middle))
     propagators = np.empty((len(times), 3, 3))
     propagators[-1] = np.eye(3)
     for k in range(len(steps) - 1, -1, -1):
@@ -148,7 +148,7 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     )
 
 
-def _exponentials(small: Array) -> Array:
+def exponentials(small: Array) -> Array:
     """Return the exponentials of matrices below 1 in norm, to seven digits."""
     total = np.broadcast_to(np.eye(3), small.shape)
     for k in range(8, 0, -1):
@@ -156,7 +156,7 @@ def _exponentials(small: Array) -> Array:
     return total
 
 
-def _jacobians(scene: Scene, omega: Array) -> Array:
+def jacobians(scene: Scene, omega: Array) -> Array:
     """Return the derivatives of equations 13-15 at each omega, shape (n, 3, 3)."""
     a, b, c = scene.euler_coefficients
     x, y, z = omega.T

@@ -107,8 +107,9 @@ def golden(chosen: Selection) -> Iterator[Check]:
             yield Check(id, False, None, None, replay(id), note)
             continue
         yield _check(id, each, entry, libraries == {mathematics()})
-    for command in sorted(set(entries) - {each.command for each in due}):
-        id = "golden/" + command.replace(" ", "-")
+    produced = {each.command for each in due}
+    for command in sorted(set(entries) - produced):
+        id = f"golden/{_source(known, command)}/{command.partition(' run ')[2].replace(' ', '')}"
         if chosen.asks(id):
             note = "is recorded and no longer produced; verify --update forgets it"
             yield Check(id, False, None, None, replay(id), note)
@@ -133,6 +134,15 @@ def _check(id: str, each: Recorded, entry: dict[str, Any], same_library: bool) -
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
         away = float(np.abs(old[:, 3:6] - new[:, 3:6]).max(initial=0.0)) / scale
     return Check(id, away <= limit, away, limit, replay(id), f"within its error: {moved}")
+
+
+def _source(known: dict[str, dict[str, Any]], command: str) -> str:
+    """Return the file in which a command is recorded."""
+    return next(
+        name
+        for name, file in known.items()
+        if any(entry["command"] == command for entry in file["trajectory"])
+    )
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:

@@ -157,15 +157,12 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     law = scene.torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
     sines, cosines = columns(law.sines), columns(law.cosines)
-    sines[:3] /= moments[:, None]
-    cosines[:3] /= moments[:, None]
-    return (
-        np.array(scene.euler_coefficients),
-        np.array(law.constant) / moments,
-        np.array(law.rate) / moments,
-        sines,
-        cosines,
-    )
+    # What is too large for binary64 is infinite here, and the kernels say that it overflows.
+    with np.errstate(over="ignore"):
+        sines[:3] /= moments[:, None]
+        cosines[:3] /= moments[:, None]
+        constant, rate = np.array(law.constant) / moments, np.array(law.rate) / moments
+    return np.array(scene.euler_coefficients), constant, rate, sines, cosines
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:

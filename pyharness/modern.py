@@ -91,7 +91,8 @@ def gauss(stages: int) -> Solver:
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
         torque = normalized(scene)[1:]
-        scale = start = max(map(abs, scene.omega)) or 1.0
+        scale = max(map(abs, scene.omega))
+        start = max(scale, _driven(scene, times[-1]))
         step, spent, reached = _first_step(scene, times), 0, 0.0
         before: _Solution | None = None
         counts = previous = _counts(times, step)
@@ -138,8 +139,8 @@ class _Solution:
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Whether it ended where the coarser one did, at an omega without bound.
 
-        That grows as steps fall, or is at the end of the range of numbers. `start` is the
-        largest omega at the beginning, where there may be no row.
+        That grows as steps fall, or is at the end of the range of numbers. `start` is the omega
+        of the beginning, or what torque alone would make of it: there may be no row.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
@@ -167,6 +168,14 @@ def _first_step(scene: Scene, times: Sequence[float]) -> float:
     for waves in (scene.torque.sines, scene.torque.cosines):
         rate = max([rate, *(abs(frequency) for _, frequency in waves)])
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
+
+
+def _driven(scene: Scene, time: float) -> float:
+    """Return the largest omega that torque alone gives until `time` (rad/s)."""
+    _, constant, rate, sines, cosines = normalized(scene)
+    torque = np.abs(constant) + np.abs(rate * time)
+    torque += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
+    return float(torque.max()) * abs(time)
 
 
 def _trajectory(

@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -21,6 +22,7 @@ import numpy as np
 
 from pyharness import kernels, original
 from pyharness import reference as truth
+from pyharness.external_file import Problem, problems
 from pyharness.listing import Listing, entries
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
 from pyharness.scene import Scene
@@ -265,6 +267,23 @@ def _sign_in_reference() -> AbstractContextManager[Any]:
     return patch.object(truth, "_coefficients", faulty)
 
 
+def _digit() -> AbstractContextManager[Any]:
+    """Change the last but one digit of a published figure."""
+
+    def altered() -> list[Problem]:
+        found = []
+        for problem in problems():
+            value = problem.values[0]
+            figure = next(each for each in value.omega if each is not None)
+            wrong = replace(figure, value=figure.value + Decimal(20.0 * figure.accuracy))
+            omega = tuple(wrong if each is figure else each for each in value.omega)
+            values = (replace(value, omega=omega), *problem.values[1:])
+            found.append(replace(problem, values=values))
+        return found
+
+    return patch("pyharness.verify.problems", altered)
+
+
 _SIGN = ("equations.py", "m[2] + c * u[0]", "m[2] - c * u[0]")
 
 PLANTS = (
@@ -305,6 +324,7 @@ PLANTS = (
           lambda: _method("closed-form", _shifted)),
     Plant("count-in-fortran", "one right-hand side too many in the count",
           lambda: _compiled(lambda run: replace(run, evaluations=run.evaluations + 1))),
+    Plant("digit-of-the-print", "a digit of a published figure", _digit),
     Plant("scipy", "another SciPy, whose results are wrong in the fourth digit",
           lambda: _method("dop853", lambda scene, times, solve:
                           replace(run := solve(scene, times), omega=run.omega * 1.0001))),

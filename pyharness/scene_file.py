@@ -49,6 +49,15 @@ def read_scene(path: str | Path) -> Scene:
         Where the file can't be read, is not TOML, has an unknown key, or lacks a value.
     """
     where = f"scene file '{path}'"
+    data = read_toml(path, where)
+    try:
+        return scene_of(data, Path(path).stem)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def read_toml(path: str | Path, where: str) -> dict[str, Any]:
+    """Return the content of a user's TOML file; InputError, which begins with `where`, if none."""
     try:
         with open(path, "rb") as file:
             content = file.read(_LARGEST_FILE + 1)
@@ -58,17 +67,13 @@ def read_scene(path: str | Path) -> Scene:
     if len(content) > _LARGEST_FILE:
         raise InputError(f"{where}: larger than {_LARGEST_FILE} bytes; a scene is a few lines")
     try:
-        data = tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8"))
     except UnicodeDecodeError:
         raise InputError(f"{where}: not UTF-8 text; TOML files are") from None
     except RecursionError:
         raise InputError(f"{where}: nested too deeply; a scene has two levels") from None
     except ValueError as error:
         raise InputError(f"{where}: not TOML: {' '.join(str(error).split())}") from None
-    try:
-        return _scene(data, Path(path).stem)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
 
 
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
@@ -92,37 +97,38 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _scene(data: dict[str, Any], default_name: str) -> Scene:
-    _check_keys(data, ("name", *_TABLES), "top level")
+def scene_of(data: dict[str, Any], default_name: str) -> Scene:
+    """Return the scene that the content of a file describes; InputError where it describes none."""
+    check_keys(data, ("name", *_TABLES), "top level")
     tables: dict[str, dict[str, Any]] = {}
     for table, keys in _TABLES.items():
         tables[table] = data.get(table, {})
         if not isinstance(tables[table], dict):
-            raise InputError(f"{table} is {_kind(tables[table])}; it must be a table [{table}]")
+            raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
         if table != "torque":
-            _check_keys(tables[table], keys, f"[{table}]")
+            check_keys(tables[table], keys, f"[{table}]")
     name = data.get("name", default_name)
     if not isinstance(name, str):
-        raise InputError(f"name is {_kind(name)}; it must be text")
+        raise InputError(f"name is {kind_of(name)}; it must be text")
     body, initial, run = tables["body"], tables["initial"], tables["run"]
     if "omega" not in initial:
         raise InputError("[initial] omega is missing; give three numbers in rad/s")
     steps = run.get("steps", 100)
     if isinstance(steps, bool) or not isinstance(steps, int):
-        raise InputError(f"[run] steps is {_kind(steps)}; it must be a whole number")
+        raise InputError(f"[run] steps is {kind_of(steps)}; it must be a whole number")
     return Scene(
         name=" ".join(name.split())[:60],
         omega=_numbers("[initial] omega", initial["omega"]),
         moments=_optional("[body] moments", body.get("moments")),
         coefficients=_optional("[body] coefficients", body.get("coefficients")),
         torque=_torque(tables["torque"], "[torque]"),
-        step_size=_number("[run] step_size", run.get("step_size", 0.01)),
+        step_size=number("[run] step_size", run.get("step_size", 0.01)),
         steps=steps,
     )
 
 
 def _torque(table: dict[str, Any], where: str) -> TorqueLaw:
-    _check_keys(table, _TABLES["torque"], where)
+    check_keys(table, _TABLES["torque"], where)
     zero = [0.0, 0.0, 0.0]
     return TorqueLaw(
         constant=_numbers(f"{where} constant", table.get("constant", zero)),
@@ -137,20 +143,21 @@ def _waves(where: str, entries: object) -> tuple[Wave, ...]:
         raise InputError(f"{where} must be a list of {{ amplitude = [..], frequency = .. }}")
     waves = []
     for entry in entries:
-        _check_keys(entry, ("amplitude", "frequency"), where)
+        check_keys(entry, ("amplitude", "frequency"), where)
         for key in ("amplitude", "frequency"):
             if key not in entry:
                 raise InputError(f"{where}: {key} is missing")
         waves.append(
             (
                 _numbers(f"{where} amplitude", entry["amplitude"]),
-                _number(f"{where} frequency", entry["frequency"]),
+                number(f"{where} frequency", entry["frequency"]),
             )
         )
     return tuple(waves)
 
 
-def _check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
+def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
+    """Refuse a key that is not among those allowed."""
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)
@@ -163,19 +170,21 @@ def _optional(where: str, value: object) -> Triple | None:
 def _numbers(where: str, value: object) -> Triple:
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(f"{where} must be a list of three numbers")
-    first, second, third = (_number(where, each) for each in value)
+    first, second, third = (number(where, each) for each in value)
     return first, second, third
 
 
-def _number(where: str, value: object) -> float:
+def number(where: str, value: object) -> float:
+    """Return a TOML value that must be a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"{where}: {_kind(value)} where a number belongs")
+        raise InputError(f"{where}: {kind_of(value)} where a number belongs")
     try:
         return float(value)
     except OverflowError:
         raise InputError(f"{where}: a number too large for binary64") from None
 
 
-def _kind(value: object) -> str:
+def kind_of(value: object) -> str:
+    """Name the kind of a TOML value for a message."""
     names = {str: "text", bool: "true or false", list: "a list", dict: "a table"}
     return names.get(type(value), f"a {type(value).__name__}")

@@ -3,9 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pyharness.checks import may_hold, selected
 from pyharness.random_scenes import weekly_seed
+
+if TYPE_CHECKING:
+    from pyharness.external_file import Problem
 
 DRAWS = 1000
 RECORD = Path(__file__).parent.parent / "tests" / "golden"
@@ -25,6 +29,8 @@ class Selection:
         How many of them.
     record : Path
         The folder of the golden record, by default that of the checkout.
+    problems : sequence of Problem or None
+        With published figures; None for those that come with the project.
     thin : bool
         A part that touches every kind, for `verify --self-test`.
     """
@@ -33,6 +39,7 @@ class Selection:
     seed: str = field(default_factory=weekly_seed)
     draws: int = DRAWS
     record: Path = RECORD
+    problems: Sequence["Problem"] | None = None
     thin: bool = False
 
     def asks(self, id: str) -> bool:

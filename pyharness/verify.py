@@ -21,6 +21,7 @@ golden
 from collections.abc import Callable, Iterator
 
 from pyharness.checks import Check
+from pyharness.external import external_checks, problems
 from pyharness.golden import golden
 from pyharness.selection import Selection
 from pyharness.verify_methods import methods, orders, prepared, random_methods
@@ -32,12 +33,24 @@ def _random(chosen: Selection) -> Iterator[Check]:
     yield from random_methods(chosen)
 
 
+def _external(chosen: Selection) -> Iterator[Check]:
+    asked = problems() if chosen.problems is None else chosen.problems
+    for check in external_checks(asked, _THIN_EXTERNAL if chosen.thin else chosen.only):
+        if chosen.asks(check.id):
+            yield check
+
+
+_THIN_EXTERNAL = [
+    f"external/detest-b5/20/{name}" for name in ("reference", "taylor", "gauss-4", "runge-kutta")
+]
+
 KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
     "cells": cells,
     "methods": methods,
     "prepared": prepared,
     "orders": orders,
     "random": _random,
+    "external": _external,
     "golden": golden,
 }
 

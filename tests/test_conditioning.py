@@ -105,7 +105,7 @@ def test_torque_that_varies_counts_with_its_angle() -> None:
 
 
 def test_a_wrong_sign_in_the_linearised_equations_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = room._jacobians
+    right = room.jacobians
     scene, time = _SCENES["any body"]
     rest = _sampled("any body")[2]
 
@@ -114,7 +114,7 @@ def test_a_wrong_sign_in_the_linearised_equations_is_seen(monkeypatch: pytest.Mo
         found[:, 0, 1] *= -1.0
         return found
 
-    monkeypatch.setattr(room, "_jacobians", wrong)
+    monkeypatch.setattr(room, "jacobians", wrong)
     sampled = float(np.abs(rest).sum(axis=2).max())
     assert not 0.999 * sampled <= conditioning(scene, time).amplification <= 1.1 * sampled
 

@@ -144,3 +144,24 @@ def test_same_bits_from_many_threads() -> None:
         first, *others = pool.map(run, range(40))
     for other in others:
         np.testing.assert_array_equal(first, other)
+
+
+@pytest.mark.parametrize("stages", [1, 2, 3])
+def test_tolerance_is_kept_at_results_close_together(stages: int) -> None:
+    """Intervals shorter than the first step have one step each, halved or not: no evidence."""
+    scene = case_scene(5)
+    truth = reference(scene, scene.times())
+    name = f"gauss-{stages}"
+    tolerance = METHODS[name].finest
+    found = solve(scene, scene.times(), name, tolerance)
+    assert found.steps > len(scene.times())
+    assert np.abs(found.omega - truth.omega).max() <= tolerance * np.abs(truth.omega).max()
+
+
+def test_body_at_rest_is_driven_to_a_relative_error() -> None:
+    """The scale is the largest omega on the way, however small, and not 1."""
+    law = TorqueLaw(sines=(((1e-9, 2e-9, -3e-9), 20.0),))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), torque=law)
+    truth = reference(scene, [1.0])
+    found = solve(scene, [1.0], "gauss-2", 1e-8)
+    assert np.abs(found.omega - truth.omega).max() <= 1e-8 * np.abs(truth.omega).max()

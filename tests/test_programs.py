@@ -9,7 +9,7 @@ import pytest
 
 from pyharness import kernels
 from pyharness.agreement import differences, distance
-from pyharness.cells import all_cells, all_listings
+from pyharness.cells import all_cells, all_listings, cell_name
 from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, corrected, names_of, original, subset
 from pyharness.methods import PROGRAM_REGISTRY
@@ -32,8 +32,7 @@ def test_every_cell_agrees_to_the_last_bit_or_is_in_the_table() -> None:
         twin = program.run(scene, listing, "python")
         count += 1
         if differences(compiled, twin) or distance(compiled, twin):
-            names = " ".join(sorted(listing.defects | listing.readings))
-            found.add(f"{listing.program} case {case}: {names}")
+            found.add(cell_name(listing, case))
     assert found == listed
     assert count == (8 * 2 + 4 + 64 * 2) * 7
 

@@ -226,7 +226,13 @@ contains
     real(dp) :: w1
     real(dp) :: w2
     real(dp) :: w3
-    real(dp) :: s1      ! sum of the stages
+    real(dp) :: p1      ! half a step of the products at u
+    real(dp) :: p2
+    real(dp) :: p3
+    real(dp) :: q1      ! the same at v
+    real(dp) :: q2
+    real(dp) :: q3
+    real(dp) :: s1      ! sum of the increments
     real(dp) :: s2
     real(dp) :: s3
     real(dp) :: m1      ! half a step of the torque
@@ -247,16 +253,23 @@ contains
       b1 = u1 + m1
       b2 = u2 + m2
       b3 = u3 + m3
-      v1 = b1 + a1*(u2*u3)
-      v2 = b2 + a2*(u3*u1)
-      v3 = b3 + a3*(u1*u2)
-      w1 = b1 + a1*(v2*v3)
-      w2 = b2 + a2*(v3*v1)
-      w3 = b3 + a3*(v1*v2)
-      ! The sum of increments k1 + 2 k2 + 2 k3 + k4, of which v, w hold k1/2 and k2/2.
-      s1 = (v1 - u1) + 2.0_dp*(w1 - u1)
-      s2 = (v2 - u2) + 2.0_dp*(w2 - u2)
-      s3 = (v3 - u3) + 2.0_dp*(w3 - u3)
+      p1 = a1*(u2*u3)
+      p2 = a2*(u3*u1)
+      p3 = a3*(u1*u2)
+      v1 = b1 + p1
+      v2 = b2 + p2
+      v3 = b3 + p3
+      q1 = a1*(v2*v3)
+      q2 = a2*(v3*v1)
+      q3 = a3*(v1*v2)
+      w1 = b1 + q1
+      w2 = b2 + q2
+      w3 = b3 + q3
+      ! The sum of increments k1 + 2 k2 + 2 k3 + k4: not read off v - u and w - u, in whose
+      ! roundings, the same from step to step, a million steps drown.
+      s1 = (m1 + p1) + 2.0_dp*(m1 + q1)
+      s2 = (m2 + p2) + 2.0_dp*(m2 + q2)
+      s3 = (m3 + p3) + 2.0_dp*(m3 + q3)
       v1 = 2.0_dp*(m1 + a1*(w2*w3))
       v2 = 2.0_dp*(m2 + a2*(w3*w1))
       v3 = 2.0_dp*(m3 + a3*(w1*w2))

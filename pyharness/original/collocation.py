@@ -46,12 +46,16 @@ def interval(
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
     """Return the coefficients c1, c2, ... of every unknown whose derivative meets `rates`."""
-    matrix = [
+    by_unknown = [list(column) for column in zip(*rates, strict=True)]
+    return leqt1f(collocation_matrix(points), by_unknown)
+
+
+def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
+    """Return the derivatives of t, t**2, ... at every point, a row for each (eq. 36)."""
+    return [
         [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]
         for t in points
     ]
-    by_unknown = [list(column) for column in zip(*rates, strict=True)]
-    return leqt1f(matrix, by_unknown)
 
 
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:

@@ -4,6 +4,7 @@ import argparse
 
 from pyharness import options as shared
 from pyharness.check_tables import checks_record, junit_text
+from pyharness.checks import Check
 from pyharness.errors import InputError, unknown
 from pyharness.stress import TRIALS, Outcome, stress, trial, worst
 
@@ -52,6 +53,8 @@ def run(options: argparse.Namespace) -> int:
     checks = [outcome.check for outcome in outcomes]
     if saves:
         _save(folder, outcomes)
+    if options.plot is not None:
+        shared.write(_picture(_chosen(only)[0], checks, options.plot), "--plot")
     if form == "json":
         from pyharness.build import build
         from pyharness.records import json_text
@@ -63,12 +66,6 @@ def run(options: argparse.Namespace) -> int:
         from pyharness.stress_tables import stress_table
 
         text = stress_table([trial(name) for name in _chosen(only)], checks)
-    if options.plot is not None:
-        from pyharness.stress_plots import stress_picture
-
-        name = _chosen(only)[0]
-        picture = stress_picture(trial(name), checks, options.plot)
-        shared.write(picture, "--plot")
     shared.emit(text, options.out)
     return 0 if all(check.passed for check in checks) else 1
 
@@ -76,6 +73,17 @@ def run(options: argparse.Namespace) -> int:
 def _chosen(only: list[str]) -> list[str]:
     names = {each.partition("/")[0] for each in only} or set(TRIALS)
     return [name for name in TRIALS if name in names]
+
+
+def _picture(name: str, checks: list[Check], path: str) -> dict[str, bytes]:
+    if name == "regions":
+        from pyharness.stability_plots import regions_picture
+        from pyharness.stability_regions import regions
+
+        return regions_picture(regions(), path)
+    from pyharness.stress_plots import stress_picture
+
+    return stress_picture(trial(name), checks, path)
 
 
 def _save(folder: str, outcomes: list[Outcome]) -> None:

@@ -21,6 +21,9 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument("--seed", metavar="S", help="of the random draws (default: the week)")
     parser.add_argument("--draws", metavar="N", help=f"random draws (default {DRAWS})")
     parser.add_argument(
+        "--external", metavar="FILE", help="a file of published figures, these alone"
+    )
+    parser.add_argument(
         "--self-test",
         action="store_true",
         help="plant faults, and report which check catches which",
@@ -39,10 +42,10 @@ def run(options: argparse.Namespace) -> int:
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
-        shared.refuse(options, "--update", ("only", "seed", "draws", "format", "out"))
+        shared.refuse(options, "--update", ("only", "seed", "draws", "external", "format", "out"))
         return _update(chosen.record)
     if options.self_test:
-        shared.refuse(options, "--self-test", ("only", "draws"))
+        shared.refuse(options, "--self-test", ("only", "draws", "external"))
         return _self_test(options, chosen, form)
     checks = []
     for check in verify(chosen):
@@ -81,6 +84,12 @@ def _self_test(options: argparse.Namespace, chosen: Selection, form: str) -> int
 
 def _selection(options: argparse.Namespace) -> Selection:
     only = shared.names(options.only)
+    problems = None
+    if options.external is not None:
+        from pyharness.external_file import read_problem
+
+        problems = [read_problem(options.external)]
+        only = only or ["external"]
     for each in only:
         if each.partition("/")[0] not in KINDS:
             raise unknown("kind", each.partition("/")[0], KINDS, "--only")
@@ -91,7 +100,7 @@ def _selection(options: argparse.Namespace) -> Selection:
     record = RECORD if options.record is None else Path(options.record)
     if options.record is not None and not options.update and not record.is_dir():
         raise InputError(f"--record '{options.record}': is not a folder; verify --update makes one")
-    return Selection(only=only, draws=draws, record=record, **changes)
+    return Selection(only=only, draws=draws, record=record, problems=problems, **changes)
 
 
 def _title(chosen: Selection) -> list[str]:

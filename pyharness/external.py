@@ -1,0 +1,259 @@
+"""Every method against published figures that were not computed here.
+
+A check passes if a method is as near to the print as the print reaches, plus what the method
+itself may be wrong by, plus what rounding the numbers of the problem to binary64 does to it.
+"""
+
+import math
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+
+from pyharness.checks import Check, bounded, may_hold, selected
+from pyharness.errors import InputError
+from pyharness.external_file import UNITS, Problem, Value, problems, read_problem
+from pyharness.listing import PROGRAMS, corrected
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.plan import closed_form
+from pyharness.scene import Scene, TorqueLaw, Triple
+from pyharness.solver import prepare
+from pyharness.trajectory import Array
+
+__all__ = ["Problem", "external_checks", "problems", "read_problem"]
+
+# The finest that a method claims, except where no one would wait for it.
+_TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
+_SOLVED = (
+    "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
+    "quick", "dop853", "lsoda", "radau", "rk45",
+)  # fmt: skip
+_FEWEST_STEPS, _MOST_STEPS = 4, 2**16
+_HALF_ULP = 2.0**-53
+# A number is rounded when it is read, and once more in what a method makes of it.
+_ROUNDING = 2.0 * _HALF_ULP
+_STEP_ASIDE = 2.0**-30
+
+
+@dataclass(frozen=True)
+class _Result:
+    """What a method gives at one time (rad/s): omega, and by how much each may be wrong."""
+
+    omega: Array
+    error: Array
+
+
+def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
+    """Hold every method that can take a problem against its published figures.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        From `problems` or `read_problem`.
+    only : sequence of str
+        Names of checks, or their leading parts; all where none is given.
+
+    Yields
+    ------
+    Check
+        ``external/<problem>/<time>/<method>``; value and limit in the problem's unit, of the
+        component that is worst against its limit.
+
+    Raises
+    ------
+    NotBuiltError
+        Where the extension is not built.
+    """
+    for problem in problems:
+        # Times on one side are solved together: a replay of one gives the same bits.
+        for side in (1.0, -1.0):
+            values = sorted(
+                (value for value in problem.values if float(value.time) * side > 0.0),
+                key=lambda value: abs(float(value.time)),
+            )
+            if any(may_hold(f"external/{problem.name}/{value.time}", only) for value in values):
+                yield from _side(problem, values, only)
+
+
+def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
+    scene = problem.scene
+    times = [float(value.time) for value in values]
+    rounding = _rounding(scene, times)
+    for method in (*_SOLVED, *PROGRAMS):
+        ids = [f"external/{problem.name}/{value.time}/{method}" for value in values]
+        if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
+            continue
+        results: list[_Result | None]
+        try:
+            if method in PROGRAMS:
+                prints = [_accuracy(problem, value) for value in values]
+                results = [
+                    _program(scene, time, method, accuracy)
+                    for time, accuracy in zip(times, prints, strict=True)
+                ]
+            else:
+                results = [*_solved(scene, times, method, rounding)]
+            note = f"ended before t = {times[min(len(results), len(times) - 1)]:g} s"
+        except InputError as error:
+            results, note = [], str(error)
+        for row, (id, value) in enumerate(zip(ids, values, strict=True)):
+            if not selected(id, only):
+                continue
+            replay = _replay(problem, id)
+            if row >= len(results):
+                yield Check(id, False, None, None, replay, note)
+            elif (result := results[row]) is not None:
+                yield _check(id, problem.unit, value, result, rounding[row], replay)
+
+
+def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
+    """Whether a method takes the problem at all; programs run forward only."""
+    if method == "closed-form":
+        return closed_form(scene) is not None
+    if method == "quick":
+        solver = prepare(scene, method, _TOLERANCES[method])
+        solver(np.array(scene.omega), times[0])
+        return solver.status != "refused"
+    return method not in PROGRAMS or times[0] > 0.0
+
+
+def _solved(
+    scene: Scene, times: Sequence[float], method: str, rounding: Array
+) -> Iterator[_Result]:
+    tolerance = _TOLERANCES.get(method) or METHODS[method].finest
+    if method == "quick":
+        solver, start = prepare(scene, method, tolerance), np.array(scene.omega)
+        rows = np.array([solver(start, time).copy() for time in times])
+    else:
+        rows = solve(scene, times, method, tolerance).omega
+    for omega, moved in zip(rows, rounding, strict=False):
+        size = np.full(3, _scale(scene, omega))
+        if method in SCIPY_METHODS:
+            # SciPy controls the error of a step; by the end the motion has made of it what it
+            # makes of a change of that size in the numbers of the problem.
+            size = np.maximum(size, moved / _ROUNDING)
+        yield _Result(omega, tolerance * size)
+
+
+def _program(scene: Scene, time: float, program: str, accuracy: float) -> _Result | None:
+    """Run a mended program in steps that are halved until the print is met or rounding reigns.
+
+    The error is taken from the last halving, and twice that for safety; rounding may add half a
+    unit in the last place a step. None where no step is long enough for its linear equations.
+    """
+    run = PROGRAM_REGISTRY[program].run
+    order = PROGRAM_REGISTRY[program].order
+    result, before, steps, ended = None, None, _FEWEST_STEPS, ""
+    previous = 0.0
+    while steps <= _MOST_STEPS:
+        stepped = replace(scene, step_size=time / steps, steps=steps)
+        rows = run(stepped, corrected(program), may_stop=False, velocity=False)
+        if rows.ier is not None and rows.ier.any():
+            # LEQT1F takes the matrices of tiny steps for singular and leaves a step of order 1.
+            break
+        # In steps far too long a motion overflows that in shorter ones does not.
+        ended = rows.ended
+        omega = rows.omega[-1] if ended == "complete" else None
+        if omega is not None and before is not None:
+            halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
+            rounding = steps * _HALF_ULP * _scale(scene, omega)
+            result = _Result(omega, np.full(3, halving + rounding))
+            # Two coarse runs may agree by accident: only where halving helps is it believed.
+            if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
+                break
+            previous = halving
+        before = omega
+        steps *= 2
+    if ended not in ("", "complete"):
+        raise InputError(f"{program} in steps of {time / _MOST_STEPS:g} s: {ended}")
+    return result
+
+
+def _check(
+    id: str, unit: str, value: Value, result: _Result, rounding: Array, replay: str
+) -> Check:
+    factor = UNITS[unit]
+    judged = []
+    for axis, figure in enumerate(value.omega):
+        if figure is not None:
+            # Subtracted in decimals: the print may have more digits than binary64.
+            distance = abs(float(Decimal(float(result.omega[axis]) / factor) - figure.value))
+            limit = figure.accuracy + float(result.error[axis] + rounding[axis]) / factor
+            judged.append((distance, limit, f"w{axis + 1}, {unit}"))
+    # NaN is the worst of all, and no comparison shows it.
+    worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
+    distance, limit, note = worst
+    return bounded(id, distance, limit, replay, note)
+
+
+def _accuracy(problem: Problem, value: Value) -> float:
+    """Return the accuracy of the finest print (rad/s)."""
+    finest = min(figure.accuracy for figure in value.omega if figure is not None)
+    return finest * UNITS[problem.unit]
+
+
+def _scale(scene: Scene, omega: Array) -> float:
+    """Return the largest angular velocity at both ends: no more than the largest on the way."""
+    return max(*map(abs, scene.omega), float(np.abs(omega).max()))
+
+
+def _rounding(scene: Scene, times: Sequence[float]) -> Array:
+    """Return by how much rounding the numbers of a scene and its times moves omega (rad/s).
+
+    The sum over all numbers of what each moves alone, to first order; no more rows than the
+    motion has.
+    """
+    moved = np.zeros((len(times), 3))
+    try:
+        here = solve(scene, times, "taylor", METHODS["taylor"].finest).omega
+        for other in _moved(scene):
+            there = solve(other, times, "taylor", METHODS["taylor"].finest).omega
+            rows = min(len(here), len(there))
+            moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
+    except InputError:
+        # What can't be solved can't be excused: the method's own check tells.
+        return np.zeros((len(times), 3))
+    slope = scene.right_hand_side()
+    for row, (time, omega) in enumerate(zip(times, here, strict=False)):
+        moved[row] += np.abs(slope(time, omega.tolist())) * abs(time) * _ROUNDING
+    return moved
+
+
+def _moved(scene: Scene) -> Iterator[Scene]:
+    """Yield the scene with one of its numbers after the other moved by a small part of itself."""
+    for name in ("moments", "coefficients", "omega"):
+        for triple in _triples(getattr(scene, name)):
+            yield _with(scene, name, triple)
+    law = scene.torque
+    for name in ("constant", "rate"):
+        for triple in _triples(getattr(law, name)):
+            yield replace(scene, torque=_with(law, name, triple))
+    for name in ("sines", "cosines"):
+        waves = getattr(law, name)
+        for place, (amplitude, frequency) in enumerate(waves):
+            others = [(triple, frequency) for triple in _triples(amplitude)]
+            others.append((amplitude, frequency * (1.0 + _STEP_ASIDE)))
+            for wave in others:
+                changed = (*waves[:place], wave, *waves[place + 1 :])
+                yield replace(scene, torque=_with(law, name, changed))
+
+
+def _with(whole: Scene | TorqueLaw, name: str, part: object) -> Any:
+    changes: dict[str, Any] = {name: part}
+    return replace(whole, **changes)
+
+
+def _triples(triple: Triple | None) -> Iterator[Triple]:
+    for axis, x in enumerate(triple or ()):
+        if x and triple:
+            changed = [*triple]
+            changed[axis] = x * (1.0 + _STEP_ASIDE)
+            yield changed[0], changed[1], changed[2]
+
+
+def _replay(problem: Problem, id: str) -> str:
+    given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
+    return f"python -m pyharness verify{given} --only {id}"

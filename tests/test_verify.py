@@ -1,0 +1,275 @@
+"""`verify`: what it checks, that each check can fail, and what a user sees then."""
+
+import datetime
+import json
+import math
+import shlex
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+from xml.etree import ElementTree
+
+import pytest
+
+from pyharness import facts as facts_room
+from pyharness import kernels, self_test, verify_programs
+from pyharness.cells import all_cells, cell_name
+from pyharness.checks import bounded, selected
+from pyharness.cli import main
+from pyharness.golden import mathematics, read_record, update
+from pyharness.listing import PROGRAMS
+from pyharness.methods import METHODS, PROGRAM_REGISTRY
+from pyharness.plants import PLANTS, Plant
+from pyharness.random_scenes import draw, weekly_seed
+from pyharness.selection import RECORD, Selection
+from pyharness.verify import KINDS, verify
+
+BY_NAME = {plant.name: plant for plant in PLANTS}
+
+
+def _json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
+    code = main(["verify", "--format", "json", *arguments])
+    return code, json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+
+
+def test_every_cell_has_a_name_of_its_own() -> None:
+    names = [cell_name(listing, case) for listing, case in all_cells()]
+    assert len(names) == len(set(names)) == (8 * 2 + 4 + 64 * 2) * 7
+    assert "two-term/case-3/original" in names
+
+
+def test_checks_have_names_of_their_own_and_all_pass() -> None:
+    """A part of everything; all of it is what `verify` is run for."""
+    checks = list(verify(Selection(seed="fixed", thin=True)))
+    assert [check.id for check in checks if not check.passed] == []
+    assert len({check.id for check in checks}) == len(checks)
+    assert {check.kind for check in checks} == set(KINDS)
+
+
+def test_limit_is_not_passed_by_nan() -> None:
+    assert not bounded("", math.nan, math.inf, "").passed
+    assert not bounded("", 2.0, 1.0, "").passed
+    assert bounded("", 1.0, 1.0, "").passed
+
+
+def test_selection_is_by_whole_parts() -> None:
+    assert selected("cells/two-term/case-3", ["cells/two-term"])
+    assert not selected("cells/two-term/case-30", ["cells/two-term/case-3"])
+    assert selected("cells", [])
+
+
+def test_json_is_as_agreed(capsys: pytest.CaptureFixture[str]) -> None:
+    code, record = _json(capsys, "--only", "cells/two-term/case-3,orders/rk4")
+    assert code == 0
+    assert record["schema"] == 1
+    assert record["passed"] is True
+    assert record["seed"] == weekly_seed()
+    assert {"id", "passed", "value", "limit", "replay"} <= set(record["checks"][0])
+    assert len(record["checks"]) == 16 + 7
+
+
+def test_junit_is_well_formed(capsys: pytest.CaptureFixture[str]) -> None:
+    with BY_NAME["ulp-in-fortran"].planted():
+        assert main(["verify", "--format", "junit", "--only", "cells/two-term/case-3"]) == 1
+    suite = ElementTree.fromstring(capsys.readouterr().out.encode())
+    assert suite.get("tests") == suite.get("failures") == "16"
+    failure = suite.find("testcase/failure")
+    assert failure is not None
+    assert failure.text is not None
+    assert "python -m pyharness verify --only cells/" in failure.text
+
+
+def test_failure_is_told_with_the_command_that_repeats_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with BY_NAME["ulp-in-fortran"].planted():
+        assert main(["verify", "--only", "cells/two-term/case-3"]) == 1
+        lines = capsys.readouterr().out.splitlines()
+        assert all(len(line) <= 100 for line in lines if not line.startswith("  python"))
+        place = next(i for i, line in enumerate(lines) if line.startswith("FAILED"))
+        assert "omega" in lines[place]
+        command = shlex.split(lines[place + 1])
+        assert command[:3] == ["python", "-m", "pyharness"]
+        assert main(command[3:]) == 1
+        assert lines[place] in capsys.readouterr().out
+    assert main(command[3:]) == 0
+    assert "1 checks, all well" in capsys.readouterr().out
+
+
+@contextmanager
+def _listed(cell: str) -> Iterator[None]:
+    """List a divergence in the table."""
+    known = facts_room.facts("divergences")
+    entry = {"id": "tried", "kind": "cross-language", "cell": cell}
+    table = {"divergence": [*known["divergence"], entry]}
+    with patch.object(verify_programs, "facts", lambda name: table):
+        yield
+
+
+@pytest.mark.parametrize(
+    ("listed", "planted", "code"), [(0, 0, 0), (0, 1, 1), (1, 1, 0), (1, 0, 1)]
+)
+def test_divergence_unlisted_or_no_longer_needed_fails(
+    listed: bool, planted: bool, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = "two-term/case-3/corrected"
+    contexts: list[AbstractContextManager[Any]] = [
+        _listed(cell) if listed else nullcontext(),
+        BY_NAME["ulp-in-fortran"].planted() if planted else nullcontext(),
+    ]
+    with contexts[0], contexts[1]:
+        assert main(["verify", "--only", f"cells/{cell}"]) == code
+    assert ("no longer occurs" in capsys.readouterr().out) == (listed and not planted)
+
+
+def test_random_draws_can_be_had_again() -> None:
+    assert draw("a", 3) == draw("a", 3)
+    assert draw("a", 3) != draw("a", 4)
+    assert draw("a", 3) != draw("b", 3)
+    # As they were drawn when this was written: a replay must outlive the version of Python.
+    assert draw("2026-W47", 0).scene.omega[0].hex() == "-0x1.5f01c99996168p+0"
+
+
+def test_half_of_the_draws_are_nasty_in_every_way() -> None:
+    names = [draw("c", number).scene.name for number in range(200)]
+    assert names[::2] == ["plain"] * 100
+    assert set(names[1::2]) == {
+        "near-symmetric", "near-separatrix", "violent torque", "far scale", "coefficients",
+        "extreme",
+    }  # fmt: skip
+
+
+def test_seed_changes_weekly_and_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    monday = datetime.date(2026, 11, 16)
+    week = [weekly_seed(monday + datetime.timedelta(days)) for days in range(8)]
+    assert week == ["2026-W47"] * 7 + ["2026-W48"]
+    assert main(["verify", "--only", "random/3/program"]) == 0
+    assert f"seed of the random draws: {weekly_seed()}" in capsys.readouterr().out
+
+
+def test_random_failure_names_its_seed() -> None:
+    with BY_NAME["ulp-in-fortran"].planted():
+        checks = list(verify(Selection(only=["random"], seed="x", draws=40)))
+    failed = [check for check in checks if not check.passed]
+    assert failed
+    assert all(check.replay.endswith(" --seed x") for check in failed)
+
+
+def test_record_is_what_is_produced(tmp_path: Path) -> None:
+    files, news = update(RECORD)
+    if {file["mathematics"] for file in read_record(RECORD).values()} == {mathematics()}:
+        exact = [line for line in news if any(f"--program {name}" in line for name in PROGRAMS)]
+        assert exact == []
+    assert sum(map(len, files.values())) < 200_000
+    assert all(line.startswith("moved: ") for line in news)
+
+
+def _written(folder: Path) -> Path:
+    files, _ = update(RECORD)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    return folder / "two-term.toml"
+
+
+def test_record_that_was_changed_fails_and_is_mended(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One unit in the last place of one number, the digest of what is not shown, a lost entry."""
+    path = _written(tmp_path)
+    good = path.read_text()
+    only = ["verify", "--only", "golden/two-term", "--record", str(tmp_path)]
+    assert main(only) == 0
+    value = next(row[3] for row in read_record(tmp_path)["two-term"]["trajectory"][5]["rows"][1:])
+    moved = float.hex(math.nextafter(float.fromhex(value), math.inf))
+    digest = read_record(tmp_path)["two-term"]["trajectory"][3]["digest"]
+    for text, told in (
+        (good.replace(value, moved, 1), "omega by 1 ulp"),
+        (good.replace(digest, "0" * 32, 1), "between the rows that are shown"),
+        (good.replace("--case 3 ", "--case 8 "), "no longer produced"),
+        (good.rpartition("[[trajectory]]")[0], "is not recorded"),
+    ):
+        path.write_text(text)
+        capsys.readouterr()
+        assert main(only) == 1
+        assert told in " ".join(capsys.readouterr().out.split())
+    path.write_text(good.replace(value, moved, 1))
+    capsys.readouterr()
+    assert main(["verify", "--update", "--record", str(tmp_path)]) == 0
+    assert "omega by 1 ulp" in capsys.readouterr().out
+    assert path.read_text() == good
+
+
+def test_method_of_the_record_may_move_within_its_error(tmp_path: Path) -> None:
+    _written(tmp_path)
+    path = tmp_path / "taylor.toml"
+    value = read_record(tmp_path)["taylor"]["trajectory"][4]["rows"][2][4]
+    for factor, passed in ((1.0 + 1e-13, True), (1.0 + 1e-6, False)):
+        text = path.read_text()
+        path.write_text(text.replace(value, (float.fromhex(value) * factor).hex()))
+        only = ["golden/taylor"]
+        checks = list(verify(Selection(only=only, record=tmp_path)))
+        assert all(check.passed for check in checks) == passed
+        path.write_text(text)
+
+
+def test_no_record_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with patch("pyharness.verbs.verify.RECORD", tmp_path / "none"):
+        assert main(["verify", "--only", "golden,orders/rk4/case-5"]) == 0
+    assert "no golden record here" in capsys.readouterr().out
+    assert main(["verify", "--record", str(tmp_path / "none")]) == 2
+    assert "is not a folder" in capsys.readouterr().err
+
+
+# Those that need no second language: the rest is what `verify --self-test` is run for.
+QUICK = ("sign-in-both", "ulp-in-fortran", "stale-solver", "label-of-method", "digit-of-the-print")
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
+    chosen = Selection(seed="fixed", thin=True)
+    with BY_NAME[name].planted():
+        caught = self_test._caught(BY_NAME[name], chosen)
+    assert caught.passed
+    assert not caught.example.startswith("golden")
+
+
+def test_plant_that_nothing_catches_is_a_failure(capsys: pytest.CaptureFixture[str]) -> None:
+    harmless = Plant("harmless", "no fault at all", nullcontext)
+    with patch.object(self_test, "PLANTS", (harmless,)):
+        assert main(["verify", "--self-test"]) == 1
+    output = capsys.readouterr().out
+    assert "FAILED harmless" in output
+    assert "1 plants and a control: 1 not as it should be" in output
+
+
+def test_plants_leave_nothing_behind() -> None:
+    before = [dict(METHODS), dict(PROGRAM_REGISTRY), kernels.run, kernels.normalized]
+    for plant in PLANTS:
+        with plant.planted():
+            pass
+    assert [dict(METHODS), dict(PROGRAM_REGISTRY), kernels.run, kernels.normalized] == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--only", "cell"], "did you mean 'cells'?"),
+        (["--only", "cells/nothing"], "no such check"),
+        (["--draws", "-1"], "--draws"),
+        (["--draws", "many"], "whole number"),
+        (["--format", "csv"], "table, json, junit"),
+        (["--update", "--only", "golden"], "--only has no meaning with --update"),
+        (["--self-test", "--draws", "3"], "--draws has no meaning with --self-test"),
+        (["--external", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert told in captured.err

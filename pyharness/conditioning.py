@@ -6,17 +6,19 @@ tolerances can be written down before a method is tried.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pyharness.errors import InputError
+from pyharness.scaling import scaled as scaled
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
 
 ROUNDING = 2.0**-53
 # Roundings in a right-hand side: two in each of A, B, C, two products, the sums.
 _ROUNDINGS = 8.0
+_HUGE = 1e100  # a factor beyond which none says more
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 50
 _MOST_NODES = 400_000
@@ -24,30 +26,46 @@ _MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class Conditioning:
-    """How errors of the data reach the end.
+    """How errors made on the way reach the end.
 
     Attributes
     ----------
     amplification : float
-        Largest factor by which an error of omega made on the way reaches the end, at least 1.
+        Largest factor by which an error of any omega made on the way reaches the end, at least 1.
     rounding : float
-        Error at the end over the largest abs(omega) if every term of the right-hand side and
-        the start are wrong by a few roundings throughout, in the worst direction.
+        Error at the end over `largest` if every term of the right-hand side, the start and the
+        result are wrong by a few roundings, each of its own size, in the worst direction.
+    storing : float
+        The same if omega is rounded once a step, for each step.
+    unamplified : float
+        Sum over the way of what `rounding` counts, as it was made: what the invariants see.
     largest : float
         Largest abs(omega) of any component on the way (rad/s).
     """
 
     amplification: float
     rounding: float
+    storing: float
+    unamplified: float
     largest: float
 
-    def limit(self, tolerance: float) -> float:
-        """Return the error that a method with a tolerance may have, over `largest`.
+    def limit(self, made: float, steps: float = 0.0) -> float:
+        """Return the error that a method may have, over `largest`.
 
-        The tolerance amplified as an error made on the way would be, plus rounding; 2, which
-        says nothing, where that is more.
+        Parameters
+        ----------
+        made : float
+            Sum of the errors that the method makes on the way, over `largest`, as its tolerance
+            or its order tells.
+        steps : float
+            Steps after which it rounds omega; 0 where it carries on what rounding took off.
+
+        Returns
+        -------
+        float
+            2, which says nothing, where it would be more.
         """
-        return min(2.0, tolerance * self.amplification + self.rounding)
+        return min(2.0, made * self.amplification + self.rounding + steps * self.storing)
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:
@@ -59,13 +77,10 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
         Where the solution leaves every bound before, or so long a time would need too many
         nodes.
     """
-    from pyharness.methods import solve
-
     times = _nodes(scene, time)
-    path = solve(scene, times[1:].tolist(), "taylor", 1e-13)
-    if path.ended != "complete":
+    omega, complete = _path(scene, times)
+    if not complete:
         raise InputError(f"conditioning: the solution leaves every bound before t = {time:g} s")
-    omega = np.vstack([scene.omega, path.omega])
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
     if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
@@ -73,17 +88,25 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     return found
 
 
+def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
+    """Return omega at each time, and whether it is there to the end."""
+    from pyharness.methods import solve
+    from pyharness.plan import closed_form
+
+    # Beside the separatrix an integrated path would be another one after a few turns.
+    method = "closed-form" if closed_form(scene) else "taylor"
+    path = solve(scene, times[1:].tolist(), method, 1e-13)
+    return np.vstack([scene.omega, path.omega]), path.ended == "complete"
+
+
 def _nodes(scene: Scene, time: float) -> Array:
     """Return times between which the solution turns by a small angle."""
-    from pyharness.methods import solve
-
     if time == 0.0:
         return np.zeros(2)
     count = _FEWEST_NODES
     while True:
         times = np.linspace(0.0, time, count + 1)
-        path = solve(scene, times[1:].tolist(), "taylor", 1e-13)
-        omega = np.vstack([scene.omega, path.omega])
+        omega, _ = _path(scene, times)
         with np.errstate(all="ignore"):
             largest = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
@@ -101,20 +124,28 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     largest = float(np.abs(omega).max()) or 1.0
     # Between nodes the Jacobian hardly changes: its exponential is the propagator.
     pieces = exponentials(steps[:, None, None] * jacobians(scene, middle))
-    propagator = np.eye(3)
-    norms = np.empty(len(times))
-    norms[-1] = 1.0
+    propagators = np.empty((len(times), 3, 3))
+    propagators[-1] = np.eye(3)
     for k in range(len(steps) - 1, -1, -1):
-        propagator = propagator @ pieces[k]
-        norms[k] = np.abs(propagator).sum(axis=1).max()
-    norms = np.minimum(norms, 1e300)
-    amplification = float(max(1.0, norms.max()))
-    source = _magnitude(scene, times, omega)
-    weights = norms * source
-    integral = float(np.sum(0.5 * (weights[1:] + weights[:-1]) * np.abs(steps)))
+        propagators[k] = np.clip(propagators[k + 1] @ pieces[k], -_HUGE, _HUGE)
+    sizes = np.abs(propagators)
+    source = _magnitudes(scene, times, omega)
+
+    def gathered(made: Array) -> Array:
+        arriving = (sizes @ made[:, :, None])[:, :, 0]
+        return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
+
     # The start and the result are rounded once, however short the time.
-    data = (integral + float(norms[0]) * max(map(abs, scene.omega))) / largest + 1.0
-    return Conditioning(amplification, _ROUNDINGS * ROUNDING * data, largest)
+    ends = sizes[0] @ np.abs(omega[0]) + np.abs(omega[-1])
+    span = abs(float(times[-1])) or 1.0
+    unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
+    return Conditioning(
+        amplification=float(max(1.0, sizes.sum(axis=2).max())),
+        rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
+        storing=ROUNDING * float(gathered(np.abs(omega)).max()) / (span * largest),
+        unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
+        largest=largest,
+    )
 
 
 def exponentials(small: Array) -> Array:
@@ -134,8 +165,8 @@ def jacobians(scene: Scene, omega: Array) -> Array:
     return np.array(rows).transpose(2, 0, 1)
 
 
-def _magnitude(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the sum of the sizes of all terms of the right-hand side, the largest of the axes.
+def _magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
+    """Return the sum of the sizes of all terms of each right-hand side, shape (n, 3).
 
     A wave counts with its angle: a rounding of frequency times t is a rounding of that many
     radians.
@@ -148,30 +179,4 @@ def _magnitude(scene: Scene, times: Array, omega: Array) -> Array:
     torque = np.abs(law.constant) + np.abs(law.rate) * np.abs(times)[:, None]
     for amplitude, frequency in law.sines + law.cosines:
         torque = torque + np.abs(amplitude) * (1.0 + np.abs(frequency * times))[:, None]
-    return np.asarray((products + torque / moments).max(axis=1))
-
-
-def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene with the solution factor omega(factor t): the same motion, faster.
-
-    A power of 2 as factor changes no digit of any quantity.
-    """
-    law = scene.torque
-    square = factor * factor
-
-    def times(values: tuple[float, float, float], by: float) -> tuple[float, float, float]:
-        first, second, third = values
-        return first * by, second * by, third * by
-
-    return replace(
-        scene,
-        omega=times(scene.omega, factor),
-        torque=replace(
-            law,
-            constant=times(law.constant, square),
-            rate=times(law.rate, square * factor),
-            sines=tuple((times(a, square), f * factor) for a, f in law.sines),
-            cosines=tuple((times(a, square), f * factor) for a, f in law.cosines),
-        ),
-        step_size=scene.step_size / factor,
-    )
+    return np.asarray(products + torque / moments)

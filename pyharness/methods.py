@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from pyharness.errors import InputError, unknown
 from pyharness.listing import PROGRAMS, Listing
+from pyharness.scaling import factor_near_one, scaled, unscaled
 from pyharness.scene import Scene
 from pyharness.scipy_methods import rows_trajectory, scipy_method
 from pyharness.trajectory import Trajectory
@@ -19,6 +20,9 @@ Solver = Callable[[Scene, Sequence[float], float], Trajectory]
 
 # Of 1 to 8 stages: low orders would need more steps than anyone waits for.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
+
+# They bring the scene near 1 themselves, or form no products in binary64.
+_ANY_SCALE = ("closed-form", "reference")
 
 
 @dataclass(frozen=True)
@@ -133,7 +137,13 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
     ordered, turned = _outward(times)
-    trajectory = chosen.solve(scene, ordered, tolerance)
+    factor = 1.0 if method in _ANY_SCALE else factor_near_one(scene, ordered[-1])
+    if factor == 1.0:
+        trajectory = chosen.solve(scene, ordered, tolerance)
+    else:
+        faster = [t / factor for t in ordered]
+        found = chosen.solve(scaled(scene, factor), faster, tolerance)
+        trajectory = unscaled(found, ordered, factor)
     if not turned:
         return trajectory
     return Trajectory(

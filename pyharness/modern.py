@@ -21,6 +21,8 @@ MOST_STAGES = 8
 _MOST_EVALUATIONS = 200_000_000
 # Two solutions that differ by so many units in the last place will not get closer.
 _ROUNDING = 16 * 2.0**-53
+# Of the range of numbers (rad/s): a solution that reached it twice leaves it.
+_NEAR_THE_END = 1e300
 
 
 def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
@@ -135,16 +137,16 @@ class _Solution:
     evaluations: int
 
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
-        """Whether it ended where the coarser one did, with an omega that grows as steps fall.
+        """Whether it ended where the coarser one did, at an omega without bound.
 
-        `start` is the omega of the beginning, or what torque alone would make of it: there may
-        be no row.
+        That grows as steps fall, or is at the end of the range of numbers. `start` is the omega
+        of the beginning, or what torque alone would make of it: there may be no row.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
         so_far = float(np.abs(self.rows[:, : self.n_rows]).max(initial=start))
-        return largest > 1.5 * before > 1e3 * so_far
+        return largest > 1.5 * before > 1e3 * so_far or min(largest, before) > _NEAR_THE_END
 
 
 def _counts(times: Sequence[float], step: float) -> Array:

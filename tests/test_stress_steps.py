@@ -250,11 +250,11 @@ def test_the_stored_picture_is_current(tmp_path: Path) -> None:
     assert stored.with_suffix(".svg").exists()
 
 
-def test_plot_is_for_regions_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plot_of_regions_draws_the_regions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target = tmp_path / "regions.svg"
     save = ["--save", str(tmp_path / "worst")]
-    assert main(["stress", "--only", "matrices", "--plot", str(target), *save]) == 2
-    assert "--only regions" in capsys.readouterr().err
+    assert main(["stress", "--only", "matrices,regions", "--plot", str(target), *save]) == 2
+    assert "--plot draws one trial" in capsys.readouterr().err
     assert not target.exists()
     only = "regions/runge-kutta/original/polynomial"
     assert main(["stress", "--only", only, "--plot", str(target)]) == 0

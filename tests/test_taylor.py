@@ -136,14 +136,8 @@ def test_blow_up_ends_the_rows(level: int) -> None:
 @pytest.mark.parametrize("size", [1e100, 1e160])
 def test_hopeless_scale_ends(size: float) -> None:
     scene = Scene("", (size, size, size), coefficients=(1.0, -1.0, 1.0))
-    with pytest.raises(InputError, match="gave up after 1 steps") if size < 1e150 else _nothing():
-        assert solve(scene, [2.0], "taylor", 1e-6).ended == "overflow"
-
-
-class _nothing:
-    def __enter__(self) -> None: ...
-
-    def __exit__(self, *_: object) -> None: ...
+    with pytest.raises(InputError, match="gave up after 1 steps"):
+        solve(scene, [2.0], "taylor", 1e-6)
 
 
 def test_tiny_and_resting_bodies() -> None:

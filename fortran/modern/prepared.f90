@@ -7,7 +7,7 @@ module prepared
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
   use sphere, only: sphere_rows
-  use statuses, only: COMPLETE, REFUSED
+  use statuses, only: COMPLETE, OVERFLOW, REFUSED
   use torque_free, only: torque_free_end
   implicit none(type, external)
   private
@@ -36,12 +36,93 @@ module prepared
   integer, parameter :: QUICK_OR_SERIES = 8 ! whichever takes fewer operations
   integer, parameter :: GAUSS = 10
 
+  ! Beyond it, or below its inverse, products of omegas may overflow or underflow, though the
+  ! solution is an ordinary number.
+  real(dp), parameter :: LARGE = 2.0_dp**300
+  integer, parameter :: MOST_POWER = 1000
+
   public :: solve_prepared
 
 contains
 
   subroutine solve_prepared(packed, n_packed, omega0, t_end, omega)
     !! Angular velocity at `t_end` by the method that was prepared; NaN unless STATUS is 0.
+    integer, intent(in) :: n_packed
+    real(dp), intent(inout) :: packed(n_packed)
+    real(dp), intent(in) :: omega0(3)  !! rad/s
+    real(dp), intent(in) :: t_end      !! s
+    real(dp), intent(out) :: omega(3)  !! rad/s
+    real(dp) :: largest
+
+    largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
+    if (largest <= LARGE .and. largest*LARGE >= 1.0_dp) then
+      call solve_as_given(packed, n_packed, omega0, t_end, omega)
+    else
+      call solve_near_one(packed, n_packed, omega0, t_end, largest, omega)
+    end if
+    ! Not ieee_value: that module ties the binary to libgfortran.
+    if (int(packed(STATUS)) /= COMPLETE) omega = transfer(huge(0_int64), 1.0_dp)
+  end subroutine solve_prepared
+
+  subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega)
+    !! The same in units that bring omega near 1, by a power of two: it changes no digit.
+    integer, intent(in) :: n_packed
+    real(dp), intent(inout) :: packed(n_packed)
+    real(dp), intent(in) :: omega0(3)  !! rad/s
+    real(dp), intent(in) :: t_end      !! s
+    real(dp), intent(in) :: largest    !! of omega0, rad/s
+    real(dp), intent(out) :: omega(3)  !! rad/s
+    real(dp) :: copy(n_packed)
+    real(dp) :: start(3)
+    real(dp) :: reach      ! omega0 and what the torque gives, rad/s
+    real(dp) :: time       ! in the new units
+    integer :: power       ! omega is 2**power times what it is in the new units
+    integer :: i
+
+    reach = largest
+    do i = 0, 2
+      reach = max(reach, abs(packed(M_CONSTANT + i)*t_end), abs(packed(M_RATE + i)*t_end*t_end))
+    end do
+    do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 1
+      if (mod(i - WAVES, 4) /= 3) reach = max(reach, abs(packed(i)*t_end))
+    end do
+    power = 0
+    if (reach > 0.0_dp .and. reach <= huge(reach)) then
+      if (.not. (reach <= LARGE .and. reach*LARGE >= 1.0_dp)) power = exponent(reach)
+    end if
+    power = max(-MOST_POWER, min(MOST_POWER, power))
+    time = scale(t_end, power)
+    if (.not. abs(time) <= huge(time)) power = 0
+    if (power == 0) then
+      call solve_as_given(packed, n_packed, omega0, t_end, omega)
+      return
+    end if
+    copy = packed
+    copy(STEP) = scale(packed(STEP), power)
+    do i = 0, 2
+      copy(M_CONSTANT + i) = scale(scale(packed(M_CONSTANT + i), -power), -power)
+      copy(M_RATE + i) = scale(scale(scale(packed(M_RATE + i), -power), -power), -power)
+    end do
+    do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 1
+      copy(i) = scale(packed(i), -power)
+      if (mod(i - WAVES, 4) /= 3) copy(i) = scale(copy(i), -power)
+    end do
+    do i = 1, 3
+      start(i) = scale(omega0(i), -power)
+    end do
+    call solve_as_given(copy, n_packed, start, time, omega)
+    do i = 1, 3
+      omega(i) = scale(omega(i), power)
+    end do
+    if (int(copy(STATUS)) == COMPLETE .and. .not. all(abs(omega) <= huge(time))) then
+      copy(STATUS) = real(OVERFLOW, dp)
+    end if
+    packed(STATUS) = copy(STATUS)
+    packed(STEPS) = copy(STEPS)
+  end subroutine solve_near_one
+
+  subroutine solve_as_given(packed, n_packed, omega0, t_end, omega)
+    !! The same without a look at the scale; omega means nothing unless STATUS is 0.
     integer, intent(in) :: n_packed
     real(dp), intent(inout) :: packed(n_packed)
     real(dp), intent(in) :: omega0(3)  !! rad/s
@@ -98,9 +179,7 @@ contains
     end select
     packed(STATUS) = real(ended, dp)
     packed(STEPS) = real(count, dp)
-    ! Not ieee_value: that module ties the binary to libgfortran.
-    if (ended /= COMPLETE) omega = transfer(huge(0_int64), 1.0_dp)
-  end subroutine solve_prepared
+  end subroutine solve_as_given
 
   pure integer function fixed_method(code)
     !! The fixed-step method of a value of METHOD.

@@ -3,7 +3,8 @@
 import argparse
 
 from pyharness import options as shared
-from pyharness.check_tables import checks_record, checks_table, junit_text
+from pyharness.check_tables import checks_record, junit_text
+from pyharness.checks import Check
 from pyharness.errors import InputError, unknown
 from pyharness.stress import TRIALS, Outcome, stress, trial, worst
 
@@ -19,9 +20,7 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--save", metavar="DIR", help="where the worst inputs go, as scene files (default: worst)"
     )
-    parser.add_argument(
-        "--plot", metavar="FILE", help="draw the regions of stability; with --only regions"
-    )
+    parser.add_argument("--plot", metavar="FILE", help="draw one trial, with its numbers as CSV")
     parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
 
@@ -33,8 +32,8 @@ def run(options: argparse.Namespace) -> int:
     for each in only:
         if each.partition("/")[0] not in TRIALS:
             raise unknown("trial", each.partition("/")[0], TRIALS, "--only")
-    if options.plot is not None and {each.partition("/")[0] for each in only} != {"regions"}:
-        raise InputError("--plot draws the regions of stability; give --only regions with it")
+    if options.plot is not None and len(_chosen(only)) != 1:
+        raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")
     shared.check_outputs(options)
     folder = options.save or _FOLDER
     # One check alone is a replay: its input has been saved before.
@@ -55,10 +54,7 @@ def run(options: argparse.Namespace) -> int:
     if saves:
         _save(folder, outcomes)
     if options.plot is not None:
-        from pyharness.stability_plots import regions_picture
-        from pyharness.stability_regions import regions
-
-        shared.write(regions_picture(regions(), options.plot), "--plot")
+        shared.write(_picture(_chosen(only)[0], checks, options.plot), "--plot")
     if form == "json":
         from pyharness.build import build
         from pyharness.records import json_text
@@ -67,18 +63,27 @@ def run(options: argparse.Namespace) -> int:
     elif form == "junit":
         text = junit_text("stress", checks)
     else:
-        text = checks_table(_head(only), checks, depth=2)
+        from pyharness.stress_tables import stress_table
+
+        text = stress_table([trial(name) for name in _chosen(only)], checks)
     shared.emit(text, options.out)
     return 0 if all(check.passed for check in checks) else 1
 
 
-def _head(only: list[str]) -> list[str]:
+def _chosen(only: list[str]) -> list[str]:
     names = {each.partition("/")[0] for each in only} or set(TRIALS)
-    return [
-        f"{name}: {trial(name).title}. Bound: {trial(name).bound}"
-        for name in TRIALS
-        if name in names
-    ]
+    return [name for name in TRIALS if name in names]
+
+
+def _picture(name: str, checks: list[Check], path: str) -> dict[str, bytes]:
+    if name == "regions":
+        from pyharness.stability_plots import regions_picture
+        from pyharness.stability_regions import regions
+
+        return regions_picture(regions(), path)
+    from pyharness.stress_plots import stress_picture
+
+    return stress_picture(trial(name), checks, path)
 
 
 def _save(folder: str, outcomes: list[Outcome]) -> None:

@@ -1,0 +1,78 @@
+"""The same motion faster or slower: omega and time in other units.
+
+Products of omegas below 1e-154 underflow, and of those above 1e154 overflow, though the solution
+is an ordinary number. A method that forms them gets such a scene in units that bring it near 1, by
+a power of two, which changes no digit.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pyharness.scene import Scene, Triple
+from pyharness.trajectory import Trajectory
+
+# Far enough from the ends that products of components of unlike size keep their digits.
+_LARGE = 2.0**300
+
+
+def scaled(scene: Scene, factor: float) -> Scene:
+    """Return the scene with the solution factor omega(factor t): the same motion, faster.
+
+    A power of 2 as factor changes no digit of any quantity.
+    """
+    law = scene.torque
+
+    def times(values: Triple, power: int) -> Triple:
+        # One factor after the other: its square alone may be too large a number.
+        for _ in range(power):
+            first, second, third = values
+            values = first * factor, second * factor, third * factor
+        return values
+
+    return replace(
+        scene,
+        omega=times(scene.omega, 1),
+        torque=replace(
+            law,
+            constant=times(law.constant, 2),
+            rate=times(law.rate, 3),
+            sines=tuple((times(a, 2), f * factor) for a, f in law.sines),
+            cosines=tuple((times(a, 2), f * factor) for a, f in law.cosines),
+        ),
+        step_size=scene.step_size / factor,
+    )
+
+
+def factor_near_one(scene: Scene, time: float) -> float:
+    """Return the power of 2 by which a scene is scaled; 1 for every ordinary one."""
+    largest = max(map(abs, scene.omega))
+    if 1.0 / _LARGE <= largest <= _LARGE:
+        return 1.0
+    law = scene.torque
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    for axis, moment in enumerate(moments):
+        waves = sum(abs(a[axis]) for a, _ in law.sines + law.cosines)
+        push = abs(law.constant[axis]) + abs(law.rate[axis] * time) + waves
+        # What the torque gives it counts like what it has.
+        largest = max(largest, push / moment * abs(time))
+    if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
+        return 1.0
+    # A step short of the ends of the exponents, where the factor itself would not be a number.
+    exponent = max(-1000, min(1000, math.frexp(largest)[1]))
+    factor = math.ldexp(1.0, -exponent)
+    fits = 0.0 < scene.step_size / factor * scene.steps < math.inf and abs(time) / factor < math.inf
+    return factor if fits else 1.0
+
+
+def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
+    """Return the trajectory of a scaled scene in the units of the scene."""
+    with np.errstate(over="ignore"):
+        omega = trajectory.omega / factor
+    finite = np.isfinite(omega).all(axis=1)
+    count = len(omega) if finite.all() else int(np.argmin(finite))
+    time = np.array(times[:count], dtype=float)
+    ended = trajectory.ended if count == len(trajectory.omega) else "overflow"
+    return replace(trajectory, time=time, recorded_time=time, omega=omega[:count], ended=ended)

@@ -1,0 +1,143 @@
+"""The picture of one trial: for each method what was found, and its limit, by circumstance."""
+
+import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pyharness.checks import Check
+from pyharness.stress import Trial
+from pyharness.tables import csv_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_FLOOR = 1e-18  # what is less, or exactly 0, lies here
+_TOP = 3.0
+_COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
+_MARKERS = {"error": "o", "drift": "v"}
+_COLUMNS = 2
+_REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
+
+
+def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str, bytes]:
+    """Draw a panel for each method; return content by path: the picture, and its numbers as CSV.
+
+    Circumstances whose names begin alike stand together, in the order in which they were tried.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    drawn = [check for check in checks if len(check.id.split("/")) > 2 and check.value is not None]
+    places = _places([check.id.split("/")[2] for check in drawn])
+    methods = list(dict.fromkeys(check.id.split("/")[1] for check in drawn))
+    columns = min(_COLUMNS, len(methods))
+    rows = -(-len(methods) // columns)
+    width = max(5.0, 2.0 + 0.11 * len(places))
+    figure = Figure(figsize=(width * columns, 2.6 * rows + 1.6), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    for axes, name in zip(grid.flat, methods, strict=False):
+        _panel(axes, name, [check for check in drawn if check.id.split("/")[1] == name], places)
+    for axes in grid.flat[len(methods) :]:
+        axes.set_visible(False)
+    for axes in grid[-1]:
+        axes.set_xticks(list(places.values()), [_label(name) for name in places], rotation=90)
+        axes.tick_params(axis="x", labelsize=6)
+    grid[0, 0].set_ylim(_FLOOR / 2.0, _TOP * 2.0)
+    title = f"{trial.name}: {trial.title}"
+    key = "o error, v drift of energy and momentum; lines: limits; open: described, no limit"
+    figure.suptitle(f"{title}\n{key}", fontsize=9)
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(_REPRODUCIBLE):
+        kind = Path(path).suffix.lstrip(".").lower()
+        metadata = {"Date": None} if kind == "svg" else None
+        figure.savefig(buffer, format=kind, dpi=110, metadata=metadata)
+    rows_out = [[check.id, repr(check.value), repr(check.limit), check.note] for check in drawn]
+    numbers = csv_text(["id", "value", "limit", "note"], rows_out)
+    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+
+
+def _places(names: Sequence[str]) -> dict[str, float]:
+    """Return where each circumstance stands: kinds side by side, with a gap between."""
+    kinds: dict[str, list[str]] = {}
+    for name in dict.fromkeys(names):
+        kinds.setdefault(_kind(name), []).append(name)
+    places: dict[str, float] = {}
+    place = 0.0
+    for members in kinds.values():
+        for name in members:
+            places[name] = place
+            place += 1.0
+        place += 1.0
+    return places
+
+
+def _kind(name: str) -> str:
+    return re.split(r"[-^]?\d", name, maxsplit=1)[0].rstrip("-")
+
+
+def _label(name: str) -> str:
+    """Return what tells a circumstance from others of its kind."""
+    return name[len(_kind(name)) :].lstrip("-") or name
+
+
+def _panel(axes: "Axes", name: str, checks: Sequence[Check], places: dict[str, float]) -> None:
+    series: dict[tuple[str, str], list[Check]] = {}
+    for check in checks:
+        what = check.id.split("/")[-1]
+        series.setdefault((_rank(_setting(check)), what if what in _MARKERS else ""), []).append(
+            check
+        )
+    for (rank, what), members in series.items():
+        color = _COLORS.get(rank, "black")
+        for judged in (True, False):
+            own = [check for check in members if (check.limit is not None) == judged]
+            axes.plot(
+                [places[check.id.split("/")[2]] for check in own],
+                [_inside(check.value) for check in own],
+                _MARKERS.get(what, "s"), markersize=3.0, color=color, linestyle="none",
+                markerfacecolor=color if judged else "none", markeredgewidth=0.6,
+                label=f"{rank} {what}".strip() if judged and own and what else None,
+            )  # fmt: skip
+        for kind in dict.fromkeys(_kind(check.id.split("/")[2]) for check in members):
+            limited = [
+                check
+                for check in members
+                if check.limit is not None and _kind(check.id.split("/")[2]) == kind
+            ]
+            axes.plot(
+                [places[check.id.split("/")[2]] for check in limited],
+                [_inside(check.limit) for check in limited],
+                color=color, linewidth=0.8, linestyle=(0, (1, 1.2)) if what == "drift" else "-",
+            )  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_title(name, fontsize=9, loc="left", fontweight="bold")
+    axes.grid(visible=True, axis="y", linewidth=0.3)
+    axes.tick_params(labelsize=7)
+    for kind in dict.fromkeys(map(_kind, places)):
+        own_places = [place for each, place in places.items() if _kind(each) == kind]
+        middle = 0.5 * (min(own_places) + max(own_places))
+        axes.text(middle, 1.01, kind, fontsize=7, ha="center", transform=axes.get_xaxis_transform())
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(fontsize=6, loc="upper left", ncols=2, framealpha=0.7)
+
+
+def _setting(check: Check) -> str:
+    parts = check.id.split("/")
+    return parts[3] if len(parts) > 3 else ""
+
+
+def _rank(setting: str) -> str:
+    """Return what a setting is called in the key: tolerances that vary are one series."""
+    try:
+        tolerance = float(setting)
+    except ValueError:
+        return setting
+    return "coarse" if tolerance >= 1e-6 else "fine"
+
+
+def _inside(value: float | None) -> float:
+    if value is None or value != value:
+        return _TOP
+    return min(_TOP, max(_FLOOR, abs(value)))

@@ -250,7 +250,9 @@ def test_the_stored_picture_is_current(tmp_path: Path) -> None:
     assert stored.with_suffix(".svg").exists()
 
 
-def test_plot_of_regions_draws_the_regions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plot_of_regions_draws_the_regions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     target = tmp_path / "regions.svg"
     save = ["--save", str(tmp_path / "worst")]
     assert main(["stress", "--only", "matrices,regions", "--plot", str(target), *save]) == 2

@@ -89,7 +89,9 @@ def summed(scene: Scene, time: float) -> Truth:
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
-    return Truth(time, known.omega[-1], known.error, Conditioning(1.0, 16.0 * ROUNDING, largest))
+    rounding = 16.0 * ROUNDING
+    flow = Conditioning(1.0, rounding, ROUNDING, rounding, largest)
+    return Truth(time, known.omega[-1], known.error, flow)
 
 
 def _wave(frequency: float) -> TorqueLaw:

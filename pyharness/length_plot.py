@@ -1,7 +1,6 @@
-"""The picture of Brouwer's law: `python -m pyharness.length_plot FILE.svg`; its rows as CSV."""
+"""The picture of Brouwer's law: `stress --only length --plot FILE`; its rows as CSV."""
 
 import io
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from pyharness.brouwer import LAWS, root_mean_square
-from pyharness.errors import InputError
-from pyharness.output import check_writable, write_files
 from pyharness.tables import csv_text
 from pyharness.trajectory import Array
 from pyharness.trials.length import CONTENDERS, MOTIONS, measured, orbit_of
@@ -105,13 +102,3 @@ def picture(found: list[Curve], path: str) -> dict[str, bytes]:
     ]
     numbers = csv_text(("motion", "method", "what", "steps", "error", "limit", "starts"), rows)
     return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
-
-
-if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m pyharness.length_plot FILE.svg (or .png, .pdf)")
-    try:
-        check_writable(sys.argv[1], "FILE")
-        write_files(picture(list(curves()), sys.argv[1]), "FILE")
-    except InputError as error:
-        sys.exit(f"length_plot: {error}")

@@ -81,6 +81,10 @@ def _picture(name: str, checks: list[Check], path: str) -> dict[str, bytes]:
         from pyharness.stability_regions import regions
 
         return regions_picture(regions(), path)
+    if name == "length":
+        from pyharness.length_plot import curves, picture
+
+        return picture(list(curves()), path)
     from pyharness.stress_plots import stress_picture
 
     return stress_picture(trial(name), checks, path)

@@ -9,7 +9,6 @@ module scaled_runge_kutta
   private
 
   integer, parameter :: MOST_WAVES = 8
-  integer, parameter :: MOST_TRIES = 20
   ! Beyond so many times the steps planned, the motion makes more of rounding than is allowed.
   real(dp), parameter :: MOST_TIMES = 12.0_dp
   integer, parameter :: EXACT_AGAIN = 64     ! steps until sine and cosine are computed afresh
@@ -94,7 +93,6 @@ contains
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: cost         ! in steps under constant torque
     real(dp) :: bits         ! of the tolerance
-    integer :: tries
     integer :: n
 
     aim = SHARE*tolerance
@@ -136,11 +134,9 @@ contains
       end if
     end if
     most = min(MOST_STEPS, MOST_TIMES*n_steps)
-    do tries = 1, MOST_TRIES
-      if (.not. n_steps <= most) then
-        status = GAVE_UP
-        return
-      end if
+    status = GAVE_UP
+    do
+      if (.not. n_steps <= most) return
       n = int(0.25_dp*(n_steps + 3.0_dp))
       steps = 4*n
       if (varies) then
@@ -148,27 +144,26 @@ contains
       else
         call march_constant(motion, start, (0.25_dp*t_end)/n, n, x, gaps, top)
       end if
+      ! Not by the error: a maximum passes over what is no number.
+      if (.not. sum(abs(gaps)) <= huge(error)) then
+        status = merge(GAVE_UP, OVERFLOW, sum(abs(x)) <= huge(error))
+        n_steps = 2.0_dp*n_steps
+        cycle
+      end if
+      status = GAVE_UP
       gaps(:, 1) = gaps(:, 1)/GAIN
       far = max(1.0_dp/(GAIN*(GAIN + 1.0_dp)), aim/FARTHEST)
       error = max(maxval(abs(gaps(:, 1)*motion%scale)), far*maxval(abs(gaps(:, 2)*motion%scale))) &
               /maxval(abs(top*motion%scale))
       if (error <= aim .or. all(abs(gaps) <= 0.0_dp)) exit
-      if (error <= huge(error)) then
-        n_steps = 4.0_dp + n_steps*min(8.0_dp, 1.1_dp*sqrt(sqrt(error/aim)))
-        if (varies .and. motion%resolved < motion%waves) then
-          faint = faint*min(0.1_dp, 0.1_dp*aim/error)
-          call average(motion, rate, t_end, faint, left_out)
-          n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
-          most = max(most, MOST_TIMES*steps_for_waves(motion, t_end, aim))
-        end if
-      else
-        n_steps = 4.0_dp*n_steps
+      n_steps = 4.0_dp + n_steps*min(8.0_dp, 1.1_dp*sqrt(sqrt(error/aim)))
+      if (varies .and. motion%resolved < motion%waves) then
+        faint = faint*min(0.1_dp, 0.1_dp*aim/error)
+        call average(motion, rate, t_end, faint, left_out)
+        n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
+        most = min(MOST_STEPS, max(most, MOST_TIMES*steps_for_waves(motion, t_end, aim)))
       end if
     end do
-    if (tries > MOST_TRIES) then
-      status = merge(GAVE_UP, OVERFLOW, error <= huge(error))
-      return
-    end if
     x = x + gaps(:, 1)
     if (varies) x = x + integral(motion, t_end)
     result(motion%axes) = x*motion%scale

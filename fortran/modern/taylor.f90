@@ -13,6 +13,7 @@ module taylor
   integer, parameter :: MOST_TRIES = 60
   real(dp), parameter :: HOPELESS = 10.0_dp*MOST_STEPS ! steps of the first one's length
   real(dp), parameter :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
+  real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass: orders that vary cost time
 
   type :: series_t
@@ -211,8 +212,10 @@ contains
     real(dp) :: push                        ! largest torque over moment, 1/s2
     real(dp) :: gain                        ! speed that torques may add, rad/s
     real(dp) :: rate                        ! 1/s
+    real(dp) :: turned                      ! by the waves, rad
     integer :: n
 
+    turned = 0.0_dp
     coupling = max(abs(coefficients(1)), abs(coefficients(2)), abs(coefficients(3)))
     push = max(abs(torque%constant(1)), abs(torque%constant(2)), abs(torque%constant(3)))
     gain = 0.5_dp*push*abs(time)
@@ -223,34 +226,37 @@ contains
       rate = rate + sqrt(coupling*push*abs(time))
     end if
     do n = 1, torque%n_sines
-      call add_wave_rates(torque%sines(:, n), coupling, time, gain, rate)
+      call add_wave_rates(torque%sines(:, n), coupling, time, gain, rate, turned)
     end do
     do n = 1, torque%n_cosines
-      call add_wave_rates(torque%cosines(:, n), coupling, time, gain, rate)
+      call add_wave_rates(torque%cosines(:, n), coupling, time, gain, rate, turned)
     end do
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
     ! An error turns into one of phase and grows with it; the weights are from the seven cases and
     ! from random scenes.
-    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain))
+    ! Waves ask for more steps, and those may all err alike.
+    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain) + ALIKE*turned)
     share = max(share, LEAST_SHARE)
     best = order_for(share, varies)
     most = min(best + 4, MOST_ORDER)
   end subroutine plan
 
-  pure subroutine add_wave_rates(wave, coupling, time, gain, rate)
+  pure subroutine add_wave_rates(wave, coupling, time, gain, rate, turned)
     !! What a wave of torque adds to the speed that may be gained, and to the rate of change.
     real(dp), intent(in) :: wave(4)         !! amplitude (3) in 1/s2, frequency in rad/s
     real(dp), intent(in) :: coupling
     real(dp), intent(in) :: time            !! to go, s
     real(dp), intent(inout) :: gain         !! rad/s
     real(dp), intent(inout) :: rate         !! 1/s
+    real(dp), intent(inout) :: turned       !! rad
     real(dp) :: push                        ! 1/s2
 
     push = max(abs(wave(1)), abs(wave(2)), abs(wave(3)))
     if (push > 0.0_dp) then
       gain = gain + push*abs(time)/(1.0_dp + abs(wave(4)*time))
       rate = rate + sqrt(coupling*push) + abs(wave(4))
+      turned = turned + abs(wave(4)*time)
     end if
   end subroutine add_wave_rates
 

@@ -14,6 +14,9 @@ module taylor
   real(dp), parameter :: HOPELESS = 10.0_dp*MOST_STEPS ! steps of the first one's length
   real(dp), parameter :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
   real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
+  real(dp), parameter :: PLANNED = 5.0_dp ! growth of a difference that the share allows for
+  real(dp), parameter :: SAFETY = 4.0_dp  ! one difference may miss where others grow
+  real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass: orders that vary cost time
 
   type :: series_t
@@ -54,6 +57,38 @@ contains
     integer(c_int), intent(out) :: n_rows
     integer(c_int), intent(out) :: status               !! 0 complete, 2 overflow, 4 gave up
     integer(c_int), intent(out) :: steps
+    real(dp) :: growth  ! of a small difference on the way
+    real(dp) :: known   ! the same, as far as it was reckoned with
+
+    known = PLANNED
+    do
+      call march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, &
+                 tolerance*(PLANNED/known), n_times, times, rows, n_rows, status, steps, growth)
+      if (growth <= known .or. status /= COMPLETE) return
+      ! What a step errs grew: once more, with less of it.
+      known = SAFETY*growth
+    end do
+  end subroutine taylor_solve
+
+  subroutine march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                          omega, tolerance, n_times, times, rows, n_rows, status, steps, growth)
+    !! Once from 0 to the last of the times.
+    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
+    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
+    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
+    integer(c_int), intent(in), value :: n_sines
+    real(c_double), intent(in), target :: sines(4, n_sines)     !! amplitude (3), frequency in rad/s
+    integer(c_int), intent(in), value :: n_cosines
+    real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
+    real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
+    real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
+    integer(c_int), intent(in), value :: n_times
+    real(c_double), intent(in) :: times(n_times)        !! s
+    real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
+    integer(c_int), intent(out) :: n_rows
+    integer(c_int), intent(out) :: status               !! 0 complete, 2 overflow, 4 gave up
+    integer(c_int), intent(out) :: steps
+    real(dp), intent(out) :: growth !! of a small difference; looked at where the torque varies
     type(series_t) :: s
     type(torque_t) :: torque
     real(dp) :: w(3)          ! omega at the step's beginning, rad/s
@@ -69,6 +104,9 @@ contains
     real(dp) :: scale         ! largest |omega| so far, rad/s
     real(dp) :: share         ! part of the scale that the last terms may have
     real(dp) :: allowed       ! the same in rad/s
+    real(dp) :: difference(3) ! of a motion beside this one
+    real(dp) :: least_difference
+    real(dp) :: size
     logical :: varies         ! torque with time
     logical :: at_end
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
@@ -81,6 +119,8 @@ contains
     n_rows = 0
     steps = 0
     status = COMPLETE
+    growth = 1.0_dp
+    difference = ASIDE
     w = omega
     w_low = 0.0_dp
     t = 0.0_dp
@@ -98,6 +138,7 @@ contains
     torque%sines => sines
     torque%cosines => cosines
     varies = n_sines + n_cosines > 0 .or. any(m_rate /= 0.0_dp)
+    least_difference = merge(1.0_dp, huge(size), varies)
     scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
     call plan(coefficients, torque, varies, scale, tolerance, rest, best, most, share, h)
     best_share = 65536/best
@@ -174,6 +215,15 @@ contains
       total = w + change
       back = total - w
       w_low = (w - (total - back)) + (change - back)
+      if (varies) then
+        call carry(coefficients, (0.25_dp*h)*(w + total), difference)
+        size = max(abs(difference(1)), abs(difference(2)), abs(difference(3)))
+      else
+        ! Its own change is a small difference too, and known; over what grows with the torque.
+        size = max(abs(s%left(2, 1)), abs(s%left(1, 1)), abs(s%right(1, 1)))/(abs(h)*scale*scale)
+      end if
+      if (size < least_difference) least_difference = size
+      if (size > growth*least_difference) growth = size/least_difference
       w = total
       steps = steps + 1
       tries = 1
@@ -194,7 +244,32 @@ contains
         return
       end if
     end do
-  end subroutine taylor_solve
+  end subroutine march
+
+  pure subroutine carry(coefficients, half, difference)
+    !! A small difference of two motions over a step, by the implicit midpoint rule.
+    real(dp), intent(in) :: coefficients(3) !! A, B, C
+    real(dp), intent(in) :: half(3)         !! half the step times omega in its middle, rad
+    real(dp), intent(inout) :: difference(3)
+    real(dp) :: a2, a3, b1, b3, c1, c2      ! the products' derivatives, times half the step
+    real(dp) :: x, y, z
+    real(dp) :: determinant
+
+    a2 = coefficients(1)*half(2)
+    a3 = coefficients(1)*half(3)
+    b1 = coefficients(2)*half(1)
+    b3 = coefficients(2)*half(3)
+    c1 = coefficients(3)*half(1)
+    c2 = coefficients(3)*half(2)
+    x = difference(1) + a3*difference(2) + a2*difference(3)
+    y = difference(2) + b3*difference(1) + b1*difference(3)
+    z = difference(3) + c2*difference(1) + c1*difference(2)
+    determinant = 1.0_dp - a3*b3 - a2*c2 - b1*c1 - a3*b1*c2 - a2*b3*c1
+    determinant = sign(max(0.1_dp, abs(determinant)), determinant)
+    difference(1) = ((1.0_dp - b1*c1)*x + (a3 + a2*c1)*y + (a2 + a3*b1)*z)/determinant
+    difference(2) = ((b3 + b1*c2)*x + (1.0_dp - a2*c2)*y + (b1 + a2*b3)*z)/determinant
+    difference(3) = ((c2 + b3*c1)*x + (c1 + a3*c2)*y + (1.0_dp - a3*b3)*z)/determinant
+  end subroutine carry
 
   pure subroutine plan(coefficients, torque, varies, scale, tolerance, time, best, most, share, h)
     !! Order from the tolerance, the first step from the rates of the problem.

@@ -19,7 +19,7 @@ module scaled_runge_kutta
   real(dp), parameter :: LEAST_STEPS = 2.0_dp
   real(dp), parameter :: THIRD_PART = 1.0_dp/3.0_dp
   real(dp), parameter :: GAIN = 15.0_dp
-  real(dp), parameter :: FARTHEST = 0.25_dp  ! gap of the longest steps, relative
+  real(dp), parameter :: FARTHEST = 0.15_dp  ! gap of the longest steps, relative
   real(dp), parameter :: COARSEST = 0.004_dp ! aim with which steps are so long that they say little
   real(dp), parameter :: SHARE = 0.35_dp      ! of the tolerance: what is not seen takes the rest
   ! Start of the longer steps, in errors of averaging; along no axis of growth.

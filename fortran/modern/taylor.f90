@@ -14,8 +14,9 @@ module taylor
   real(dp), parameter :: HOPELESS = 10.0_dp*MOST_STEPS ! steps of the first one's length
   real(dp), parameter :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
   real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
-  real(dp), parameter :: PLANNED = 5.0_dp ! growth of a difference that the share allows for
-  real(dp), parameter :: SAFETY = 4.0_dp  ! one difference may miss where others grow
+  real(dp), parameter :: PLANNED = 3.0_dp ! growth of a difference that the share allows for
+  real(dp), parameter :: SAFETY = 10.0_dp  ! one difference may miss where others grow
+  real(dp), parameter :: ROUNDING = 2e-16_dp ! relative
   real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass: orders that vary cost time
 
@@ -64,7 +65,7 @@ contains
     do
       call march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, &
                  tolerance*(PLANNED/known), n_times, times, rows, n_rows, status, steps, growth)
-      if (growth <= known .or. status /= COMPLETE) return
+      if (growth <= known .or. status /= COMPLETE .or. tolerance*(PLANNED/known) < ROUNDING) return
       ! What a step errs grew: once more, with less of it.
       known = SAFETY*growth
     end do
@@ -106,6 +107,7 @@ contains
     real(dp) :: allowed       ! the same in rad/s
     real(dp) :: difference(3) ! of a motion beside this one
     real(dp) :: least_difference
+    real(dp) :: roots(3)      ! times omega: rates, 1/s, in which the products are alike
     real(dp) :: size
     logical :: varies         ! torque with time
     logical :: at_end
@@ -139,6 +141,9 @@ contains
     torque%cosines => cosines
     varies = n_sines + n_cosines > 0 .or. any(m_rate /= 0.0_dp)
     least_difference = merge(1.0_dp, huge(size), varies)
+    roots(1) = sqrt(abs(coefficients(2)*coefficients(3)))
+    roots(2) = sqrt(abs(coefficients(1)*coefficients(3)))
+    roots(3) = sqrt(abs(coefficients(1)*coefficients(2)))
     scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
     call plan(coefficients, torque, varies, scale, tolerance, rest, best, most, share, h)
     best_share = 65536/best
@@ -220,7 +225,8 @@ contains
         size = max(abs(difference(1)), abs(difference(2)), abs(difference(3)))
       else
         ! Its own change is a small difference too, and known; over what grows with the torque.
-        size = max(abs(s%left(2, 1)), abs(s%left(1, 1)), abs(s%right(1, 1)))/(abs(h)*scale*scale)
+        size = max(roots(1)*abs(s%left(2, 1)), roots(2)*abs(s%left(1, 1)), &
+                   roots(3)*abs(s%right(1, 1)))/(abs(h)*(scale*scale))
       end if
       if (size < least_difference) least_difference = size
       if (size > growth*least_difference) growth = size/least_difference

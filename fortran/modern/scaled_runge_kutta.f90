@@ -1,6 +1,6 @@
 module scaled_runge_kutta
   !! Classical Runge-Kutta (eq. 31) for few digits: unknowns scaled so that a slope is one fused
-  !! multiply-add, waves of the torque integrated exactly, equal steps, checked as they are taken.
+  !! multiply-add, waves of the torque integrated exactly, equal steps of three lengths side by side.
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
@@ -9,19 +9,19 @@ module scaled_runge_kutta
   private
 
   integer, parameter :: MOST_WAVES = 8
+  integer, parameter :: EXACT_AGAIN = 64     ! fours of steps until sine and cosine are made afresh
+  real(dp), parameter :: THIRD_PART = 1.0_dp/3.0_dp
+  real(dp), parameter :: LEAST_STEPS = 2.0_dp
+  real(dp), parameter :: MOST_STEPS = 2e6_dp
   ! Beyond so many times the steps planned, the motion makes more of rounding than is allowed.
   real(dp), parameter :: MOST_TIMES = 12.0_dp
-  integer, parameter :: EXACT_AGAIN = 64     ! steps until sine and cosine are computed afresh
-  real(dp), parameter :: MOST_STEPS = 2e6_dp
-  ! Error after time T: about SPREAD (rate h)**4 rate T; from the cases, see tests/test_quick.py.
+  ! Error after time T: about FIRST_GUESS (rate h)**4 rate T; from the cases.
   real(dp), parameter :: FIRST_GUESS = 0.0022_dp
+  real(dp), parameter :: COARSEST = 0.004_dp ! aim for which steps are so long that they say little
   ! Steps of twice the length err 16 times as much: the gap is 15 times the error that is left.
-  real(dp), parameter :: LEAST_STEPS = 2.0_dp
-  real(dp), parameter :: THIRD_PART = 1.0_dp/3.0_dp
   real(dp), parameter :: GAIN = 15.0_dp
   real(dp), parameter :: FARTHEST = 0.15_dp  ! gap of the longest steps, relative
-  real(dp), parameter :: COARSEST = 0.004_dp ! aim with which steps are so long that they say little
-  real(dp), parameter :: SHARE = 0.35_dp      ! of the tolerance: what is not seen takes the rest
+  real(dp), parameter :: SHARE = 0.35_dp     ! of the tolerance: two gaps may be small by chance
   ! Start of the longer steps, in errors of averaging; along no axis of growth.
   real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
   ! Against the series, in steps of this method for a radian of motion: so many, and so many more
@@ -32,7 +32,7 @@ module scaled_runge_kutta
   real(dp), parameter :: VARYING = 1.5_dp    ! cost of a step under a torque of time
   real(dp), parameter :: A_WAVE = 0.9_dp     ! and of each wave in it
   real(dp), parameter :: FAST = 8.0_dp       ! frequency of a wave over the rate of the motion
-  real(dp), parameter :: WEAK = 0.5_dp
+  real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging, of the aim
   real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that counts
   real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! of Simpson's rule, times radians**4
 
@@ -47,8 +47,7 @@ module scaled_runge_kutta
     real(dp) :: on_versine(3, MOST_WAVES) ! and these times 1 - cosine
     real(dp) :: mean(3)      ! of the waves that are averaged, in the unknowns
     real(dp) :: push(3)      ! mean of their products, 1/s2
-    logical :: odd           ! the second sign is minus, as for a body
-    real(dp) :: sign_2       ! that sign
+    real(dp) :: sign_2       ! of the second product: -1 for a body
     integer :: axes(3)       ! of the body
   end type motion_t
 
@@ -100,7 +99,8 @@ contains
     steps = 0
     result = omega
     if (n_sines + n_cosines > MOST_WAVES) return
-   call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, motion, status)
+    call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                motion, status)
     if (status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale
     rate_0 = max(abs(start(1)), abs(start(2)), abs(start(3)))
@@ -193,8 +193,7 @@ contains
     if (coefficients(1)*coefficients(2) > 0.0_dp) motion%axes = [2, 3, 1]
     if (coefficients(1)*coefficients(3) > 0.0_dp) motion%axes = [1, 2, 3]
     c = coefficients(motion%axes)
-    motion%odd = c(1)*c(2) < 0.0_dp
-    motion%sign_2 = merge(-1.0_dp, 1.0_dp, motion%odd)
+    motion%sign_2 = merge(-1.0_dp, 1.0_dp, c(1)*c(2) < 0.0_dp)
     turned = 1.0_dp
     if (c(1) < 0.0_dp) turned = -1.0_dp
     root = sqrt(abs(c))

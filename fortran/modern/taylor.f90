@@ -72,7 +72,7 @@ contains
   end subroutine taylor_solve
 
   subroutine march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                          omega, tolerance, n_times, times, rows, n_rows, status, steps, growth)
+                   omega, tolerance, n_times, times, rows, n_rows, status, steps, growth)
     !! Once from 0 to the last of the times.
     real(c_double), intent(in) :: coefficients(3)       !! A, B, C
     real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2

@@ -26,7 +26,7 @@ module scaled_motion
     integer :: axes(3)       ! of the body
   end type motion_t
 
-  public :: average, integral, scaled, size_of, steps_for_waves, turn, turned
+  public :: average, integral, scaled, size_of, steps_for_waves, turned
 
 contains
 
@@ -202,33 +202,6 @@ contains
 
     size_of = maxval(abs(motion%on_sine(:, n))) + maxval(abs(motion%on_versine(:, n)))
   end function size_of
-
-  pure subroutine turn(motion, t, afresh, turn_sine, turn_cosine, sine, cosine, s)
-    !! Waves half a step on, and the integral of the torque there.
-    type(motion_t), intent(in) :: motion
-    real(dp), intent(in) :: t                        !! s
-    logical, intent(in) :: afresh                    !! from t, not from half a step before
-    real(dp), intent(in) :: turn_sine(MOST_WAVES)    !! of half a step
-    real(dp), intent(in) :: turn_cosine(MOST_WAVES)
-    real(dp), intent(inout) :: sine(MOST_WAVES)
-    real(dp), intent(inout) :: cosine(MOST_WAVES)
-    real(dp), intent(out) :: s(3)
-    real(dp) :: held
-    integer :: n
-
-    s = motion%mean + t*(motion%slope + (0.5_dp*t)*motion%climb)
-    do n = 1, motion%resolved
-      if (afresh) then
-        sine(n) = sin(motion%frequency(n)*t)
-        cosine(n) = cos(motion%frequency(n)*t)
-      else
-        held = sine(n)*turn_cosine(n) + cosine(n)*turn_sine(n)
-        cosine(n) = cosine(n)*turn_cosine(n) - sine(n)*turn_sine(n)
-        sine(n) = held
-      end if
-      s = s + (motion%on_sine(:, n)*sine(n) + motion%on_versine(:, n)*(1.0_dp - cosine(n)))
-    end do
-  end subroutine turn
 
   pure function integral(motion, t) result(s)
     !! The whole torque's integral from 0 to t, in the unknowns.

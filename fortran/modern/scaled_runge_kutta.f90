@@ -5,7 +5,7 @@ module scaled_runge_kutta
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use scaled_motion, only: average, integral, MOST_WAVES, motion_t, scaled, size_of, &
-                           steps_for_waves, turn, turned
+                           steps_for_waves, turned
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
   implicit none(type, external)
   private
@@ -399,5 +399,32 @@ contains
     gaps(:, 2) = y(:, 1) - y(:, 2)
     if (motion%resolved < motion%waves) x = x + turned(motion, x + s(:, 8), t_end)
   end subroutine march_varying
+
+  pure subroutine turn(motion, t, afresh, turn_sine, turn_cosine, sine, cosine, s)
+    !! Waves half a step on, and the integral of the torque there.
+    type(motion_t), intent(in) :: motion
+    real(dp), intent(in) :: t                        !! s
+    logical, intent(in) :: afresh                    !! from t, not from half a step before
+    real(dp), intent(in) :: turn_sine(MOST_WAVES)    !! of half a step
+    real(dp), intent(in) :: turn_cosine(MOST_WAVES)
+    real(dp), intent(inout) :: sine(MOST_WAVES)
+    real(dp), intent(inout) :: cosine(MOST_WAVES)
+    real(dp), intent(out) :: s(3)
+    real(dp) :: held
+    integer :: n
+
+    s = motion%mean + t*(motion%slope + (0.5_dp*t)*motion%climb)
+    do n = 1, motion%resolved
+      if (afresh) then
+        sine(n) = sin(motion%frequency(n)*t)
+        cosine(n) = cos(motion%frequency(n)*t)
+      else
+        held = sine(n)*turn_cosine(n) + cosine(n)*turn_sine(n)
+        cosine(n) = cosine(n)*turn_cosine(n) - sine(n)*turn_sine(n)
+        sine(n) = held
+      end if
+      s = s + (motion%on_sine(:, n)*sine(n) + motion%on_versine(:, n)*(1.0_dp - cosine(n)))
+    end do
+  end subroutine turn
 
 end module scaled_runge_kutta

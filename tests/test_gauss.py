@@ -15,6 +15,7 @@ from pyharness.kernels import extension, normalized
 from pyharness.methods import METHODS, solve
 from pyharness.reference import reference
 from pyharness.trajectory import Array
+from tests.random_scenes import NASTY
 
 _MAKER = Path(__file__).parent.parent / "fortran/make_gauss.py"
 _STAGES = range(1, 9)
@@ -144,3 +145,15 @@ def test_same_bits_from_many_threads() -> None:
         first, *others = pool.map(run, range(40))
     for other in others:
         np.testing.assert_array_equal(first, other)
+
+
+@pytest.mark.parametrize("kind", ["from rest", "nearly symmetric"])
+def test_long_steps_of_high_order_are_not_trusted(kind: str) -> None:
+    """Two solutions whose steps are too long for the order to show say less than it promises."""
+    generator = np.random.default_rng(8)
+    for _ in range(25):
+        scene, t_end = NASTY[kind](generator)
+        truth = solve(scene, [t_end], "taylor", 1e-14).omega[0]
+        found = solve(scene, [t_end], "gauss-8", 1e-10).omega[0]
+        scale = max(np.abs(truth).max(), *map(abs, scene.omega))
+        assert np.abs(found - truth).max() <= 1e-10 * scale

@@ -147,10 +147,18 @@ def test_same_bits_from_many_threads() -> None:
         np.testing.assert_array_equal(first, other)
 
 
-@pytest.mark.parametrize("kind", ["from rest", "nearly symmetric"])
-def test_long_steps_of_high_order_are_not_trusted(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [
+        ("nearly symmetric", 8),
+        ("from rest", 16),
+        ("nearly symmetric", 10),
+        ("nearly symmetric", 18),
+    ],
+)
+def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
     """Two solutions whose steps are too long for the order to show say less than it promises."""
-    generator = np.random.default_rng(8)
+    generator = np.random.default_rng(seed)
     for _ in range(25):
         scene, t_end = NASTY[kind](generator)
         truth = solve(scene, [t_end], "taylor", 1e-14).omega[0]

@@ -19,6 +19,7 @@ MOST_STAGES = 8
 
 # Right-hand sides of all trial steps of Gauss collocation together, some ten seconds.
 _MOST_EVALUATIONS = 200_000_000
+_ORDER_THAT_SHOWS = 8
 # Two solutions that differ by so many units in the last place will not get closer.
 _ROUNDING = 16 * 2.0**-53
 # Of the range of numbers (rad/s): a solution that reached it twice leaves it.
@@ -86,7 +87,8 @@ def gauss(stages: int) -> Solver:
     """Return the solver by Gauss collocation, steps halved until two solutions agree.
 
     The error of the finer one is taken to be their difference over ratio**order - 1, where their
-    steps differ by that ratio, and twice that for safety.
+    steps differ by that ratio, and twice that for safety. No more than order 8 is counted on: steps
+    of high order are long, and the coarser ones too long for the order to show.
     """
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
@@ -115,7 +117,8 @@ def gauss(stages: int) -> Solver:
                 scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
                 # Where an interval has as many steps as before, the difference tells nothing.
-                known = float((counts / previous).min(initial=2.0)) ** (2 * stages) - 1.0
+                ratio = float((counts / previous).min(initial=2.0))
+                known = ratio ** min(2 * stages, _ORDER_THAT_SHOWS) - 1.0
                 allowed = max(tolerance * scale * known / 2.0, _ROUNDING * scale)
                 close = known > 0.0 and difference <= allowed
                 if (close and found.status == COMPLETE) or found.blows_up(before, start):

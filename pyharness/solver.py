@@ -117,7 +117,8 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
         A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
     tolerance : float
         Largest error at the end over the largest angular velocity on the way; the methods with
-        a fixed step do not look at it.
+        a fixed step do not look at it. Where small differences grow by a factor K on the way, no
+        method keeps less than some 1e-15 K.
 
     Returns
     -------

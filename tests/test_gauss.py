@@ -15,6 +15,7 @@ from pyharness.kernels import extension, normalized
 from pyharness.methods import METHODS, solve
 from pyharness.reference import reference
 from pyharness.trajectory import Array
+from tests.random_scenes import NASTY
 
 _MAKER = Path(__file__).parent.parent / "fortran/make_gauss.py"
 _STAGES = range(1, 9)
@@ -165,3 +166,23 @@ def test_body_at_rest_is_driven_to_a_relative_error() -> None:
     truth = reference(scene, [1.0])
     found = solve(scene, [1.0], "gauss-2", 1e-8)
     assert np.abs(found.omega - truth.omega).max() <= 1e-8 * np.abs(truth.omega).max()
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [
+        ("nearly symmetric", 8),
+        ("from rest", 16),
+        ("nearly symmetric", 10),
+        ("nearly symmetric", 18),
+    ],
+)
+def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
+    """Two solutions whose steps are too long for the order to show say less than it promises."""
+    generator = np.random.default_rng(seed)
+    for _ in range(25):
+        scene, t_end = NASTY[kind](generator)
+        truth = solve(scene, [t_end], "taylor", 1e-14).omega[0]
+        found = solve(scene, [t_end], "gauss-8", 1e-10).omega[0]
+        scale = max(np.abs(truth).max(), *map(abs, scene.omega))
+        assert np.abs(found - truth).max() <= 1e-10 * scale

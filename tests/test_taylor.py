@@ -18,6 +18,7 @@ from pyharness.reference import Reference, reference
 from pyharness.scene import TorqueLaw
 from pyharness.trajectory import Array
 from tests.instruction_sets import BEST, level_here
+from tests.random_scenes import NASTY
 
 FORTRAN = Path(__file__).parent.parent / "fortran"
 RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
@@ -89,6 +90,34 @@ def test_any_torque_law_either_way(name: str, time: float) -> None:
         omega, status, _ = _end(SCENES[name], time, tolerance)
         assert status == 0
         assert _error(omega, truth) <= tolerance
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-6, 1e-9, 1e-12, 1e-14])
+@pytest.mark.parametrize(("frequency", "time"), [(242.25, 70.5), (1000.3, 60.0)])
+def test_thousands_of_turns_of_a_wave(frequency: float, time: float, tolerance: float) -> None:
+    """What each step errs adds up, and so does what the rounding of a phase costs."""
+    law = TorqueLaw(sines=(((2.0, -1.0, 6.0), frequency),))
+    scene = Scene("", (0.3, -1.0, 0.5), moments=(2.0, 2.0, 2.0), torque=law)
+    omega, status, _ = _end(scene, time, tolerance)
+    assert status == 0
+    assert _error(omega, reference(scene, [time]).omega[0]) <= tolerance
+
+
+@pytest.mark.parametrize("kind", NASTY)
+def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
+    """Where a small difference grows the series takes smaller errors by itself."""
+    generator = np.random.default_rng([3, list(NASTY).index(kind)])
+    for number in range(60):
+        scene, time = NASTY[kind](generator)
+        times = np.linspace(0.0, time, 33)[1:]
+        truth, n_rows, _, _ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-14)
+        if n_rows < len(times):
+            continue
+        scale = max(np.abs(truth).max(), max(map(abs, scene.omega)))
+        for tolerance in (1e-3, 1e-6, 1e-9):
+            omega, _, _ = _end(scene, time, tolerance)
+            error = np.abs(omega - truth[:, -1]).max() / scale
+            assert error <= tolerance, f"{kind} {number} to {tolerance:g}"
 
 
 @pytest.mark.parametrize("name", ["case 2", "case 3", "case 4", "case 5", "case 6"])

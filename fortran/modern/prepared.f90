@@ -40,6 +40,8 @@ module prepared
   ! solution is an ordinary number.
   real(dp), parameter :: LARGE = 2.0_dp**300
   integer, parameter :: MOST_POWER = 1000
+  ! With few digits the series' own tolerance is cheap, and its estimate of growth is coarse.
+  real(dp), parameter :: AUTO_SHARE = 0.25_dp
 
   public :: solve_prepared
 
@@ -131,6 +133,7 @@ contains
     real(dp) :: times(1)
     real(dp) :: rows(3, 1)
     real(dp) :: reached(4)
+    real(dp) :: tolerance_left
     integer :: sines
     integer :: cosines
     integer :: cosines_at
@@ -153,14 +156,16 @@ contains
       omega = rows(:, 1)
     case (SERIES, QUICK, QUICK_OR_SERIES)
       ended = REFUSED
+      tolerance_left = packed(TOLERANCE)
       if (int(packed(METHOD)) /= SERIES) then
+        tolerance_left = AUTO_SHARE*tolerance_left
         call quick_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
                          t_end, int(packed(METHOD)) - QUICK, omega, ended, count)
       end if
       if (ended /= COMPLETE .and. int(packed(METHOD)) /= QUICK) then
         call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
+                          packed(WAVES), cosines, packed(cosines_at), omega0, tolerance_left, &
                           1, times, rows, n_rows, ended, count)
         omega = rows(:, 1)
       end if

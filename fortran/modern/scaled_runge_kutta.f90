@@ -1,24 +1,30 @@
 module scaled_runge_kutta
   !! Classical Runge-Kutta (eq. 31) for few digits: unknowns scaled so that a slope is one fused
-  !! multiply-add, waves of the torque integrated exactly, equal steps, checked as they are taken.
+  !! multiply-add, waves of the torque integrated exactly, equal steps of three lengths at once.
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
+  use scaled_motion, only: average, integral, MOST_WAVES, motion_t, scaled, size_of, &
+                           steps_for_waves, turned
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
   implicit none(type, external)
   private
 
-  integer, parameter :: MOST_WAVES = 8
-  integer, parameter :: MOST_TRIES = 40
-  integer, parameter :: EXACT_AGAIN = 64     ! steps until sine and cosine are computed afresh
-  real(dp), parameter :: LEAST_STEPS = 4.0_dp ! fewer seams say too little
-  real(dp), parameter :: MOST_STEPS = 1e7_dp
-  ! Error after time T: about SPREAD (rate h)**4 rate T; from the cases, see tests/test_quick.py.
-  real(dp), parameter :: FIRST_GUESS = 0.003_dp
-  ! Of the change of slope at the seams of steps, what the error is at the most.
-  real(dp), parameter :: SEAM = 0.13_dp
-  real(dp), parameter :: SHARE = 0.5_dp      ! of the tolerance: what is not seen takes the rest
-  real(dp), parameter :: ENOUGH = 0.75_dp    ! of the aim, where the seams are looked at
+  integer, parameter :: EXACT_AGAIN = 64     ! fours of steps until sine and cosine are made afresh
+  real(dp), parameter :: THIRD_PART = 1.0_dp/3.0_dp
+  real(dp), parameter :: LEAST_STEPS = 2.0_dp
+  real(dp), parameter :: MOST_STEPS = 2e6_dp
+  ! Beyond so many times the steps planned, the motion makes more of rounding than is allowed.
+  real(dp), parameter :: MOST_TIMES = 12.0_dp
+  ! Error after time T: about FIRST_GUESS (rate h)**4 rate T; from the cases.
+  real(dp), parameter :: FIRST_GUESS = 0.0022_dp
+  real(dp), parameter :: COARSEST = 0.004_dp ! aim for which steps are so long that they say little
+  ! Steps of twice the length err 16 times as much: the gap is 15 times the error that is left.
+  real(dp), parameter :: GAIN = 15.0_dp
+  real(dp), parameter :: FARTHEST = 0.15_dp  ! gap of the longest steps, relative
+  real(dp), parameter :: SHARE = 0.35_dp     ! of the tolerance: two gaps may be small by chance
+  ! Start of the longer steps, in errors of averaging; along no axis of growth.
+  real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
   ! Against the series, in steps of this method for a radian of motion: so many, and so many more
   ! for each binary digit: measured in Cases 5 to 7.
   real(dp), parameter :: SERIES_STEPS = 1.9_dp
@@ -26,23 +32,7 @@ module scaled_runge_kutta
   real(dp), parameter :: WAVE_RADIAN = 0.4_dp ! of a wave, in radians of motion, to the series
   real(dp), parameter :: VARYING = 1.5_dp    ! cost of a step under a torque of time
   real(dp), parameter :: A_WAVE = 0.9_dp     ! and of each wave in it
-  real(dp), parameter :: FAST = 8.0_dp       ! frequency of a wave over the rate of the motion
-  real(dp), parameter :: WEAK = 0.2_dp
-  real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that counts
-  real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! of Simpson's rule, times radians**4
-
-  type :: motion_t
-    real(dp) :: scale(3)     ! angular velocity is scale times unknown, rad/s
-    real(dp) :: slope(3)     ! constant torque in the unknowns, 1/s
-    real(dp) :: climb(3)     ! rate of the torque, 1/s2
-    integer :: waves
-    real(dp) :: frequency(MOST_WAVES)    ! rad/s
-    real(dp) :: on_sine(3, MOST_WAVES)   ! integral of the wave: these times sine
-    real(dp) :: on_versine(3, MOST_WAVES) ! and these times 1 - cosine
-    real(dp) :: mean(3)      ! of the waves that are averaged, in the unknowns
-    logical :: odd           ! the second sign is minus, as for a body
-    integer :: axes(3)       ! of the body
-  end type motion_t
+  real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging, of the aim
 
   public :: quick_solve
 
@@ -67,25 +57,24 @@ contains
     integer(c_int), intent(out) :: status               !! COMPLETE, OVERFLOW, REFUSED, GAVE_UP
     integer(c_int), intent(out) :: steps                !! of the last try
     type(motion_t) :: motion
-    type(motion_t) :: whole  ! with the waves that are averaged
     logical :: varies
     real(dp) :: start(3)
     real(dp) :: x(3)
-    real(dp) :: seams        ! sum of the changes of slope times step
+    real(dp) :: gaps(3, 2)   ! between steps of one length and of the next
+    real(dp) :: top(3)       ! largest unknowns
     real(dp) :: rate         ! 1/s
     real(dp) :: rate_0       ! the same at time 0
     real(dp) :: power_5      ! mean of the fifth power of the rate, which grows with the torque
     real(dp) :: n_steps
-    real(dp) :: h            ! s
+    real(dp) :: most         ! steps
     real(dp) :: aim          ! error, relative
+    real(dp) :: faint        ! what averaging may cost, rad/s
+    real(dp) :: left_out     ! what it costs, in the unknowns
     real(dp) :: error        ! relative
-    real(dp) :: size         ! of the unknowns, 1/s
-    real(dp) :: wave         ! what it adds to the unknowns, times time
-    real(dp) :: resolved     ! steps for a radian of it
+    real(dp) :: far          ! what the second gap says of the error
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: cost         ! in steps under constant torque
     real(dp) :: bits         ! of the tolerance
-    integer :: tries
     integer :: n
 
     aim = SHARE*tolerance
@@ -93,7 +82,8 @@ contains
     steps = 0
     result = omega
     if (n_sines + n_cosines > MOST_WAVES) return
-   call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, motion, status)
+    call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                motion, status)
     if (status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale
     rate_0 = max(abs(start(1)), abs(start(2)), abs(start(3)))
@@ -105,292 +95,309 @@ contains
     end do
     power_5 = rate**5
     if (rate > 1.1_dp*rate_0) power_5 = (rate**6 - rate_0**6)/(6.0_dp*(rate - rate_0))
-    n_steps = LEAST_STEPS + abs(t_end)*sqrt(sqrt(FIRST_GUESS*power_5*abs(t_end)/aim))
+    n_steps = LEAST_STEPS + abs(t_end)*sqrt(sqrt(FIRST_GUESS*power_5*abs(t_end) &
+                                                 /min(aim, COARSEST)))
     varies = motion%waves > 0 .or. any(abs(motion%climb) > 0.0_dp)
-    whole = motion
-    call average(motion, rate, aim)
-    do n = 1, motion%waves
-      ! What is left of the waves has to be resolved.
-      wave = size_of(motion, n)*abs(t_end)
-      resolved = max(RESOLVED_STEPS, sqrt(sqrt(WAVE_ERROR*wave/aim)))
-      n_steps = max(n_steps, resolved*abs(motion%frequency(n)*t_end))
-    end do
+    faint = WEAK*aim*max(abs(omega(1)), abs(omega(2)), abs(omega(3)))
+    if (varies) then
+      call average(motion, rate, t_end, faint, left_out)
+      n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
+    end if
     if (contest /= 0) then
       radians = 0.5_dp*abs(t_end)*(rate_0 + rate)
-      do n = 1, whole%waves
-        radians = radians + WAVE_RADIAN*abs(whole%frequency(n)*t_end)
+      do n = 1, motion%waves
+        radians = radians + WAVE_RADIAN*abs(motion%frequency(n)*t_end)
       end do
       cost = n_steps
-      if (varies) cost = n_steps*(VARYING + A_WAVE*motion%waves)
+      if (varies) cost = n_steps*(VARYING + A_WAVE*motion%resolved)
       bits = 1023.0_dp - real(ishft(transfer(aim, 0_int64), -52), dp)
       if (cost > 10.0_dp + radians*(SERIES_STEPS + SERIES_STEPS_A_BIT*bits)) then
         status = REFUSED
         return
       end if
     end if
-    do tries = 1, MOST_TRIES
-      if (.not. n_steps <= MOST_STEPS) then
-        status = merge(GAVE_UP, OVERFLOW, tries == 1)
-        return
-      end if
-      steps = int(n_steps)
+    most = min(MOST_STEPS, MOST_TIMES*n_steps)
+    status = GAVE_UP
+    do
+      if (.not. n_steps <= most) return
+      n = int(0.25_dp*(n_steps + 3.0_dp))
+      steps = 4*n
       if (varies) then
-        call march_varying(motion, start, t_end, steps, x, seams)
-      else if (motion%odd) then
-        call march_odd(motion%slope, start, t_end/steps, steps, x, seams)
+        call march_varying(motion, start, (GAIN*left_out)*ASIDE, t_end, n, x, gaps, top)
       else
-        call march_even(motion%slope, start, t_end/steps, steps, x, seams)
+        call march_constant(motion, start, (0.25_dp*t_end)/n, n, x, gaps, top)
       end if
-      size = max(abs(start(1)), abs(start(2)), abs(start(3)), abs(x(1)), abs(x(2)), abs(x(3)))
-      h = abs(t_end)/real(steps, dp)
-      ! The seams show an error of third order in the step: the fourth is smaller by rate times h.
-      error = SEAM*(seams*h/size)*(sqrt(sqrt(power_5/rate))*h)
-      if (error <= ENOUGH*aim) exit
-      if (error <= huge(error)) then
-        n_steps = 1.0_dp + n_steps*min(8.0_dp, 1.1_dp*sqrt(sqrt(error/aim)))
-      else
-        n_steps = 4.0_dp*n_steps
+      ! Not by the error: a maximum passes over what is no number.
+      if (.not. sum(abs(gaps)) <= huge(error)) then
+        status = merge(GAVE_UP, OVERFLOW, sum(abs(x)) <= huge(error))
+        n_steps = 2.0_dp*n_steps
+        cycle
       end if
-      if (tries == MOST_TRIES) then
-        status = OVERFLOW
-        return
+      status = GAVE_UP
+      gaps(:, 1) = gaps(:, 1)/GAIN
+      far = max(1.0_dp/(GAIN*(GAIN + 1.0_dp)), aim/FARTHEST)
+      error = max(maxval(abs(gaps(:, 1)*motion%scale)), far*maxval(abs(gaps(:, 2)*motion%scale))) &
+              /maxval(abs(top*motion%scale))
+      if (error <= aim .or. all(abs(gaps) <= 0.0_dp)) exit
+      n_steps = 4.0_dp + n_steps*min(8.0_dp, 1.1_dp*sqrt(sqrt(error/aim)))
+      if (varies .and. motion%resolved < motion%waves) then
+        faint = faint*min(0.1_dp, 0.1_dp*aim/error)
+        call average(motion, rate, t_end, faint, left_out)
+        n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
+        most = min(MOST_STEPS, max(most, MOST_TIMES*steps_for_waves(motion, t_end, aim)))
       end if
     end do
-    if (varies) x = x + integral(whole, t_end)
+    x = x + gaps(:, 1)
+    if (varies) x = x + integral(motion, t_end)
     result(motion%axes) = x*motion%scale
     status = COMPLETE
   end subroutine quick_solve
 
-  pure subroutine scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         motion, status)
-    !! Unknowns in which every product has the coefficient 1 or -1, and -1 only the second.
-    real(dp), intent(in) :: coefficients(3)
-    real(dp), intent(in) :: m_constant(3)
-    real(dp), intent(in) :: m_rate(3)
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)
-    type(motion_t), intent(out) :: motion
-    integer, intent(out) :: status
-    real(dp) :: c(3)
-    real(dp) :: root(3)
-    real(dp) :: turned       ! -1 where all signs are turned by turning the third axis
-    integer :: i
-
-    status = REFUSED
-    ! The axis whose sign stands alone becomes the second.
-    motion%axes = [3, 1, 2]
-    if (coefficients(1)*coefficients(2) > 0.0_dp) motion%axes = [2, 3, 1]
-    if (coefficients(1)*coefficients(3) > 0.0_dp) motion%axes = [1, 2, 3]
-    c = coefficients(motion%axes)
-    motion%odd = c(1)*c(2) < 0.0_dp
-    turned = 1.0_dp
-    if (c(1) < 0.0_dp) turned = -1.0_dp
-    root = sqrt(abs(c))
-    if (.not. minval(root) > 0.0_dp) return
-    motion%scale(1) = 1.0_dp/(root(2)*root(3))
-    motion%scale(2) = 1.0_dp/(root(1)*root(3))
-    motion%scale(3) = turned/(root(1)*root(2))
-    if (.not. maxval(abs(motion%scale)) <= 1e100_dp) return
-    motion%slope = m_constant(motion%axes)/motion%scale
-    motion%climb = m_rate(motion%axes)/motion%scale
-    motion%waves = 0
-    do i = 1, n_sines
-      call add_wave(sines(1:3, i), sines(4, i), .false., motion)
-    end do
-    do i = 1, n_cosines
-      call add_wave(cosines(1:3, i), cosines(4, i), .true., motion)
-    end do
-    status = COMPLETE
-  end subroutine scaled
-
-  pure subroutine add_wave(amplitude, frequency, is_cosine, motion)
-    !! The integral of one more wave; waves of one frequency share their sine and cosine.
-    real(dp), intent(in) :: amplitude(3)  !! 1/s2
-    real(dp), intent(in) :: frequency     !! rad/s
-    logical, intent(in) :: is_cosine
-    type(motion_t), intent(inout) :: motion
-    real(dp) :: part(3)
-    integer :: n
-
-    part = amplitude(motion%axes)/motion%scale
-    if (abs(frequency) < 1e-100_dp) then
-      if (is_cosine) motion%slope = motion%slope + part
-      return
-    end if
-    do n = 1, motion%waves
-      if (abs(motion%frequency(n) - frequency) <= 0.0_dp) exit
-    end do
-    if (n > motion%waves) then
-      motion%waves = n
-      motion%frequency(n) = frequency
-      motion%on_sine(:, n) = 0.0_dp
-      motion%on_versine(:, n) = 0.0_dp
-    end if
-    if (is_cosine) then
-      motion%on_sine(:, n) = motion%on_sine(:, n) + part/frequency
-    else
-      motion%on_versine(:, n) = motion%on_versine(:, n) + part/frequency
-    end if
-  end subroutine add_wave
-
-  pure subroutine average(motion, rate, tolerance)
-    !! Drop the waves too fast and too weak to matter in the products, but for their mean: they
-    !! turn the motion by their integral times the rate over their frequency, forth and back.
-    type(motion_t), intent(inout) :: motion
-    real(dp), intent(in) :: rate         !! 1/s
-    real(dp), intent(in) :: tolerance
-    integer :: n
-    integer :: kept
-    real(dp) :: size
-
-    kept = 0
-    motion%mean = 0.0_dp
-    do n = 1, motion%waves
-      size = size_of(motion, n)
-      if (abs(motion%frequency(n)) > FAST*rate .and. &
-          size*rate < WEAK*tolerance*abs(motion%frequency(n))*rate) then
-        motion%mean = motion%mean + motion%on_versine(:, n)
-      else
-        kept = kept + 1
-        motion%frequency(kept) = motion%frequency(n)
-        motion%on_sine(:, kept) = motion%on_sine(:, n)
-        motion%on_versine(:, kept) = motion%on_versine(:, n)
-      end if
-    end do
-    motion%waves = kept
-  end subroutine average
-
-  pure real(dp) function size_of(motion, n)
-    !! Of the integral of wave n, 1/s.
+  pure subroutine march_constant(motion, start, h, fours, x, gaps, top)
+    !! Fours of equal steps under constant torque; and beside them, in the time that the processor
+    !! waits for them, steps of twice and of four times the length.
     type(motion_t), intent(in) :: motion
-    integer, intent(in) :: n
-
-    size_of = maxval(abs(motion%on_sine(:, n))) + maxval(abs(motion%on_versine(:, n)))
-  end function size_of
-
-  pure subroutine march_odd(m, start, h, n_steps, x, seams)
-    !! Equal steps under constant torque, signs plus, minus, plus.
-    real(dp), intent(in) :: m(3)
     real(dp), intent(in) :: start(3)
-    real(dp), intent(in) :: h
-    integer, intent(in) :: n_steps
+    real(dp), intent(in) :: h           !! s
+    integer, intent(in) :: fours
     real(dp), intent(out) :: x(3)
-    real(dp), intent(out) :: seams
-    real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3
-    real(dp) :: half, sixth, third
+    real(dp), intent(out) :: gaps(3, 2) !! from where steps of twice the length lead, and theirs
+    real(dp), intent(out) :: top(3)     !! largest size of the unknowns
+    real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
+    real(dp) :: y(3, 2)                 ! by the longer steps
+    real(dp) :: whole, half, third, sixth          ! of a step
+    real(dp) :: whole_2, half_2, third_2, sixth_2  ! of the second unknown, with its sign
+    real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, of longer steps
     integer :: i
+    integer :: k
+    integer :: n
 
+    whole = h
     half = 0.5_dp*h
-    sixth = h/6.0_dp
-    third = h/3.0_dp
+    third = THIRD_PART*h
+    sixth = 0.5_dp*third
+    whole_2 = motion%sign_2*whole
+    half_2 = motion%sign_2*half
+    third_2 = motion%sign_2*third
+    sixth_2 = motion%sign_2*sixth
+    wholes(1, :) = [2.0_dp*h, 4.0_dp*h]
+    wholes(2, :) = motion%sign_2*wholes(1, :)
+    halves = 0.5_dp*wholes
+    thirds = THIRD_PART*wholes
+    sixths = 0.5_dp*thirds
+    m1 = motion%slope(1)
+    m2 = motion%sign_2*motion%slope(2)
+    m3 = motion%slope(3)
     x1 = start(1)
     x2 = start(2)
     x3 = start(3)
-    a1 = m(1) + x2*x3
-    a2 = m(2) - x1*x3
-    a3 = m(3) + x1*x2
-    seams = 0.0_dp
-    do i = 1, n_steps
-      p1 = x1 + half*a1
-      p2 = x2 + half*a2
-      p3 = x3 + half*a3
-      b1 = m(1) + p2*p3
-      b2 = m(2) - p1*p3
-      b3 = m(3) + p1*p2
-      p1 = x1 + half*b1
-      p2 = x2 + half*b2
-      p3 = x3 + half*b3
-      c1 = m(1) + p2*p3
-      c2 = m(2) - p1*p3
-      c3 = m(3) + p1*p2
-      p1 = x1 + h*c1
-      p2 = x2 + h*c2
-      p3 = x3 + h*c3
-      d1 = m(1) + p2*p3
-      d2 = m(2) - p1*p3
-      d3 = m(3) + p1*p2
-      x1 = ((x1 + sixth*a1) + third*(b1 + c1)) + sixth*d1
-      x2 = ((x2 + sixth*a2) + third*(b2 + c2)) + sixth*d2
-      x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
-      a1 = m(1) + x2*x3
-      a2 = m(2) - x1*x3
-      a3 = m(3) + x1*x2
-      seams = seams + ((abs(a1 - d1) + abs(a2 - d2)) + abs(a3 - d3))
+    y(:, 1) = start
+    y(:, 2) = start
+    top = abs(start)
+    do i = 1, 2*fours
+      do k = 1, 1 + mod(i, 2)
+        a1 = m1 + y(2, k)*y(3, k)
+        a2 = m2 + y(1, k)*y(3, k)
+        a3 = m3 + y(1, k)*y(2, k)
+        p1 = y(1, k) + halves(1, k)*a1
+        p2 = y(2, k) + halves(2, k)*a2
+        p3 = y(3, k) + halves(1, k)*a3
+        b1 = m1 + p2*p3
+        b2 = m2 + p1*p3
+        b3 = m3 + p1*p2
+        p1 = y(1, k) + halves(1, k)*b1
+        p2 = y(2, k) + halves(2, k)*b2
+        p3 = y(3, k) + halves(1, k)*b3
+        c1 = m1 + p2*p3
+        c2 = m2 + p1*p3
+        c3 = m3 + p1*p2
+        p1 = y(1, k) + wholes(1, k)*c1
+        p2 = y(2, k) + wholes(2, k)*c2
+        p3 = y(3, k) + wholes(1, k)*c3
+        d1 = m1 + p2*p3
+        d2 = m2 + p1*p3
+        d3 = m3 + p1*p2
+        y(1, k) = ((y(1, k) + sixths(1, k)*a1) + thirds(1, k)*(b1 + c1)) + sixths(1, k)*d1
+        y(2, k) = ((y(2, k) + sixths(2, k)*a2) + thirds(2, k)*(b2 + c2)) + sixths(2, k)*d2
+        y(3, k) = ((y(3, k) + sixths(1, k)*a3) + thirds(1, k)*(b3 + c3)) + sixths(1, k)*d3
+      end do
+      do n = 1, 2
+        a1 = m1 + x2*x3
+        a2 = m2 + x1*x3
+        a3 = m3 + x1*x2
+        p1 = x1 + half*a1
+        p2 = x2 + half_2*a2
+        p3 = x3 + half*a3
+        b1 = m1 + p2*p3
+        b2 = m2 + p1*p3
+        b3 = m3 + p1*p2
+        p1 = x1 + half*b1
+        p2 = x2 + half_2*b2
+        p3 = x3 + half*b3
+        c1 = m1 + p2*p3
+        c2 = m2 + p1*p3
+        c3 = m3 + p1*p2
+        p1 = x1 + whole*c1
+        p2 = x2 + whole_2*c2
+        p3 = x3 + whole*c3
+        d1 = m1 + p2*p3
+        d2 = m2 + p1*p3
+        d3 = m3 + p1*p2
+        x1 = ((x1 + sixth*a1) + third*(b1 + c1)) + sixth*d1
+        x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
+        x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
+      end do
+      top(1) = max(top(1), abs(x1))
+      top(2) = max(top(2), abs(x2))
+      top(3) = max(top(3), abs(x3))
     end do
     x = [x1, x2, x3]
-  end subroutine march_odd
+    gaps(:, 1) = x - y(:, 1)
+    gaps(:, 2) = y(:, 1) - y(:, 2)
+  end subroutine march_constant
 
-  pure subroutine march_even(m, start, h, n_steps, x, seams)
-    !! The same with three signs alike, which no body has.
-    real(dp), intent(in) :: m(3)
-    real(dp), intent(in) :: start(3)
-    real(dp), intent(in) :: h
-    integer, intent(in) :: n_steps
-    real(dp), intent(out) :: x(3)
-    real(dp), intent(out) :: seams
-    real(dp) :: a(3), b(3), c(3), d(3)
-    integer :: i
-
-    x = start
-    a = m + slopes(x, 1.0_dp)
-    seams = 0.0_dp
-    do i = 1, n_steps
-      b = m + slopes(x + (0.5_dp*h)*a, 1.0_dp)
-      c = m + slopes(x + (0.5_dp*h)*b, 1.0_dp)
-      d = m + slopes(x + h*c, 1.0_dp)
-      x = x + (h/6.0_dp)*(a + 2.0_dp*(b + c) + d)
-      a = m + slopes(x, 1.0_dp)
-      seams = seams + sum(abs(a - d))
-    end do
-  end subroutine march_even
-
-  pure subroutine march_varying(motion, start, t_end, n_steps, x, seams)
-    !! Equal steps under a torque of time: its integral is exact, and what remains is smooth.
+  pure subroutine march_varying(motion, start, aside, t_end, fours, x, gaps, top)
+    !! The same under a torque of time: its integral is exact, and what remains is smooth.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: start(3)
-    real(dp), intent(in) :: t_end
-    integer, intent(in) :: n_steps
-    real(dp), intent(out) :: x(3)
-    real(dp), intent(out) :: seams
-    real(dp) :: u(3)         ! x without the integral of the torque
-    real(dp) :: a(3), b(3), c(3), d(3)
-    real(dp) :: s_middle(3)  ! integral of the torque at the step's middle and end
-    real(dp) :: s_end(3)
+    real(dp), intent(in) :: aside(3)     !! the longer steps start so much off
+    real(dp), intent(in) :: t_end        !! s
+    integer, intent(in) :: fours
+    real(dp), intent(out) :: x(3)        !! without the integral of the torque
+    real(dp), intent(out) :: gaps(3, 2)
+    real(dp), intent(out) :: top(3)      !! with the integral
+    real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
+    real(dp) :: y(3, 2)                  ! by the longer steps
+    real(dp) :: whole, half, third, sixth          ! of a step
+    real(dp) :: whole_2, half_2, third_2, sixth_2  ! of the second unknown, with its sign
+    real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, of longer steps
+    real(dp) :: s(3, 0:8)    ! integral of the torque at halves of the steps
     real(dp) :: sine(MOST_WAVES)
     real(dp) :: cosine(MOST_WAVES)
     real(dp) :: turn_sine(MOST_WAVES)
     real(dp) :: turn_cosine(MOST_WAVES)
     real(dp) :: h
-    real(dp) :: sign_2
     logical :: afresh
+    integer :: begin
+    integer :: middle
+    integer :: end_
     integer :: i
+    integer :: k
     integer :: n
 
-    h = t_end/n_steps
-    sign_2 = merge(-1.0_dp, 1.0_dp, motion%odd)
-    do n = 1, motion%waves
+    h = (0.25_dp*t_end)/fours
+    whole = h
+    half = 0.5_dp*h
+    third = THIRD_PART*h
+    sixth = 0.5_dp*third
+    whole_2 = motion%sign_2*whole
+    half_2 = motion%sign_2*half
+    third_2 = motion%sign_2*third
+    sixth_2 = motion%sign_2*sixth
+    wholes(1, :) = [2.0_dp*h, 4.0_dp*h]
+    wholes(2, :) = motion%sign_2*wholes(1, :)
+    halves = 0.5_dp*wholes
+    thirds = THIRD_PART*wholes
+    sixths = 0.5_dp*thirds
+    do n = 1, motion%resolved
       turn_sine(n) = sin(0.5_dp*h*motion%frequency(n))
       turn_cosine(n) = cos(0.5_dp*h*motion%frequency(n))
       sine(n) = 0.0_dp
       cosine(n) = 1.0_dp
     end do
-    u = start
-    a = slopes(u + motion%mean, sign_2)
-    seams = 0.0_dp
-    do i = 1, n_steps
-      afresh = mod(i, EXACT_AGAIN) == 0
-      call turn(motion, (i - 0.5_dp)*h, afresh, turn_sine, turn_cosine, sine, cosine, s_middle)
-      call turn(motion, i*h, afresh, turn_sine, turn_cosine, sine, cosine, s_end)
-      b = slopes((u + (0.5_dp*h)*a) + s_middle, sign_2)
-      c = slopes((u + (0.5_dp*h)*b) + s_middle, sign_2)
-      d = slopes((u + h*c) + s_end, sign_2)
-      u = u + (h/6.0_dp)*((a + d) + 2.0_dp*(b + c))
-      a = slopes(u + s_end, sign_2)
-      seams = seams + ((abs(a(1) - d(1)) + abs(a(2) - d(2))) + abs(a(3) - d(3)))
+    m1 = motion%push(1)
+    m2 = motion%sign_2*motion%push(2)
+    m3 = motion%push(3)
+    x = start
+    if (motion%resolved < motion%waves) x = x - turned(motion, x + motion%mean, 0.0_dp)
+    x1 = x(1)
+    x2 = x(2)
+    x3 = x(3)
+    y(:, 1) = x + aside
+    y(:, 2) = x - GAIN*aside
+    top = abs(start)
+    s(:, 8) = motion%mean
+    do i = 1, 2*fours
+      if (mod(i, 2) == 1) then
+        afresh = mod(i, 2*EXACT_AGAIN) == 1
+        s(:, 0) = s(:, 8)
+        do n = 1, 8
+          call turn(motion, (2*(i - 1) + 0.5_dp*n)*h, afresh, turn_sine, turn_cosine, sine, &
+                    cosine, s(:, n))
+        end do
+      end if
+      do k = 1, 1 + mod(i, 2)
+        begin = merge(0, 4, mod(i, 2) == 1)
+        middle = begin + 2*k
+        end_ = begin + 4*k
+        p1 = y(1, k) + s(1, begin)
+        p2 = y(2, k) + s(2, begin)
+        p3 = y(3, k) + s(3, begin)
+        a1 = m1 + p2*p3
+        a2 = m2 + p1*p3
+        a3 = m3 + p1*p2
+        p1 = (y(1, k) + halves(1, k)*a1) + s(1, middle)
+        p2 = (y(2, k) + halves(2, k)*a2) + s(2, middle)
+        p3 = (y(3, k) + halves(1, k)*a3) + s(3, middle)
+        b1 = m1 + p2*p3
+        b2 = m2 + p1*p3
+        b3 = m3 + p1*p2
+        p1 = (y(1, k) + halves(1, k)*b1) + s(1, middle)
+        p2 = (y(2, k) + halves(2, k)*b2) + s(2, middle)
+        p3 = (y(3, k) + halves(1, k)*b3) + s(3, middle)
+        c1 = m1 + p2*p3
+        c2 = m2 + p1*p3
+        c3 = m3 + p1*p2
+        p1 = (y(1, k) + wholes(1, k)*c1) + s(1, end_)
+        p2 = (y(2, k) + wholes(2, k)*c2) + s(2, end_)
+        p3 = (y(3, k) + wholes(1, k)*c3) + s(3, end_)
+        d1 = m1 + p2*p3
+        d2 = m2 + p1*p3
+        d3 = m3 + p1*p2
+        y(1, k) = ((y(1, k) + sixths(1, k)*a1) + thirds(1, k)*(b1 + c1)) + sixths(1, k)*d1
+        y(2, k) = ((y(2, k) + sixths(2, k)*a2) + thirds(2, k)*(b2 + c2)) + sixths(2, k)*d2
+        y(3, k) = ((y(3, k) + sixths(1, k)*a3) + thirds(1, k)*(b3 + c3)) + sixths(1, k)*d3
+      end do
+      do n = 0, 2, 2
+        begin = merge(0, 4, mod(i, 2) == 1) + n
+        middle = begin + 1
+        end_ = begin + 2
+        p1 = x1 + s(1, begin)
+        p2 = x2 + s(2, begin)
+        p3 = x3 + s(3, begin)
+        a1 = m1 + p2*p3
+        a2 = m2 + p1*p3
+        a3 = m3 + p1*p2
+        p1 = (x1 + half*a1) + s(1, middle)
+        p2 = (x2 + half_2*a2) + s(2, middle)
+        p3 = (x3 + half*a3) + s(3, middle)
+        b1 = m1 + p2*p3
+        b2 = m2 + p1*p3
+        b3 = m3 + p1*p2
+        p1 = (x1 + half*b1) + s(1, middle)
+        p2 = (x2 + half_2*b2) + s(2, middle)
+        p3 = (x3 + half*b3) + s(3, middle)
+        c1 = m1 + p2*p3
+        c2 = m2 + p1*p3
+        c3 = m3 + p1*p2
+        p1 = (x1 + whole*c1) + s(1, end_)
+        p2 = (x2 + whole_2*c2) + s(2, end_)
+        p3 = (x3 + whole*c3) + s(3, end_)
+        d1 = m1 + p2*p3
+        d2 = m2 + p1*p3
+        d3 = m3 + p1*p2
+        x1 = ((x1 + sixth*a1) + third*(b1 + c1)) + sixth*d1
+        x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
+        x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
+      end do
+      top(1) = max(top(1), abs(x1 + s(1, end_)))
+      top(2) = max(top(2), abs(x2 + s(2, end_)))
+      top(3) = max(top(3), abs(x3 + s(3, end_)))
     end do
-    x = u
+    x = [x1, x2, x3]
+    gaps(:, 1) = x - y(:, 1)
+    gaps(:, 2) = y(:, 1) - y(:, 2)
+    if (motion%resolved < motion%waves) x = x + turned(motion, x + s(:, 8), t_end)
   end subroutine march_varying
 
   pure subroutine turn(motion, t, afresh, turn_sine, turn_cosine, sine, cosine, s)
@@ -407,7 +414,7 @@ contains
     integer :: n
 
     s = motion%mean + t*(motion%slope + (0.5_dp*t)*motion%climb)
-    do n = 1, motion%waves
+    do n = 1, motion%resolved
       if (afresh) then
         sine(n) = sin(motion%frequency(n)*t)
         cosine(n) = cos(motion%frequency(n)*t)
@@ -419,30 +426,5 @@ contains
       s = s + (motion%on_sine(:, n)*sine(n) + motion%on_versine(:, n)*(1.0_dp - cosine(n)))
     end do
   end subroutine turn
-
-  pure function integral(motion, t) result(s)
-    !! The whole torque's integral from 0 to t, in the unknowns.
-    type(motion_t), intent(in) :: motion
-    real(dp), intent(in) :: t
-    real(dp) :: s(3)
-    integer :: n
-
-    s = t*(motion%slope + (0.5_dp*t)*motion%climb)
-    do n = 1, motion%waves
-      s = s + motion%on_sine(:, n)*sin(motion%frequency(n)*t) &
-          + motion%on_versine(:, n)*(1.0_dp - cos(motion%frequency(n)*t))
-    end do
-  end function integral
-
-  pure function slopes(x, sign_2) result(f)
-    !! Products of the unknowns.
-    real(dp), intent(in) :: x(3)
-    real(dp), intent(in) :: sign_2
-    real(dp) :: f(3)
-
-    f(1) = x(2)*x(3)
-    f(2) = sign_2*(x(1)*x(3))
-    f(3) = x(1)*x(2)
-  end function slopes
 
 end module scaled_runge_kutta

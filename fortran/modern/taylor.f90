@@ -13,6 +13,11 @@ module taylor
   integer, parameter :: MOST_TRIES = 60
   real(dp), parameter :: HOPELESS = 10.0_dp*MOST_STEPS ! steps of the first one's length
   real(dp), parameter :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
+  real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
+  real(dp), parameter :: PLANNED = 3.0_dp ! growth of a difference that the share allows for
+  real(dp), parameter :: SAFETY = 10.0_dp  ! one difference may miss where others grow
+  real(dp), parameter :: ROUNDING = 2e-16_dp ! relative
+  real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass: orders that vary cost time
 
   type :: series_t
@@ -53,6 +58,38 @@ contains
     integer(c_int), intent(out) :: n_rows
     integer(c_int), intent(out) :: status               !! 0 complete, 2 overflow, 4 gave up
     integer(c_int), intent(out) :: steps
+    real(dp) :: growth  ! of a small difference on the way
+    real(dp) :: known   ! the same, as far as it was reckoned with
+
+    known = PLANNED
+    do
+      call march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, &
+                 tolerance*(PLANNED/known), n_times, times, rows, n_rows, status, steps, growth)
+      if (growth <= known .or. status /= COMPLETE .or. tolerance*(PLANNED/known) < ROUNDING) return
+      ! What a step errs grew: once more, with less of it.
+      known = SAFETY*growth
+    end do
+  end subroutine taylor_solve
+
+  subroutine march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                   omega, tolerance, n_times, times, rows, n_rows, status, steps, growth)
+    !! Once from 0 to the last of the times.
+    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
+    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
+    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
+    integer(c_int), intent(in), value :: n_sines
+    real(c_double), intent(in), target :: sines(4, n_sines)     !! amplitude (3), frequency in rad/s
+    integer(c_int), intent(in), value :: n_cosines
+    real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
+    real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
+    real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
+    integer(c_int), intent(in), value :: n_times
+    real(c_double), intent(in) :: times(n_times)        !! s
+    real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
+    integer(c_int), intent(out) :: n_rows
+    integer(c_int), intent(out) :: status               !! 0 complete, 2 overflow, 4 gave up
+    integer(c_int), intent(out) :: steps
+    real(dp), intent(out) :: growth !! of a small difference; looked at where the torque varies
     type(series_t) :: s
     type(torque_t) :: torque
     real(dp) :: w(3)          ! omega at the step's beginning, rad/s
@@ -68,6 +105,10 @@ contains
     real(dp) :: scale         ! largest |omega| so far, rad/s
     real(dp) :: share         ! part of the scale that the last terms may have
     real(dp) :: allowed       ! the same in rad/s
+    real(dp) :: difference(3) ! of a motion beside this one
+    real(dp) :: least_difference
+    real(dp) :: roots(3)      ! times omega: rates, 1/s, in which the products are alike
+    real(dp) :: size
     logical :: varies         ! torque with time
     logical :: at_end
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
@@ -80,6 +121,8 @@ contains
     n_rows = 0
     steps = 0
     status = COMPLETE
+    growth = 1.0_dp
+    difference = ASIDE
     w = omega
     w_low = 0.0_dp
     t = 0.0_dp
@@ -97,6 +140,10 @@ contains
     torque%sines => sines
     torque%cosines => cosines
     varies = n_sines + n_cosines > 0 .or. any(m_rate /= 0.0_dp)
+    least_difference = merge(1.0_dp, huge(size), varies)
+    roots(1) = sqrt(abs(coefficients(2)*coefficients(3)))
+    roots(2) = sqrt(abs(coefficients(1)*coefficients(3)))
+    roots(3) = sqrt(abs(coefficients(1)*coefficients(2)))
     scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
     call plan(coefficients, torque, varies, scale, tolerance, rest, best, most, share, h)
     best_share = 65536/best
@@ -173,6 +220,16 @@ contains
       total = w + change
       back = total - w
       w_low = (w - (total - back)) + (change - back)
+      if (varies) then
+        call carry(coefficients, (0.25_dp*h)*(w + total), difference)
+        size = max(abs(difference(1)), abs(difference(2)), abs(difference(3)))
+      else
+        ! Its own change is a small difference too, and known; over what grows with the torque.
+        size = max(roots(1)*abs(s%left(2, 1)), roots(2)*abs(s%left(1, 1)), &
+                   roots(3)*abs(s%right(1, 1)))/(abs(h)*(scale*scale))
+      end if
+      if (size < least_difference) least_difference = size
+      if (size > growth*least_difference) growth = size/least_difference
       w = total
       steps = steps + 1
       tries = 1
@@ -193,7 +250,32 @@ contains
         return
       end if
     end do
-  end subroutine taylor_solve
+  end subroutine march
+
+  pure subroutine carry(coefficients, half, difference)
+    !! A small difference of two motions over a step, by the implicit midpoint rule.
+    real(dp), intent(in) :: coefficients(3) !! A, B, C
+    real(dp), intent(in) :: half(3)         !! half the step times omega in its middle, rad
+    real(dp), intent(inout) :: difference(3)
+    real(dp) :: a2, a3, b1, b3, c1, c2      ! the products' derivatives, times half the step
+    real(dp) :: x, y, z
+    real(dp) :: determinant
+
+    a2 = coefficients(1)*half(2)
+    a3 = coefficients(1)*half(3)
+    b1 = coefficients(2)*half(1)
+    b3 = coefficients(2)*half(3)
+    c1 = coefficients(3)*half(1)
+    c2 = coefficients(3)*half(2)
+    x = difference(1) + a3*difference(2) + a2*difference(3)
+    y = difference(2) + b3*difference(1) + b1*difference(3)
+    z = difference(3) + c2*difference(1) + c1*difference(2)
+    determinant = 1.0_dp - a3*b3 - a2*c2 - b1*c1 - a3*b1*c2 - a2*b3*c1
+    determinant = sign(max(0.1_dp, abs(determinant)), determinant)
+    difference(1) = ((1.0_dp - b1*c1)*x + (a3 + a2*c1)*y + (a2 + a3*b1)*z)/determinant
+    difference(2) = ((b3 + b1*c2)*x + (1.0_dp - a2*c2)*y + (b1 + a2*b3)*z)/determinant
+    difference(3) = ((c2 + b3*c1)*x + (c1 + a3*c2)*y + (1.0_dp - a3*b3)*z)/determinant
+  end subroutine carry
 
   pure subroutine plan(coefficients, torque, varies, scale, tolerance, time, best, most, share, h)
     !! Order from the tolerance, the first step from the rates of the problem.
@@ -211,8 +293,10 @@ contains
     real(dp) :: push                        ! largest torque over moment, 1/s2
     real(dp) :: gain                        ! speed that torques may add, rad/s
     real(dp) :: rate                        ! 1/s
+    real(dp) :: turned                      ! by the waves, rad
     integer :: n
 
+    turned = 0.0_dp
     coupling = max(abs(coefficients(1)), abs(coefficients(2)), abs(coefficients(3)))
     push = max(abs(torque%constant(1)), abs(torque%constant(2)), abs(torque%constant(3)))
     gain = 0.5_dp*push*abs(time)
@@ -223,34 +307,37 @@ contains
       rate = rate + sqrt(coupling*push*abs(time))
     end if
     do n = 1, torque%n_sines
-      call add_wave_rates(torque%sines(:, n), coupling, time, gain, rate)
+      call add_wave_rates(torque%sines(:, n), coupling, time, gain, rate, turned)
     end do
     do n = 1, torque%n_cosines
-      call add_wave_rates(torque%cosines(:, n), coupling, time, gain, rate)
+      call add_wave_rates(torque%cosines(:, n), coupling, time, gain, rate, turned)
     end do
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
     ! An error turns into one of phase and grows with it; the weights are from the seven cases and
     ! from random scenes.
-    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain))
+    ! Waves ask for more steps, and those may all err alike.
+    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain) + ALIKE*turned)
     share = max(share, LEAST_SHARE)
     best = order_for(share, varies)
     most = min(best + 4, MOST_ORDER)
   end subroutine plan
 
-  pure subroutine add_wave_rates(wave, coupling, time, gain, rate)
+  pure subroutine add_wave_rates(wave, coupling, time, gain, rate, turned)
     !! What a wave of torque adds to the speed that may be gained, and to the rate of change.
     real(dp), intent(in) :: wave(4)         !! amplitude (3) in 1/s2, frequency in rad/s
     real(dp), intent(in) :: coupling
     real(dp), intent(in) :: time            !! to go, s
     real(dp), intent(inout) :: gain         !! rad/s
     real(dp), intent(inout) :: rate         !! 1/s
+    real(dp), intent(inout) :: turned       !! rad
     real(dp) :: push                        ! 1/s2
 
     push = max(abs(wave(1)), abs(wave(2)), abs(wave(3)))
     if (push > 0.0_dp) then
       gain = gain + push*abs(time)/(1.0_dp + abs(wave(4)*time))
       rate = rate + sqrt(coupling*push) + abs(wave(4))
+      turned = turned + abs(wave(4)*time)
     end if
   end subroutine add_wave_rates
 

@@ -1,0 +1,231 @@
+module scaled_motion
+  !! Unknowns scaled so that every product has the coefficient 1 or -1, and the integral of the
+  !! torque in them; waves that are fast and weak are averaged, to second order.
+  use kinds, only: dp
+  use statuses, only: COMPLETE, REFUSED
+  implicit none(type, external)
+  private
+
+  integer, parameter, public :: MOST_WAVES = 8
+  real(dp), parameter :: FAST = 8.0_dp       ! frequency of a wave over the rate of the motion
+  real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that counts
+  real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! of Simpson's rule, times radians**4
+
+  type, public :: motion_t
+    real(dp) :: scale(3)     ! angular velocity is scale times unknown, rad/s
+    real(dp) :: slope(3)     ! constant torque in the unknowns, 1/s
+    real(dp) :: climb(3)     ! rate of the torque, 1/s2
+    integer :: waves         ! all of them
+    integer :: resolved      ! the first so many; the others are averaged
+    real(dp) :: frequency(MOST_WAVES)    ! rad/s
+    real(dp) :: on_sine(3, MOST_WAVES)   ! integral of the wave: these times sine
+    real(dp) :: on_versine(3, MOST_WAVES) ! and these times 1 - cosine
+    real(dp) :: mean(3)      ! of the waves that are averaged, in the unknowns
+    real(dp) :: push(3)      ! mean of their products, 1/s2
+    real(dp) :: sign_2       ! of the second product: -1 for a body
+    integer :: axes(3)       ! of the body
+  end type motion_t
+
+  public :: average, integral, scaled, size_of, steps_for_waves, turned
+
+contains
+
+  pure subroutine scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                         motion, status)
+    !! Unknowns in which every product has the coefficient 1 or -1, and -1 only the second.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp), intent(in) :: m_constant(3)
+    real(dp), intent(in) :: m_rate(3)
+    integer, intent(in) :: n_sines
+    real(dp), intent(in) :: sines(4, n_sines)
+    integer, intent(in) :: n_cosines
+    real(dp), intent(in) :: cosines(4, n_cosines)
+    type(motion_t), intent(out) :: motion
+    integer, intent(out) :: status
+    real(dp) :: c(3)
+    real(dp) :: root(3)
+    real(dp) :: turned       ! -1 where all signs are turned by turning the third axis
+    integer :: i
+
+    status = REFUSED
+    ! The axis whose sign stands alone becomes the second.
+    motion%axes = [3, 1, 2]
+    if (coefficients(1)*coefficients(2) > 0.0_dp) motion%axes = [2, 3, 1]
+    if (coefficients(1)*coefficients(3) > 0.0_dp) motion%axes = [1, 2, 3]
+    c = coefficients(motion%axes)
+    motion%sign_2 = merge(-1.0_dp, 1.0_dp, c(1)*c(2) < 0.0_dp)
+    turned = 1.0_dp
+    if (c(1) < 0.0_dp) turned = -1.0_dp
+    root = sqrt(abs(c))
+    if (.not. minval(root) > 0.0_dp) return
+    motion%scale(1) = 1.0_dp/(root(2)*root(3))
+    motion%scale(2) = 1.0_dp/(root(1)*root(3))
+    motion%scale(3) = turned/(root(1)*root(2))
+    if (.not. maxval(abs(motion%scale)) <= 1e100_dp) return
+    motion%slope = m_constant(motion%axes)/motion%scale
+    motion%climb = m_rate(motion%axes)/motion%scale
+    motion%waves = 0
+    motion%resolved = 0
+    do i = 1, n_sines
+      call add_wave(sines(1:3, i), sines(4, i), .false., motion)
+    end do
+    do i = 1, n_cosines
+      call add_wave(cosines(1:3, i), cosines(4, i), .true., motion)
+    end do
+    status = COMPLETE
+  end subroutine scaled
+
+  pure subroutine add_wave(amplitude, frequency, is_cosine, motion)
+    !! The integral of one more wave; waves of one frequency share their sine and cosine.
+    real(dp), intent(in) :: amplitude(3)  !! 1/s2
+    real(dp), intent(in) :: frequency     !! rad/s
+    logical, intent(in) :: is_cosine
+    type(motion_t), intent(inout) :: motion
+    real(dp) :: part(3)
+    integer :: n
+
+    part = amplitude(motion%axes)/motion%scale
+    if (abs(frequency) < 1e-100_dp) then
+      if (is_cosine) motion%slope = motion%slope + part
+      return
+    end if
+    do n = 1, motion%waves
+      if (abs(motion%frequency(n) - frequency) <= 0.0_dp) exit
+    end do
+    if (n > motion%waves) then
+      motion%waves = n
+      motion%frequency(n) = frequency
+      motion%on_sine(:, n) = 0.0_dp
+      motion%on_versine(:, n) = 0.0_dp
+    end if
+    if (is_cosine) then
+      motion%on_sine(:, n) = motion%on_sine(:, n) + part/frequency
+    else
+      motion%on_versine(:, n) = motion%on_versine(:, n) + part/frequency
+    end if
+  end subroutine add_wave
+
+  pure subroutine average(motion, rate, t_end, faint, left_out)
+    !! Take the waves that are fast and weak out of the products, but for their means and for the
+    !! turn that they give the motion forth and back (`turned`): what is left is of second order.
+    type(motion_t), intent(inout) :: motion
+    real(dp), intent(in) :: rate         !! 1/s
+    real(dp), intent(in) :: t_end        !! s
+    real(dp), intent(in) :: faint        !! error allowed, rad/s
+    real(dp), intent(out) :: left_out    !! error, in the unknowns
+    real(dp) :: largest                  ! scale
+    real(dp) :: change                   ! of the unknowns, 1/s2
+    real(dp) :: f                        ! rad/s
+    real(dp) :: size
+    real(dp) :: error
+    integer :: n
+    integer :: k
+
+    largest = maxval(abs(motion%scale))
+    change = 2.0_dp*rate*rate + maxval(abs(motion%slope)) + abs(t_end)*maxval(abs(motion%climb))
+    motion%resolved = 0
+    motion%mean = 0.0_dp
+    motion%push = 0.0_dp
+    left_out = 0.0_dp
+    do n = 1, motion%waves
+      f = abs(motion%frequency(n))
+      size = size_of(motion, n)
+      error = left_out + 2.0_dp*(size/f)*(change/f + size + 2.0_dp*rate*abs(t_end)*size)
+      do k = 1, motion%waves
+        ! Two waves together make a slow one.
+        if (k /= n) error = error + 4.0_dp*size*size_of(motion, k) &
+                            *min(abs(t_end), 1.0_dp/abs(f - abs(motion%frequency(k))))
+      end do
+      if (f > FAST*rate .and. error*largest <= faint) then
+        motion%mean = motion%mean + motion%on_versine(:, n)
+        motion%push = motion%push + 0.5_dp*(slopes(motion%on_sine(:, n), motion%sign_2) &
+                                            + slopes(motion%on_versine(:, n), motion%sign_2))
+        left_out = error
+      else
+        motion%resolved = motion%resolved + 1
+        call swap(motion, n, motion%resolved)
+      end if
+    end do
+  end subroutine average
+
+  pure subroutine swap(motion, n, k)
+    !! Two waves change places.
+    type(motion_t), intent(inout) :: motion
+    integer, intent(in) :: n
+    integer, intent(in) :: k
+
+    if (n == k) return
+    motion%frequency([n, k]) = motion%frequency([k, n])
+    motion%on_sine(:, [n, k]) = motion%on_sine(:, [k, n])
+    motion%on_versine(:, [n, k]) = motion%on_versine(:, [k, n])
+  end subroutine swap
+
+  pure function turned(motion, y, t) result(change)
+    !! What the waves that are averaged do to the unknowns by their integral, forth and back.
+    type(motion_t), intent(in) :: motion
+    real(dp), intent(in) :: y(3)         !! unknowns
+    real(dp), intent(in) :: t            !! s
+    real(dp) :: change(3)
+    real(dp) :: o(3)
+    integer :: n
+
+    o = 0.0_dp
+    do n = motion%resolved + 1, motion%waves
+      o = o - (cos(motion%frequency(n)*t)*motion%on_sine(:, n) &
+               + sin(motion%frequency(n)*t)*motion%on_versine(:, n))/motion%frequency(n)
+    end do
+    change(1) = y(2)*o(3) + y(3)*o(2)
+    change(2) = motion%sign_2*(y(1)*o(3) + y(3)*o(1))
+    change(3) = y(1)*o(2) + y(2)*o(1)
+  end function turned
+
+  pure real(dp) function steps_for_waves(motion, t_end, aim)
+    !! Waves that are not averaged have to be resolved.
+    type(motion_t), intent(in) :: motion
+    real(dp), intent(in) :: t_end        !! s
+    real(dp), intent(in) :: aim          !! relative
+    real(dp) :: wave         ! what it adds to the unknowns, times time
+    integer :: n
+
+    steps_for_waves = 0.0_dp
+    do n = 1, motion%resolved
+      wave = size_of(motion, n)*abs(t_end)
+      steps_for_waves = max(steps_for_waves, abs(motion%frequency(n)*t_end)* &
+                            max(RESOLVED_STEPS, sqrt(sqrt(WAVE_ERROR*wave/aim))))
+    end do
+  end function steps_for_waves
+
+  pure real(dp) function size_of(motion, n)
+    !! Of the integral of wave n, 1/s.
+    type(motion_t), intent(in) :: motion
+    integer, intent(in) :: n
+
+    size_of = maxval(abs(motion%on_sine(:, n))) + maxval(abs(motion%on_versine(:, n)))
+  end function size_of
+
+  pure function integral(motion, t) result(s)
+    !! The whole torque's integral from 0 to t, in the unknowns.
+    type(motion_t), intent(in) :: motion
+    real(dp), intent(in) :: t
+    real(dp) :: s(3)
+    integer :: n
+
+    s = t*(motion%slope + (0.5_dp*t)*motion%climb)
+    do n = 1, motion%waves
+      s = s + motion%on_sine(:, n)*sin(motion%frequency(n)*t) &
+          + motion%on_versine(:, n)*(1.0_dp - cos(motion%frequency(n)*t))
+    end do
+  end function integral
+
+  pure function slopes(x, sign_2) result(f)
+    !! Products of the unknowns.
+    real(dp), intent(in) :: x(3)
+    real(dp), intent(in) :: sign_2
+    real(dp) :: f(3)
+
+    f(1) = x(2)*x(3)
+    f(2) = sign_2*(x(1)*x(3))
+    f(3) = x(1)*x(2)
+  end function slopes
+
+end module scaled_motion

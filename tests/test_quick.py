@@ -6,6 +6,7 @@ import pytest
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.kernels import extension, normalized
 from pyharness.reference import reference
+from pyharness.scaling import scaled
 from pyharness.trajectory import Array
 from tests.random_scenes import NASTY, plain, triple
 
@@ -132,3 +133,15 @@ def test_run_away_is_an_overflow_and_nothing_hangs() -> None:
     solver = prepare(scene, "quick", 1e-3)
     assert np.isnan(solver(np.array(scene.omega), 2.0)).all()
     assert solver.status in ("overflow", "gave up")
+
+
+@pytest.mark.parametrize("power", [-250, -190, 190, 250])
+def test_unit_of_time_changes_no_bit(power: int) -> None:
+    """Powers of rates overflow, or vanish, where those of radians do not."""
+    law = TorqueLaw((3.0, -2.0, 1.0), (1.0, 2.0, 3.0), (((1.0, 1.0, 2.0), 5.0),))
+    scene = Scene("", (1.0, 2.0, -1.0), moments=(4.0, 3.0, 2.0), torque=law)
+    factor = 2.0**power
+    found = prepare(scene, "quick", 1e-5)(np.array(scene.omega), 1.0).copy()
+    faster = scaled(scene, factor)
+    other = prepare(faster, "quick", 1e-5)(np.array(faster.omega), 1.0 / factor)
+    np.testing.assert_array_equal(other, found * factor)

@@ -18,6 +18,7 @@ module scaled_runge_kutta
   real(dp), parameter :: MOST_TIMES = 12.0_dp
   ! Error after time T: about FIRST_GUESS (rate h)**4 rate T; from the cases.
   real(dp), parameter :: FIRST_GUESS = 0.0022_dp
+  real(dp), parameter :: LONGEST = 1e40_dp ! rad; far beyond what MOST_STEPS can go
   real(dp), parameter :: COARSEST = 0.004_dp ! aim for which steps are so long that they say little
   ! Steps of twice the length err 16 times as much: the gap is 15 times the error that is left.
   real(dp), parameter :: GAIN = 15.0_dp
@@ -64,7 +65,9 @@ contains
     real(dp) :: top(3)       ! largest unknowns
     real(dp) :: rate         ! 1/s
     real(dp) :: rate_0       ! the same at time 0
-    real(dp) :: power_5      ! mean of the fifth power of the rate, which grows with the torque
+    real(dp) :: turn_0       ! the whole way at the first rate, rad
+    real(dp) :: turn         ! the same at the last
+    real(dp) :: power_5      ! mean of the fifth power of the turn, whose rate grows with the torque
     real(dp) :: n_steps
     real(dp) :: most         ! steps
     real(dp) :: aim          ! error, relative
@@ -93,10 +96,14 @@ contains
     do n = 1, motion%waves
       rate = rate + size_of(motion, n)*min(2.0_dp, abs(motion%frequency(n)*t_end))
     end do
-    power_5 = rate**5
-    if (rate > 1.1_dp*rate_0) power_5 = (rate**6 - rate_0**6)/(6.0_dp*(rate - rate_0))
-    n_steps = LEAST_STEPS + abs(t_end)*sqrt(sqrt(FIRST_GUESS*power_5*abs(t_end) &
-                                                 /min(aim, COARSEST)))
+    ! In radians, whose powers are numbers whatever the unit of time.
+    turn_0 = rate_0*abs(t_end)
+    turn = rate*abs(t_end)
+    status = GAVE_UP
+    if (.not. turn <= LONGEST) return
+    power_5 = turn**5
+    if (turn > 1.1_dp*turn_0) power_5 = (turn**6 - turn_0**6)/(6.0_dp*(turn - turn_0))
+    n_steps = LEAST_STEPS + sqrt(sqrt(FIRST_GUESS*power_5/min(aim, COARSEST)))
     varies = motion%waves > 0 .or. any(abs(motion%climb) > 0.0_dp)
     faint = WEAK*aim*max(abs(omega(1)), abs(omega(2)), abs(omega(3)))
     if (varies) then
@@ -104,7 +111,7 @@ contains
       n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
     end if
     if (contest /= 0) then
-      radians = 0.5_dp*abs(t_end)*(rate_0 + rate)
+      radians = 0.5_dp*(turn_0 + turn)
       do n = 1, motion%waves
         radians = radians + WAVE_RADIAN*abs(motion%frequency(n)*t_end)
       end do

@@ -177,9 +177,18 @@ def _outward(times: Sequence[float]) -> tuple[list[float], bool]:
 def _auto(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
     from pyharness.plan import closed_form
 
-    name = "closed-form" if closed_form(scene) else "taylor"
-    # A closed form is as good as rounding lets it be, whatever is asked.
-    return METHODS[name].solve(scene, times, max(tolerance, METHODS[name].finest))
+    if closed_form(scene):
+        form = METHODS["closed-form"]
+        try:
+            # As good as rounding lets it be, whatever is asked.
+            return form.solve(scene, times, max(tolerance, form.finest))
+        except InputError as refusal:
+            # A disturbance of the middle axis may be too faint for it, but not for a series.
+            try:
+                return METHODS["taylor"].solve(scene, times, tolerance)
+            except InputError:
+                raise refusal from None
+    return METHODS["taylor"].solve(scene, times, tolerance)
 
 
 def _taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:

@@ -29,6 +29,7 @@ _CODES = {
     EITHER: 8,
     **{f"gauss-{stages}": 10 + stages for stages in range(1, 9)},
 }
+_FREE_OR_SERIES = 9
 PREPARED = (
     "auto",
     "closed-form",
@@ -55,14 +56,16 @@ class Solver(partial[Array]):
     plan: Plan
     _scene: Scene
     _tolerance: float
+    _asked: str
 
-    def __new__(cls, scene: Scene, chosen: Plan, tolerance: float) -> Self:
+    def __new__(cls, scene: Scene, chosen: Plan, tolerance: float, asked: str) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
-        packed = _pack(scene, chosen, tolerance)
+        packed = _pack(scene, _code(chosen, asked), tolerance)
         solver = super().__new__(cls, extension().solve_packed, packed, np.empty(3))
         solver.plan = chosen
         solver._scene = scene
         solver._tolerance = tolerance
+        solver._asked = asked
         return solver
 
     def __repr__(self) -> str:
@@ -102,7 +105,7 @@ class Solver(partial[Array]):
             raise InputError(f"omega0: {len(omega0)} numbers; allowed: three")
         first, second, third = (float(each) for each in omega0)
         scene = replace(self._scene, omega=(first, second, third))
-        method = "taylor" if self.plan.method in ("quick", EITHER) else self.plan.method
+        method = "taylor" if self._asked == "quick" else self._asked
         return solve_by_name(scene, times, method, self._tolerance)
 
 
@@ -142,7 +145,7 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
     """
     if method not in PREPARED:
         raise unknown("method", method, PREPARED)
-    return Solver(scene, plan(scene, method, tolerance), tolerance)
+    return Solver(scene, plan(scene, method, tolerance), tolerance, method)
 
 
 def solve(
@@ -184,13 +187,23 @@ def solve(
     return solve_by_name(scene, times, method, tolerance)
 
 
-def _pack(scene: Scene, chosen: Plan, tolerance: float) -> Array:
+def _code(chosen: Plan, asked: str) -> int:
+    """Return the number by which the kernel knows what was decided."""
+    if chosen.method == "closed-form":
+        if chosen.closed_form == "sphere":
+            return _CODES["sphere"]
+        # A disturbance too faint to square: then the series, if that is not against the order.
+        return _FREE_OR_SERIES if asked == "auto" else _CODES["closed-form"]
+    return _CODES[chosen.method]
+
+
+def _pack(scene: Scene, code: int, tolerance: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
     # A wave without amplitude has no effect, and would cost its sine and cosine.
     sines, cosines = (waves[:, waves[:3].any(axis=0)] for waves in (sines, cosines))
     # Four places more than the waves need: the kernel names where the cosines would begin.
     packed = np.zeros(_WAVES_AT + sines.size + cosines.size + 4)
-    packed[0] = _CODES["sphere" if chosen.closed_form == "sphere" else chosen.method]
+    packed[0] = code
     packed[1:5] = tolerance, scene.step_size, sines.shape[1], cosines.shape[1]
     packed[5:14] = np.concatenate([coefficients, constant, rate])
     packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()

@@ -216,3 +216,22 @@ def test_plan_and_growth_on_the_command_line(capsys: pytest.CaptureFixture[str])
     assert main(["bench", "--growth", "--peers", "none"]) == 2
     assert main(["bench", "--plan", "--growth"]) == 2
     capsys.readouterr()
+
+
+def test_auto_solves_what_the_closed_form_refuses() -> None:
+    """A disturbance of the middle axis whose square is no number."""
+    scene = Scene("", (1e-130, 1.0, 0.0), moments=(3.0, 2.0, 1.0))
+    with pytest.raises(InputError, match="too faint"):
+        solve(scene, [5.0], "closed-form")
+    solver = prepare(scene, "closed-form")
+    solver(_omega(scene), 5.0)
+    assert solver.status == "refused"
+    wanted = reference(scene, [5.0]).omega[0]
+    np.testing.assert_allclose(solve(scene, [5.0]).omega[0], wanted, rtol=1e-13)
+    solver = prepare(scene)
+    np.testing.assert_allclose(solver(_omega(scene), 5.0), wanted, rtol=1e-11)
+    assert solver.status == "complete"
+    np.testing.assert_allclose(solver.trajectory(scene.omega, [5.0]).omega[0], wanted, rtol=1e-11)
+    # And where both refuse, the reason is that of the closed form.
+    with pytest.raises(InputError, match="the phase is beyond"):
+        solve(case_scene(4), [1e18])

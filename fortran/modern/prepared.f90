@@ -34,6 +34,7 @@ module prepared
   integer, parameter :: RUNGE_KUTTA_STEPS = 6
   integer, parameter :: QUICK = 7           ! Runge-Kutta for few digits
   integer, parameter :: QUICK_OR_SERIES = 8 ! whichever takes fewer operations
+  integer, parameter :: FREE_OR_SERIES = 9  ! the closed form, or the series where it refuses
   integer, parameter :: GAUSS = 10
 
   ! Beyond it, or below its inverse, products of omegas may overflow or underflow, though the
@@ -148,8 +149,14 @@ contains
     times(1) = t_end
     count = 0
     select case (int(packed(METHOD)))
-    case (TORQUE_FREE)
+    case (TORQUE_FREE, FREE_OR_SERIES)
       call torque_free_end(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, t_end, omega, ended)
+      if (ended == REFUSED .and. int(packed(METHOD)) == FREE_OR_SERIES) then
+        call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
+                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
+                          1, times, rows, n_rows, ended, count)
+        omega = rows(:, 1)
+      end if
     case (SPHERE)
       call sphere_rows(packed(M_CONSTANT), packed(M_RATE), sines, packed(WAVES), cosines, &
                        packed(cosines_at), omega0, 1, times, rows, n_rows, ended)

@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from pyharness.errors import InputError, unknown
+from pyharness.errors import InputError, printable, unknown
 from pyharness.facts import facts
+from pyharness.pipes import read_some
 from pyharness.scene import Scene, TorqueLaw, Triple, Wave
 
 _LARGEST_FILE = 1_000_000
@@ -50,8 +51,7 @@ def read_scene(path: str | Path) -> Scene:
     """
     where = f"scene file '{path}'"
     try:
-        with open(path, "rb") as file:
-            content = file.read(_LARGEST_FILE + 1)
+        content = read_some(str(path), _LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{where}: {reason}; give a TOML file that can be read") from None
@@ -90,7 +90,7 @@ def _scene(data: dict[str, Any], default_name: str) -> Scene:
     if isinstance(steps, bool) or not isinstance(steps, int):
         raise InputError(f"[run] steps is {_kind(steps)}; it must be a whole number")
     return Scene(
-        name=" ".join(name.split())[:60],
+        name=printable(" ".join(name.split())[:60]),
         omega=_numbers("[initial] omega", initial["omega"]),
         moments=_optional("[body] moments", body.get("moments")),
         coefficients=_optional("[body] coefficients", body.get("coefficients")),

@@ -194,6 +194,4 @@ def _pack(scene: Scene, chosen: Plan, tolerance: float) -> Array:
     packed[5:14] = np.concatenate([coefficients, constant, rate])
     packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
     packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
-    if not np.isfinite(packed).all():
-        raise InputError("torque over moment is not finite; take smaller torques")
     return packed

@@ -89,12 +89,15 @@ def gauss(stages: int) -> Solver:
 
     def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
         torque = normalized(scene)[1:]
-        scale = max(map(abs, scene.omega)) or 1.0
+        if times[-1] == 0.0:
+            return _trajectory(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
+        start = max(map(abs, scene.omega))
+        scale = start or 1.0
         step, spent, reached = _first_step(scene, times), 0, 0.0
         before: _Solution | None = None
         while True:
             # Each step takes two iterations at the least.
-            if spent + 2.0 * stages * _steps(times, step) > _MOST_EVALUATIONS:
+            if not step or spent + 2.0 * stages * _steps(times, step) > _MOST_EVALUATIONS:
                 raise InputError(
                     f"gauss-{stages} gave up at t = {reached:.6g} s after {spent} right-hand "
                     "sides; take a shorter time, a larger tolerance or more stages"
@@ -112,7 +115,7 @@ def gauss(stages: int) -> Solver:
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
                 error = 2.0 * difference / (4.0**stages - 1.0)
                 close = error <= tolerance * scale or difference <= _ROUNDING * scale
-                if (close and found.status == COMPLETE) or found.blows_up(before):
+                if (close and found.status == COMPLETE) or found.blows_up(before, start):
                     count = _steps(times, step)
                     return _trajectory(times, found.rows, n, found.status, count, spent)
             before = found
@@ -129,12 +132,16 @@ class _Solution:
     status: int
     evaluations: int
 
-    def blows_up(self, coarser: "_Solution") -> bool:
+    def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Whether it ended where the coarser one did, with an omega that grows as steps fall."""
         if COMPLETE in (self.status, coarser.status):
             return False
+        # What only grows with time is as far from the coarser one in time as in size.
+        if abs(self.reached[0] - coarser.reached[0]) > 0.01 * abs(self.reached[0]):
+            return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
-        return largest > 1.5 * before > 1e3 * float(np.abs(self.rows[:, : self.n_rows]).max())
+        usual = float(np.abs(self.rows[:, : self.n_rows]).max(initial=start))
+        return largest > 1.5 * before > 1e3 * usual
 
 
 def _steps(times: Sequence[float], step: float) -> int:

@@ -7,7 +7,7 @@ module prepared
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
   use sphere, only: sphere_rows
-  use statuses, only: COMPLETE, REFUSED
+  use statuses, only: COMPLETE, OVERFLOW, REFUSED
   use torque_free, only: torque_free_end
   implicit none(type, external)
   private
@@ -96,6 +96,8 @@ contains
                       count)
       omega = rows(:, 1)
     end select
+    ! A start that is not finite may come back as it is, at time 0 for one.
+    if (ended == COMPLETE .and. .not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
     packed(STATUS) = real(ended, dp)
     packed(STEPS) = real(count, dp)
     ! Not ieee_value: that module ties the binary to libgfortran.

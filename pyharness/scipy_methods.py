@@ -1,5 +1,6 @@
 """`scipy.integrate.solve_ivp` as methods; SciPy is imported when one is used."""
 
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -15,7 +16,8 @@ _STEP_SHARE = 1.0 / 30.0
 # A phase of so many radians has hardly a digit left in binary64. What still grows there is on
 # its way to infinity in finite time, and LSODA would never come back from it.
 _LARGEST_PHASE = 1e13
-_MOST_EVALUATIONS = 2_000_000
+# Some ten seconds of Python; each wave of a torque adds an eighth to what a right-hand side costs.
+_MOST_EVALUATIONS = 1_000_000
 
 
 def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
@@ -31,13 +33,15 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
         rate = max(map(abs, scene.euler_coefficients))
         right_hand_side = scene.right_hand_side()
         evaluations = 0
+        waves = len(scene.torque.sines) + len(scene.torque.cosines)
+        most = _MOST_EVALUATIONS * 8 // (8 + waves)
 
         def counted(time: float, omega: Sequence[float]) -> list[float]:
             nonlocal evaluations
             evaluations += 1
-            if evaluations > _MOST_EVALUATIONS:
+            if evaluations > most:
                 raise InputError(
-                    f"{name} gave up at t = {time:.6g} s after {_MOST_EVALUATIONS} right-hand "
+                    f"{name} gave up at t = {time:.6g} s after {most} right-hand "
                     "sides; take a shorter time or a larger tolerance"
                 )
             return right_hand_side(time, omega)
@@ -46,17 +50,26 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             return _LARGEST_PHASE - rate * abs(time) * max(map(abs, omega))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
-        with np.errstate(all="ignore"):
-            result = solve_ivp(
-                counted,
-                (0.0, times[-1]),
-                scene.omega,
-                method=name,
-                t_eval=times,
-                events=phase_left,
-                rtol=step_tolerance,
-                atol=step_tolerance * (largest or 1.0),
-            )
+        # LSODA warns of what the rows that are missing say already.
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            try:
+                result = solve_ivp(
+                    counted,
+                    (0.0, times[-1]),
+                    scene.omega,
+                    method=name,
+                    t_eval=times,
+                    events=phase_left,
+                    rtol=step_tolerance,
+                    atol=step_tolerance * (largest or 1.0),
+                )
+            except InputError:
+                raise
+            except (ValueError, ArithmeticError) as error:
+                raise InputError(
+                    f"{name} gave up: {error}; take a shorter time, slower motion or smaller "
+                    "torques"
+                ) from None
         rows = result.y.T if len(result.t) else np.empty((0, 3))
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))

@@ -261,6 +261,20 @@ def test_scipy_that_meets_infinity_gives_up_in_words() -> None:
     assert solve(scene, [-0.48, -2353.0], "lsoda", 5e-7).ended == "overflow"
 
 
+def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A right-hand side of Radau costs three times that of the others: half a minute and more."""
+    monkeypatch.setattr("pyharness.scipy_methods._MOST_EVALUATIONS", 3_000)
+    waves = (((1.0, 2.0, 3.0), 1e4),) * 8
+    for law, method, most in (
+        (TorqueLaw((1e42, 0.0, 0.0)), "dop853", 3000),
+        (TorqueLaw((1e42, 0.0, 0.0)), "radau", 1000),
+        (TorqueLaw((1e42, 0.0, 0.0), sines=waves), "dop853", 1500),
+    ):
+        scene = Scene("", (1.0, 1.0, 9.0), moments=(4.0, 7.0, 8.5), torque=law)
+        with pytest.raises(InputError, match=f"after {most} right-hand"):
+            solve(scene, [0.7], method, 1e-9)
+
+
 def test_reference_as_a_method_gives_up_in_time() -> None:
     """It took minutes; whoever asks `pyharness.reference` may wait as long."""
     scene = Scene("", (0.01, 7.0, -9.7), moments=(9.85, 2.99, 1800.0))

@@ -262,12 +262,12 @@ def test_scipy_that_meets_infinity_gives_up_in_words() -> None:
 
 
 def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A right-hand side of Radau costs three times that of the others: half a minute and more."""
+    """A right-hand side of Radau costs more than that of the others: half a minute and more."""
     monkeypatch.setattr("pyharness.scipy_methods._MOST_EVALUATIONS", 3_000)
     waves = (((1.0, 2.0, 3.0), 1e4),) * 8
     for law, method, most in (
         (TorqueLaw((1e42, 0.0, 0.0)), "dop853", 3000),
-        (TorqueLaw((1e42, 0.0, 0.0)), "radau", 1000),
+        (TorqueLaw((1e42, 0.0, 0.0)), "radau", 1500),
         (TorqueLaw((1e42, 0.0, 0.0), sines=waves), "dop853", 1500),
     ):
         scene = Scene("", (1.0, 1.0, 9.0), moments=(4.0, 7.0, 8.5), torque=law)

@@ -16,8 +16,8 @@ _STEP_SHARE = 1.0 / 30.0
 # A phase of so many radians has hardly a digit left in binary64. What still grows there is on
 # its way to infinity in finite time, and LSODA would never come back from it.
 _LARGEST_PHASE = 1e13
-# Five to ten seconds of Python; each wave of a torque adds an eighth to what a right-hand side costs,
-# and Radau solves linear systems besides.
+# Five to ten seconds of Python; each wave of a torque adds an eighth to what a right-hand side
+# costs, and Radau solves linear systems besides.
 _MOST_EVALUATIONS = 500_000
 _RADAU_SHARE = 2
 

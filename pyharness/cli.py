@@ -36,10 +36,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # No matrix here is worth a second thread, and starting a pool of them costs a seventh of
     # `compare`. It counts only where NumPy is not imported yet.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if sys.stderr is None:  # closed by the caller, as in 2>&-
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
+    if sys.stdout is None:
+        return _complain("standard output is closed", 2)
     try:
-        code = _run(list(sys.argv[1:] if arguments is None else arguments))
-        sys.stdout.flush()
-        return code
+        try:
+            return _run(list(sys.argv[1:] if arguments is None else arguments))
+        finally:
+            sys.stdout.flush()
     except InputError as error:
         return _complain(str(error), 2)
     except NotBuiltError as error:
@@ -47,9 +52,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _complain("not enough memory; take fewer steps", 2)
     except BrokenPipeError:
-        # The reader has seen enough; Python must not complain when it closes the pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader has seen enough.
+        _leave_stdout()
         return 0
+    except OSError as error:
+        _leave_stdout()
+        return _complain(f"standard output: {error.strerror or error}", 2)
     except KeyboardInterrupt:
         return _complain("interrupted", 130)
 
@@ -75,6 +83,11 @@ def _run(arguments: list[str]) -> int:
     module.declare(parser)
     code: int = module.run(parser.read(verb, rest))
     return code
+
+
+def _leave_stdout() -> None:
+    # Python would try once more when it closes the stream, and complain.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str, code: int) -> int:

@@ -2,13 +2,33 @@
 
 from collections.abc import Iterable
 
+# More of a message than this is someone's input, given back at length.
+_LONGEST = 900
+
 
 class InputError(ValueError):
-    """A user's mistake: exit code 2 on the command line."""
+    """A user's mistake: exit code 2 on the command line.
+
+    Its text is one line that a terminal can show, whatever it quotes.
+    """
+
+    def __init__(self, message: str) -> None:
+        """Bring the message into one line."""
+        line = printable(" ".join(message.split()))
+        if len(line) > _LONGEST:
+            line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
+        super().__init__(line)
 
 
 class NotBuiltError(RuntimeError):
     """The compiled extension is missing: exit code 3 on the command line."""
+
+
+def printable(text: str) -> str:
+    """Return a text with what is no character, or steers a terminal, as an escape sequence."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def unknown(what: str, name: str, allowed: Iterable[str], where: str = "") -> InputError:

@@ -153,16 +153,31 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
         A, B, C; torque over moment (1/s2) and its rate (1/s3).
     sines, cosines : ndarray, shape (4, n)
         Columns of amplitude (1/s2) and frequency (rad/s).
+
+    Raises
+    ------
+    InputError
+        Where one of them is too large for binary64.
     """
     law = scene.torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
     sines, cosines = columns(law.sines), columns(law.cosines)
-    # What is too large for binary64 is infinite here, and the kernels say that it overflows.
     with np.errstate(over="ignore"):
         sines[:3] /= moments[:, None]
         cosines[:3] /= moments[:, None]
-        constant, rate = np.array(law.constant) / moments, np.array(law.rate) / moments
-    return np.array(scene.euler_coefficients), constant, rate, sines, cosines
+        found = (
+            np.array(scene.euler_coefficients),
+            np.array(law.constant) / moments,
+            np.array(law.rate) / moments,
+            sines,
+            cosines,
+        )
+    if not all(np.isfinite(each).all() for each in found):
+        raise InputError(
+            "A, B, C or torque over moment is not finite; take moments nearer to each other, or "
+            "smaller torques"
+        )
+    return found
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:

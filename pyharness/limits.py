@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, names_of, original, subset
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.reference import Reference, reference
@@ -18,6 +19,7 @@ from pyharness.scene import Scene
 from pyharness.trajectory import Array
 
 _TOLERANCE = 1e-11
+_MOST_EVALUATIONS = 1_000_000  # some ten seconds
 
 TENDS_TO = {
     "two-term": "the solution of w' = F(w) - (2/9) t^2 Q(F(w)), Q the quadratic part of F",
@@ -96,7 +98,7 @@ def limit(program: str, scene: Scene, halvings: int = 6) -> Limit:
             distances.append(float(np.abs(omega - goal).max()) if complete else math.inf)
         found.append(Halving(finer.step_size, *distances))
     last, before = found[-1].from_limit, found[-2].from_limit
-    finite = math.isfinite(before) and math.isfinite(last) and last > 0.0
+    finite = math.isfinite(before) and math.isfinite(last) and min(before, last) > 0.0
     return Limit(program, tends_to, tuple(found), math.log2(before / last) if finite else math.nan)
 
 
@@ -158,6 +160,17 @@ def _solved(
     from scipy.integrate import solve_ivp
 
     scale = max(map(abs, start)) or 1.0
+    evaluations = 0
+
+    def counted(time: float, state: Sequence[float]) -> list[float]:
+        nonlocal evaluations
+        evaluations += 1
+        if evaluations > _MOST_EVALUATIONS:
+            raise InputError(
+                f"limits: no limit found beyond t = {time:.6g} s after {_MOST_EVALUATIONS} "
+                "right-hand sides; take fewer or smaller steps"
+            )
+        return rate(time, state)
 
     def bounded(time: float, state: Sequence[float]) -> float:
         return 1e6 * scale - max(map(abs, state))
@@ -165,7 +178,7 @@ def _solved(
     bounded.terminal = True  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):
         result = solve_ivp(
-            rate,
+            counted,
             (0.0, times[-1]),
             start,
             method="DOP853",
@@ -175,7 +188,8 @@ def _solved(
             atol=_TOLERANCE * scale,
         )
     rows = np.full((len(times), len(start)), math.nan)
-    rows[: len(result.t)] = result.y.T
+    if len(result.t):  # else y is an empty list
+        rows[: len(result.t)] = result.y.T
     return rows
 
 

@@ -200,7 +200,9 @@ def _taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajector
 def _reference(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
     from pyharness.reference import reference
 
-    result = reference(scene, times)
+    # Some ten seconds; whoever holds something against the truth may wait longer.
+    waves = len(scene.torque.sines) + len(scene.torque.cosines)
+    result = reference(scene, times, most_steps=100_000 // (5 + waves))
     ended = "complete" if len(result.time) == len(times) else "overflow"
     return rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
 

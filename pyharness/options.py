@@ -44,6 +44,10 @@ class Parser(argparse.ArgumentParser):
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
             raise unknown("option", rest[0], self.option_names(), verb)
+        for name, value in vars(options).items():
+            # What argparse makes of `--name=--`.
+            if isinstance(value, list):
+                raise InputError(f"--{name.replace('_', '-')}: '--' is no value; give one")
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
@@ -239,4 +243,6 @@ def emit(content: str | bytes, out: str | None) -> None:
     elif isinstance(content, bytes):
         sys.stdout.buffer.write(content)
     else:
-        sys.stdout.write(content)
+        # A name may hold letters that the terminal's encoding lacks.
+        encoding = sys.stdout.encoding or "utf-8"
+        sys.stdout.write(content.encode(encoding, "backslashreplace").decode(encoding))

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pyharness.errors import InputError
+from pyharness.pipes import write_waiting
 
 
 def check_writable(path: str, option: str) -> None:
@@ -15,6 +16,8 @@ def check_writable(path: str, option: str) -> None:
     try:
         if "\0" in path:
             reason = "a path has no null character"
+        elif not path:
+            reason = "a name is missing"
         elif target.is_dir():
             reason = "is a folder"
         elif not folder.is_dir():
@@ -37,7 +40,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
     try:
         for path, content in contents.items():
             if Path(path).exists() and not Path(path).is_file():
-                Path(path).write_bytes(content)
+                write_waiting(path, content)
                 continue
             handle, temporary = tempfile.mkstemp(dir=Path(path).parent, prefix=".pyharness-")
             written.append((temporary, path))

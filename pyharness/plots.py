@@ -80,7 +80,9 @@ def comparison_picture(comparison: Comparison, path: str) -> dict[str, bytes]:
     title = f"Case {scene.case}: {scene.name}" if scene.case else scene.name
     ended = any(each.trajectory.ended != "complete" for each in comparison.programs)
     note = "\nx: the program stopped or overflowed" if ended else ""
-    figure.suptitle(f"{title}; thin line: error of the reference{note}", fontsize=10)
+    figure.suptitle(
+        f"{title}; thin line: error of the reference{note}", fontsize=10, parse_math=False
+    )
     buffer = io.BytesIO()
     figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
     numbers = str(Path(path).with_suffix(".csv"))
@@ -100,7 +102,7 @@ def trajectory_picture(title: str, trajectory: Trajectory, path: str) -> dict[st
         axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         axes[row].grid(visible=True, linewidth=0.3)
     axes[2].set_xlabel("time (s)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(title, fontsize=10, parse_math=False)
     buffer = io.BytesIO()
     figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
     numbers = csv_text(*trajectory_rows(trajectory))

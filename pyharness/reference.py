@@ -24,7 +24,7 @@ DIGITS = 40
 # Order and tolerance (relative to the solution, per step) of the two series that are compared.
 _QUICK = ((20, Decimal("1e-19")), (24, Decimal("1e-22")))
 _PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
-_MOST_STEPS = 100_000
+MOST_STEPS = 100_000
 _HALF_ULP = 2.0**-53
 
 Row = list[Decimal]
@@ -65,7 +65,11 @@ class Reference:
 
 
 def reference(
-    scene: Scene, times: Sequence[float], velocity: bool = False, precise: bool = False
+    scene: Scene,
+    times: Sequence[float],
+    velocity: bool = False,
+    precise: bool = False,
+    most_steps: int = MOST_STEPS,
 ) -> Reference:
     """Return the true solution of `scene` at `times`.
 
@@ -80,6 +84,8 @@ def reference(
     precise : bool
         Whether the series should be good to 1e-25 before rounding, where the motion itself
         allows it, and not only to more digits than binary64 has.
+    most_steps : int
+        Of a series; each takes about a third of a millisecond, some more with waves.
 
     Returns
     -------
@@ -103,8 +109,8 @@ def reference(
         if known is not None and not velocity:
             return _rounded(times, known, None, "known solution", Decimal(1).scaleb(3 - DIGITS))
         coarse, fine = _PRECISE if precise else _QUICK
-        first = _series(scene, exact, False, *coarse)
-        second = _series(scene, exact, velocity, *fine)
+        first = _series(scene, exact, False, *coarse, most_steps)
+        second = _series(scene, exact, velocity, *fine, most_steps)
         rows = min(len(first), len(second))
         omega = [row[:3] for row in second[:rows]]
         estimate = _largest_difference(first[:rows], omega)
@@ -160,21 +166,26 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
 
 
 def _series(
-    scene: Scene, times: Sequence[Decimal], velocity: bool, order: int, tolerance: Decimal
+    scene: Scene,
+    times: Sequence[Decimal],
+    velocity: bool,
+    order: int,
+    tolerance: Decimal,
+    most_steps: int,
 ) -> list[Row]:
     """Return omega (and velocity) at `times` by Taylor steps; fewer rows where it blows up."""
     equations = _Equations(scene, velocity)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     begin = Decimal(0)
     rows: list[Row] = []
-    for step in range(_MOST_STEPS):
+    for step in range(most_steps):
         coefficients = equations.expand(begin, state, order)
         scale = max(map(abs, state[:3])) or Decimal(1)
         rest = abs(times[-1] - begin)
         length = _step(coefficients, scale * tolerance, rest).copy_sign(times[-1])
         if begin + length == begin and rest:
             return rows
-        if step == 0 and rest > 10 * _MOST_STEPS * abs(length):
+        if step == 0 and rest > 10 * most_steps * abs(length):
             break
         while len(rows) < len(times) and abs(times[len(rows)]) <= abs(begin + length):
             rows.append(_evaluate(coefficients, times[len(rows)] - begin))
@@ -183,7 +194,7 @@ def _series(
         state = _evaluate(coefficients, length)
         begin += length
     raise InputError(
-        f"reference: more than {_MOST_STEPS} Taylor steps would be needed; "
+        f"reference: more than {most_steps} Taylor steps would be needed; "
         "take a shorter time, slower motion or slower torques"
     )
 

@@ -104,9 +104,8 @@ class Scene:
             )
         limit = most_steps()
         if not 1 <= self.steps <= limit:
-            size = f" (it would need {self.steps * _BYTES_PER_STEP / 1e9:.3g} GB)"
             raise InputError(
-                f"steps is {self.steps}{size if self.steps > limit else ''}; "
+                f"steps is {_size(self.steps, limit)}; "
                 f"allowed: 1 to {limit}, what fits in this machine's memory"
             )
         if not math.isfinite(self.step_size * self.steps):
@@ -164,6 +163,14 @@ def most_steps() -> int:
     """Return the largest number of steps whose rows fit in half of this machine's memory."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
+
+
+def _size(steps: int, limit: int) -> str:
+    # A whole number has no bound: Python refuses to write or to convert one of many digits.
+    if abs(steps) > 10**18:
+        return "a number of more than 18 digits"
+    size = f" (it would need {steps * _BYTES_PER_STEP / 1e9:.3g} GB)"
+    return f"{steps}{size if steps > limit else ''}"
 
 
 def _triple(values: Sequence[float]) -> Triple:

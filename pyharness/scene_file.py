@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from pyharness.errors import InputError, unknown
+from pyharness.errors import InputError, printable, unknown
 from pyharness.facts import facts
+from pyharness.pipes import read_some
 from pyharness.scene import Scene, TorqueLaw, Triple, Wave
 
 _LARGEST_FILE = 1_000_000
@@ -59,8 +60,7 @@ def read_scene(path: str | Path) -> Scene:
 def read_toml(path: str | Path, where: str) -> dict[str, Any]:
     """Return the content of a user's TOML file; InputError, which begins with `where`, if none."""
     try:
-        with open(path, "rb") as file:
-            content = file.read(_LARGEST_FILE + 1)
+        content = read_some(str(path), _LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{where}: {reason}; give a TOML file that can be read") from None
@@ -117,7 +117,7 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
     if isinstance(steps, bool) or not isinstance(steps, int):
         raise InputError(f"[run] steps is {kind_of(steps)}; it must be a whole number")
     return Scene(
-        name=" ".join(name.split())[:60],
+        name=printable(" ".join(name.split())[:60]),
         omega=_numbers("[initial] omega", initial["omega"]),
         moments=_optional("[body] moments", body.get("moments")),
         coefficients=_optional("[body] coefficients", body.get("coefficients")),

@@ -1,5 +1,6 @@
 """`scipy.integrate.solve_ivp` as methods; SciPy is imported when one is used."""
 
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -20,7 +21,10 @@ _FINEST_STEP = 7e-13 * _STEP_SHARE
 # A phase of so many radians has hardly a digit left in binary64. What still grows there is on
 # its way to infinity in finite time, and LSODA would never come back from it.
 _LARGEST_PHASE = 1e13
-_MOST_EVALUATIONS = 2_000_000
+# Five to ten seconds of Python; each wave of a torque adds an eighth to what a right-hand side
+# costs, and Radau solves linear systems besides.
+_MOST_EVALUATIONS = 500_000
+_RADAU_SHARE = 2
 
 
 def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
@@ -43,13 +47,17 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             step_tolerance = max(_FINEST_STEP, tolerance * share)
         right_hand_side = scene.right_hand_side()
         evaluations = 0
+        waves = len(scene.torque.sines) + len(scene.torque.cosines)
+        most = _MOST_EVALUATIONS * 8 // (8 + waves)
+        if name == "Radau":
+            most //= _RADAU_SHARE
 
         def counted(time: float, omega: Sequence[float]) -> list[float]:
             nonlocal evaluations
             evaluations += 1
-            if evaluations > _MOST_EVALUATIONS:
+            if evaluations > most:
                 raise InputError(
-                    f"{name} gave up at t = {time:.6g} s after {_MOST_EVALUATIONS} right-hand "
+                    f"{name} gave up at t = {time:.6g} s after {most} right-hand "
                     "sides; take a shorter time or a larger tolerance"
                 )
             return right_hand_side(time, omega)
@@ -58,8 +66,9 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             return _LARGEST_PHASE - rate * abs(time) * max(map(abs, omega))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
-        try:
-            with np.errstate(all="ignore"):
+        # LSODA warns of what the rows that are missing say already.
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            try:
                 result = solve_ivp(
                     counted,
                     (0.0, times[-1]),
@@ -70,11 +79,17 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
                     rtol=step_tolerance,
                     atol=step_tolerance * (largest or 1.0),
                 )
-        except ValueError as error:
-            # Radau's linear algebra refuses what has left the range of numbers.
-            if "infs or NaNs" not in str(error):
+            except InputError:
                 raise
-            return rows_trajectory([], np.empty((0, 3)), evaluations, len(times), "overflow")
+            except (ValueError, ArithmeticError) as error:
+                # Radau's linear algebra refuses what has left the range of numbers.
+                if "infs or NaNs" in str(error):
+                    rows = np.empty((0, 3))
+                    return rows_trajectory([], rows, evaluations, len(times), "overflow")
+                raise InputError(
+                    f"{name} gave up: {error}; take a shorter time, slower motion or smaller "
+                    "torques"
+                ) from None
         rows = result.y.T if len(result.t) else np.empty((0, 3))
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))

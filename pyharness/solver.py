@@ -208,6 +208,4 @@ def _pack(scene: Scene, code: int, tolerance: float) -> Array:
     packed[5:14] = np.concatenate([coefficients, constant, rate])
     packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
     packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
-    if not np.isfinite(packed).all():
-        raise InputError("torque over moment is not finite; take smaller torques")
     return packed

@@ -10,7 +10,8 @@ module fixed_step
   integer, parameter, public :: IMPROVED_EULER = 1
   integer, parameter, public :: TAYLOR_3 = 2
   integer, parameter, public :: RUNGE_KUTTA_4 = 3
-  real(dp), parameter :: MOST_STEPS = 4e8_dp  ! four right-hand sides a step are counted
+  ! Four right-hand sides a step are counted; and some ten seconds are as long as anyone waits.
+  real(dp), parameter :: MOST_STEPS = 4e8_dp
   real(dp), parameter :: EXCESS = 1e-6_dp     ! of a step, rather than one step more
 
   public :: fixed_step_rows
@@ -43,10 +44,14 @@ contains
     real(dp) :: begin
     real(dp) :: h
     real(dp) :: n_steps
+    real(dp) :: most_steps_here
     integer :: i
 
     n_rows = 0
     status = GAVE_UP
+    ! A torque that varies costs as much as the step, a wave twice that.
+    most_steps_here = MOST_STEPS/(1.0_dp + 2.0_dp*real(n_sines + n_cosines, dp) &
+                                  + merge(1.0_dp, 0.0_dp, any(abs(m_rate) > 0.0_dp)))
     steps = 0
     evaluations = 0
     y = omega0
@@ -54,7 +59,7 @@ contains
     do i = 1, n_times
       h = sign(step, times(i) - begin)
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
-      if (.not. steps + n_steps <= MOST_STEPS) return
+      if (.not. steps + n_steps <= most_steps_here) return
       steps = steps + int(n_steps)
       evaluations = per_step(method)*steps
       call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &

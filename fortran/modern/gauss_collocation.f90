@@ -11,7 +11,7 @@ module gauss_collocation
   private
 
   integer, parameter :: MOST_ITERATIONS = 60
-  integer, parameter :: MOST_EVALUATIONS = 2000000000
+  integer, parameter :: MOST_EVALUATIONS = 200000000 ! some ten seconds
   real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling
   real(dp), parameter :: EXCESS = 1e-6_dp       ! of a step, rather than one step more
 
@@ -48,6 +48,7 @@ contains
     real(dp) :: begin
     real(dp) :: h
     real(dp) :: n_steps
+    real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
     logical :: varies
     integer :: i
@@ -67,7 +68,9 @@ contains
     begin = 0.0_dp
     do i = 1, n_times
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
-      if (.not. n_steps*real(stages, dp) <= real(MOST_EVALUATIONS, dp)) then
+      ! Two iterations a step at the least; a wave costs as much as one.
+      cost = n_steps*real(stages, dp)*real(2 + n_sines + n_cosines, dp)
+      if (.not. cost <= real(MOST_EVALUATIONS - evaluations, dp)) then
         status = GAVE_UP
         return
       end if

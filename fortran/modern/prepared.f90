@@ -189,6 +189,8 @@ contains
                       count)
       omega = rows(:, 1)
     end select
+    ! A start that is not finite may come back as it is, at time 0 for one.
+    if (ended == COMPLETE .and. .not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
     packed(STATUS) = real(ended, dp)
     packed(STEPS) = real(count, dp)
   end subroutine solve_as_given

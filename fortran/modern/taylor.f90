@@ -210,8 +210,12 @@ contains
       do while (n_rows < n_times)
         if (abs(times(n_rows + 1) - t) > abs(h)) exit
         if (at_end .and. n_rows + 1 == n_times) exit
+        rows(:, n_rows + 1) = w + (w_low + inside(s, ((times(n_rows + 1) - t) - t_low)/h))
+        if (.not. all(abs(rows(:, n_rows + 1)) <= huge(scale))) then
+          status = OVERFLOW
+          return
+        end if
         n_rows = n_rows + 1
-        rows(:, n_rows) = w + (w_low + inside(s, ((times(n_rows) - t) - t_low)/h))
       end do
       change(1) = ((s%tail(1) + s%left(2, 3)) + s%left(2, 2)) + s%left(2, 1)
       change(2) = ((s%tail(2) + s%left(1, 3)) + s%left(1, 2)) + s%left(1, 1)

@@ -35,7 +35,7 @@ class UntoldException(AssertionError):
 
 def guard(module: ModuleType) -> int:
     """Put a guard before every compiled entry of an extension; return how many."""
-    _print_places()
+    _print_places(module)
     count = 0
     for name in dir(module):
         entry = getattr(module, name)
@@ -93,9 +93,9 @@ def _mathematics() -> ctypes.CDLL:
     return ctypes.CDLL(ctypes.util.find_library("m"))
 
 
-def _print_places() -> None:
-    """Let the Fortran library, where it is loaded, print the lines that led to a trap."""
-    library = ctypes.CDLL(None)
+def _print_places(module: ModuleType) -> None:
+    """Let the Fortran library, where the extension has one, print the lines that led to a trap."""
+    library = ctypes.CDLL(module.__file__ or "")
     if hasattr(library, "_gfortran_set_options"):
-        # warn and allow the standard's dialects, pedantic, dump, backtrace, signed zero, bounds
-        library._gfortran_set_options(7, (ctypes.c_int * 7)(68, 8191, 0, 0, 1, 1, 1))
+        # Four options as gfortran's own main programs pass them; the last asks for the backtrace.
+        library._gfortran_set_options(4, (ctypes.c_int * 4)(68, 8191, 0, 1))

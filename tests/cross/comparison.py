@@ -40,6 +40,6 @@ def again(build: str, cell: str) -> str:
     return inside(build, replay(cell))
 
 
-def inside(build: str, module: str) -> str:
+def inside(build: str, module: str, variables: str = "") -> str:
     """Return the command that runs a module in the tree of a build."""
-    return f"cd build/cross/{build} && ../environment/bin/python -m {module}"
+    return f"cd build/cross/{build} && {variables}../environment/bin/python -m {module}"

@@ -1,5 +1,7 @@
 """The cross-check's own parts: digests, their comparison, claims, floating-point guards."""
 
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +15,7 @@ from pyharness.kernels import COMPLETE, GAVE_UP, OVERFLOW
 from pyharness.listing import original
 from pyharness.trajectory import Stop
 from tests import traps
-from tests.cross.builds import Build, false_claims
+from tests.cross.builds import ROOT, Build, false_claims
 from tests.cross.comparison import compared
 from tests.cross.digests import digest, replay
 from tests.traps import DIVIDE, INVALID, TOO_LARGE, UntoldException, guarded
@@ -145,3 +147,21 @@ def test_guard_lets_through_what_the_answer_tells_of(
     else:
         with pytest.raises(UntoldException, match="entry: "):
             call()
+
+
+@pytest.mark.external
+@pytest.mark.skipif(not (ROOT / ".ci/flang").exists(), reason="needs a checkout")
+@pytest.mark.parametrize(
+    ("named", "words"), [("", "no flang, and none could be installed"), ("none", "no 'none'")]
+)
+def test_flang_that_can_not_be_had_is_one_line(named: str, words: str, tmp_path: Path) -> None:
+    """The cross-check shows it and goes on."""
+    for tool in ("sh", "id"):
+        (tmp_path / tool).symlink_to(shutil.which(tool) or "")
+    environment = {"PATH": str(tmp_path), "INSTALL": "no", "FLANG": named}
+    done = subprocess.run(
+        [str(ROOT / ".ci/flang")], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert words in done.stderr
+    assert len(done.stderr.splitlines()) == 1

@@ -133,7 +133,8 @@ def _entry(status: int, quotient: float) -> Callable[..., Any]:
         (INVALID, COMPLETE, 0.0, False),
         (INVALID, OVERFLOW, 0.0, False),
         (DIVIDE, COMPLETE, 0.0, False),
-        (DIVIDE | TOO_LARGE, OVERFLOW, 0.0, False),
+        (DIVIDE, OVERFLOW, 0.0, False),
+        (DIVIDE | TOO_LARGE, OVERFLOW, 0.0, True),
         (TOO_LARGE, COMPLETE, np.inf, False),
     ],
 )

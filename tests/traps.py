@@ -81,8 +81,9 @@ def _told(found: dict[str, Any], raised: int) -> int:
     """Return the exceptions that an answer tells of."""
     told = 0
     if found.get("status") in (OVERFLOW, GAVE_UP) and raised & TOO_LARGE:
-        # What became infinite, taken from another infinity, is invalid too; not so by itself.
-        told |= TOO_LARGE | INVALID
+        # An infinity taken from another is invalid, and a step of one over infinity is zero; either
+        # by itself is not told.
+        told |= _TRAPPED
     if np.isinf(found.get("stop_quotient", 0.0)):
         told |= DIVIDE
     return told

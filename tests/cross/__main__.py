@@ -103,7 +103,11 @@ def _jobs() -> tuple[list[Job], list[str]]:
         skipped.append(f"skipped: gfortran -O3 for this processor: {gfortran} has no such option")
     else:
         jobs.append(Job(Build("gfortran-O3-native", gfortran, "gcc", "3", (native,)), tests=modern))
-        fused = ("meson.build", "'-nostdinc', '-ffp-contract=off'", "'-nostdinc', '-ffp-contract=fast'")
+        fused = (
+            "meson.build",
+            "'-nostdinc', '-ffp-contract=off'",
+            "'-nostdinc', '-ffp-contract=fast'",
+        )
         contracted = Build("contracted", gfortran, "gcc", "3", (native,), "fast", plants=(fused,))
         if fuses_here():
             jobs.append(Job(contracted))

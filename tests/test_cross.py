@@ -150,6 +150,14 @@ def test_guard_lets_through_what_the_answer_tells_of(
             call()
 
 
+def test_guard_knows_an_infinity_that_was_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(traps, "_mathematics", lambda: _Flags(INVALID))
+    call = guarded("entry", _entry(OVERFLOW, 0.0))
+    assert call(np.array([np.inf, 1.0]), 2) == (OVERFLOW, 0.0)
+    with pytest.raises(UntoldException):
+        call(np.array([1.0, 1.0]), 2)
+
+
 @pytest.mark.external
 @pytest.mark.skipif(not (ROOT / ".ci/flang").exists(), reason="needs a checkout")
 @pytest.mark.parametrize(

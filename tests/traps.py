@@ -59,7 +59,7 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
         if name == "solve_packed":
             found["status"] = int(args[0][_STATUS_AT])
-        untold = raised & ~_told(found, raised)
+        untold = raised & ~_told(found, bool(raised & TOO_LARGE) or not _finite(args))
         if not untold:
             return answer
         words = ", ".join(word for bit, word in _NAMES.items() if untold & bit)
@@ -77,16 +77,20 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
     return functools.wraps(entry, assigned=("__doc__",), updated=())(call)
 
 
-def _told(found: dict[str, Any], raised: int) -> int:
+def _told(found: dict[str, Any], has_infinity: bool) -> int:
     """Return the exceptions that an answer tells of."""
     told = 0
-    if found.get("status") in (OVERFLOW, GAVE_UP) and raised & TOO_LARGE:
+    if found.get("status") in (OVERFLOW, GAVE_UP) and has_infinity:
         # An infinity taken from another is invalid, and a step of one over infinity is zero; either
         # by itself is not told.
         told |= _TRAPPED
     if np.isinf(found.get("stop_quotient", 0.0)):
         told |= DIVIDE
     return told
+
+
+def _finite(args: tuple[Any, ...]) -> bool:
+    return all(np.isfinite(np.asarray(each, dtype=float)).all() for each in args)
 
 
 @functools.cache

@@ -19,3 +19,8 @@ def level_here() -> int:
     simd = np.show_config(mode="dicts")["SIMD Extensions"]
     found = {*simd["baseline"], *simd["found"]}
     return sum(not names.isdisjoint(found) for names in _NAMES)
+
+
+def fuses_here() -> bool:
+    """Whether this processor multiplies and adds in one operation."""
+    return level_here() > 0 or platform.machine().lower() in ("arm64", "aarch64")

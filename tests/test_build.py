@@ -25,6 +25,7 @@ def _dependencies(path: str) -> str:
 
 
 @pytest.mark.external
+@pytest.mark.skipif("-fcheck" in (build().flags or ""), reason="run-time checks have messages")
 def test_extension_needs_no_fortran_library_at_run_time() -> None:
     needed = _dependencies(kernels.extension().__file__ or "")
     assert "lib" in needed

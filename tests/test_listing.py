@@ -78,7 +78,7 @@ def test_listing_refuses_what_the_program_has_not() -> None:
 
 
 def test_divergences_are_complete_entries() -> None:
-    kinds = {"cross-language", "from-the-listing", "from-the-plan"}
+    kinds = {"cross-language", "cross-build", "from-the-listing", "from-the-plan"}
     identities = [entry["id"] for entry in divergences()]
     assert len(set(identities)) == len(identities)
     for entry in divergences():

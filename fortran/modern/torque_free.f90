@@ -108,11 +108,11 @@ contains
     orbit%time_exponent = 0
     orbit%omega_exponent = 0
     largest = max(abs(a(1)), abs(a(2)), abs(a(3)))
-    if (.not. (largest <= LARGE .and. largest*LARGE >= 1.0_dp)) then
+    if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
       call bring_near_one(a, orbit%time_exponent)
     end if
     largest = max(abs(w(1)), abs(w(2)), abs(w(3)))
-    if (.not. (largest <= LARGE .and. largest*LARGE >= 1.0_dp)) then
+    if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
       call bring_near_one(w, orbit%omega_exponent)
       orbit%time_exponent = orbit%time_exponent + orbit%omega_exponent
     end if

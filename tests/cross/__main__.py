@@ -1,0 +1,225 @@
+"""`make cross-check`: make every build, compare their bits, run the suites; 1 on any fault."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from pyharness.check_tables import checks_table
+from pyharness.checks import Check
+from pyharness.facts import facts
+from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
+from tests.cross.comparison import compared, inside
+from tests.instruction_sets import fuses_here
+
+FOLDER = ROOT / "build" / "cross"
+# The kernels that answer to the truth, not to bits.
+MODERN = [
+    f"tests/test_{name}.py"
+    for name in (
+        "closed_form", "fixed_step", "gauss", "linear_solver", "quick", "solver", "taylor",
+    )
+]  # fmt: skip
+# Recursion: the entries release the lock, so that two threads may well be in one of them.
+CHECKED = (
+    "-fcheck=all,no-recursion", "-finit-real=snan", "-finit-integer=-2147483647",
+    "-finit-logical=true", "-finit-derived",
+)  # fmt: skip
+ORIGINAL = "fortran/original/"
+# Faults that bits need not show: program, file, what stands there, the fault, what must be said.
+FAULTS = {
+    "index": ("two-term", ("two_term.f90", "M1(3) + A1*U2(3)*U3(3)",
+                           "M1(3) + A1*U2(3)*U3(3) + 0.0_dp*U3(2 + I)"), "above upper bound"),
+    "uninitialised": ("four-term", ("four_term.f90", "V1(1) = 0.0_dp", "continue"), "invalid"),
+    "zero": ("runge-kutta", ("runge_kutta.f90", "begin = real(L - 1, dp)*scene%step_size",
+                             "begin = scene%step_size/real(L - 1, dp)"), "divide by zero"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Job:
+    """A build, and what is done with it after its bits are compared.
+
+    Attributes
+    ----------
+    build : Build
+        How it is made.
+    faulty : bool
+        Whether it is to be caught at its faults, and nothing else.
+    tests : tuple of str or None
+        The tests to run; all where empty.
+    """
+
+    build: Build
+    faulty: bool = False
+    tests: tuple[str, ...] | None = None
+
+
+def main() -> int:
+    """Run the builds named on the command line, or all."""
+    jobs, skipped = _jobs()
+    chosen = sys.argv[1:] or [job.build.name for job in jobs]
+    for name in chosen:
+        if name not in {job.build.name for job in jobs}:
+            print(f"cross-check: no build '{name}'; skipped: {skipped}", file=sys.stderr)
+            return 2
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    environment(FOLDER / "environment")
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        # The longest first.
+        ordered = sorted(
+            (job for job in jobs if job.build.name in chosen),
+            key=lambda job: job.tests != (),
+        )
+        twin = pool.submit(_twin)
+        checks = [
+            check
+            for found in pool.map(lambda job: list(_checked(job, twin.result())), ordered)
+            for check in found
+        ]
+    print(checks_table(skipped, checks, 2), end="")
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _jobs() -> tuple[list[Job], list[str]]:
+    """Return what can be made here, and in words what can't."""
+    gfortran = os.environ.get("FC", "gfortran")
+    modern = tuple(MODERN)
+    faults = tuple((ORIGINAL + file, old, new) for _, (file, old, new), _ in FAULTS.values())
+    jobs = [
+        Job(Build("gfortran-O0", gfortran, "gcc", "0"), tests=modern),
+        Job(Build("gfortran-O2", gfortran, "gcc", "2"), tests=modern),
+        Job(Build("debug", gfortran, "gcc", "0", CHECKED, checked=True), tests=()),
+        Job(Build("faulty", gfortran, "gcc", "0", CHECKED, checked=True, plants=faults), True),
+    ]
+    skipped = []
+    native = native_flag(gfortran)
+    if native is None:
+        skipped.append(f"skipped: gfortran -O3 for this processor: {gfortran} has no such option")
+    else:
+        jobs.append(Job(Build("gfortran-O3-native", gfortran, "gcc", "3", (native,)), tests=modern))
+        fused = (
+            "meson.build",
+            "'-nostdinc', '-ffp-contract=off'",
+            "'-nostdinc', '-ffp-contract=fast'",
+        )
+        contracted = Build("contracted", gfortran, "gcc", "3", (native,), "fast", plants=(fused,))
+        if fuses_here():
+            jobs.append(Job(contracted))
+        else:
+            skipped.append("skipped: contracted: this processor has no fused multiply-add")
+    found = subprocess.run(
+        [str(ROOT / ".ci" / "flang")], capture_output=True, text=True, check=False
+    )
+    if found.returncode:
+        skipped.append(f"skipped: flang: {(found.stderr.splitlines() or ['?'])[-1]}")
+    else:
+        flang = Build("flang-O2", found.stdout.strip(), "llvm-flang", "2")
+        jobs.append(Job(flang, tests=modern))
+    return jobs, skipped
+
+
+def _twin() -> dict[str, str]:
+    """Return the digests of the Python twin, computed in this checkout."""
+    file = FOLDER / "twin.json"
+    command = [sys.executable, "-m", "tests.cross.digests", "python", str(file)]
+    subprocess.run(command, cwd=ROOT, check=True)
+    digests: dict[str, str] = json.loads(file.read_text())["digests"]
+    return digests
+
+
+def _checked(job: Job, twin: dict[str, str]) -> Iterator[Check]:
+    name = job.build.name
+    replay = f"make cross-check ARGS={name}"
+    begin = time.monotonic()
+    try:
+        tree = make(job.build, FOLDER)
+    except RuntimeError as error:
+        yield Check(f"build/{name}", False, None, None, replay, str(error))
+        return
+    built = time.monotonic()
+    if job.faulty:
+        yield from _faults(tree)
+        _tell(name, begin, built, built)
+        return
+    done = _run(tree, ["-m", "tests.cross.digests", "fortran", "digests.json"])
+    if done.returncode:
+        yield Check(f"build/{name}", False, None, None, replay, done.stdout[-1000:])
+        return
+    record = json.loads((tree / "digests.json").read_text())
+    wrong = false_claims(job.build, tree, record)
+    yield Check(f"build/{name}", not wrong, None, None, replay, "; ".join(wrong))
+    entries = facts("divergences")["divergence"]
+    listed = {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
+    bits = list(compared(name, record["digests"], twin, listed))
+    if job.build.contract != "off":
+        seen = sum(not check.passed for check in bits)
+        note = f"{seen} of {len(bits)} cells differ" if seen else "the comparison sees no fault"
+        yield Check("fault/contraction", seen > 0, None, None, replay, note)
+    else:
+        yield from bits
+    compared_at = time.monotonic()
+    if job.tests is not None:
+        yield _suite(job, tree)
+    _tell(name, begin, built, compared_at)
+
+
+def _tell(name: str, begin: float, built: float, compared_at: float) -> None:
+    print(
+        f"cross-check: {name}: built in {built - begin:.0f} s, compared in "
+        f"{compared_at - built:.0f} s, tested in {time.monotonic() - compared_at:.0f} s",
+        file=sys.stderr,
+    )
+
+
+def _suite(job: Job, tree: Path) -> Check:
+    """Run tests in the tree of a build, with traps where it has run-time checks."""
+    name = job.build.name
+    # A test that ends the process is named by the line before, if nothing is held back.
+    shown = "-sv" if job.build.checked else "-q"
+    arguments = ["pytest", shown, "-p", "no:cacheprovider", *(job.tests or ())]
+    done = _run(tree, ["-m", *arguments], traps=job.build.checked)
+    log = FOLDER / f"{name}.log"
+    log.write_text(done.stdout)
+    traps = "PYHARNESS_TRAPS=1 " if job.build.checked else ""
+    replay = inside(name, " ".join(arguments), traps)
+    note = ""
+    if done.returncode:
+        lines = done.stdout.splitlines()
+        failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
+        died = [line for line in lines if "Fortran runtime error" in line or ", untold" in line]
+        last = [line for line in lines if line.startswith("tests/")][-1:]
+        words = failed or [*last, *died] or lines[-3:]
+        note = "; ".join([*(each[:300] for each in words), f"see {log.relative_to(ROOT)}"])
+    return Check(f"tests/{name}", done.returncode == 0, None, None, replay, note)
+
+
+def _faults(tree: Path) -> Iterator[Check]:
+    """See that each planted fault ends the process, by the message that is due."""
+    for name, (program, _, words) in FAULTS.items():
+        code = (
+            "import tests.conftest; from pyharness.cli import main; "
+            f"main(['run', '--case', '3', '--program', '{program}', '--listing', 'original'])"
+        )
+        done = _run(tree, ["-c", code], traps=True)
+        seen = done.returncode != 0 and words in done.stdout
+        note = "" if seen else f"not seen: {words}\n{done.stdout[-2000:]}"
+        replay = "make cross-check ARGS=faulty"
+        yield Check(f"fault/{name}", seen, None, None, replay, note)
+
+
+def _run(tree: Path, arguments: list[str], traps: bool = False) -> subprocess.CompletedProcess[str]:
+    variables = {"PYHARNESS_TRAPS": "1"} if traps else {}
+    return subprocess.run(
+        [str(FOLDER / "environment" / "bin" / "python"), *arguments], cwd=tree, check=False,
+        env=os.environ | variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,169 @@
+"""The builds that are held against each other, and whether each is what it claims to be."""
+
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent.parent
+NOT_COPIED = shutil.ignore_patterns(".*_cache", ".git", ".venv", "build", "dist", "__pycache__")
+
+
+@dataclass(frozen=True)
+class Build:
+    """One way to compile the project.
+
+    Attributes
+    ----------
+    name : str
+        Also that of its folder.
+    compiler : str
+        The command.
+    family : str
+        What meson calls such a compiler.
+    optimization : str
+        Meson's word: 0, 2, 3.
+    flags : tuple of str
+        What is asked of the compiler beyond that.
+    contract : str
+        What the original programs are to be compiled with: ``off``, or ``fast`` for the build
+        that shows that the comparison sees a compiler's fault.
+    checked : bool
+        Whether this is a build with run-time checks, which needs the compiler's library.
+    plants : tuple
+        File, what stands there, the fault that takes its place.
+    """
+
+    name: str
+    compiler: str
+    family: str
+    optimization: str
+    flags: tuple[str, ...] = ()
+    contract: str = "off"
+    checked: bool = False
+    plants: tuple[tuple[str, str, str], ...] = ()
+
+
+def make(build: Build, folder: Path) -> Path:
+    """Copy the checkout into `folder`, build there, and put the extension into its package.
+
+    Raises
+    ------
+    RuntimeError
+        With the end of what the build said.
+    """
+    tree = folder / build.name
+    shutil.rmtree(tree, ignore_errors=True)
+    shutil.copytree(ROOT, tree, ignore=NOT_COPIED)
+    for file, old, new in build.plants:
+        text = (tree / file).read_text()
+        if text.count(old) != 1:
+            raise RuntimeError(f"{old!r} stands {text.count(old)} times in {file}")
+        (tree / file).write_text(text.replace(old, new))
+    if build.checked:
+        _fill_results_with_nan(tree)
+    environment = dict(os.environ)
+    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
+    environment["FC"] = build.compiler
+    environment["FFLAGS"] = " ".join(build.flags)
+    options = [f"-Doptimization={build.optimization}", f"-Ddebug={str(build.checked).lower()}"]
+    for command in (["meson", "setup", "build", *options], ["meson", "compile", "-C", "build"]):
+        done = subprocess.run(
+            command, cwd=tree, env=environment, check=False,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )  # fmt: skip
+        if done.returncode:
+            end = "\n".join(done.stdout.splitlines()[-20:])
+            raise RuntimeError(f"{build.name}: {shlex.join(command)} failed\n{end}")
+    (module,) = (
+        path for path in (tree / "build").glob("_kernels.*") if path.suffix in (".so", ".pyd")
+    )
+    shutil.copy2(module, tree / "pyharness")
+    shutil.copy2(tree / "build" / "_build.py", tree / "pyharness")
+    return tree
+
+
+def _fill_results_with_nan(tree: Path) -> None:
+    """F2py hands out results that begin as zeros: let them begin as NaN, and integers as -1."""
+    import numpy.f2py
+
+    text = (Path(numpy.f2py.get_include()) / "fortranobject.c").read_text()
+    zeros = "PyArray_FILLWBYTE(arr, 0);"
+    meson = (tree / "meson.build").read_text()
+    place = "f2py_folder / 'fortranobject.c'"
+    if zeros not in text or place not in meson:
+        raise RuntimeError("numpy's fortranobject.c or meson.build is not as expected")
+    (tree / "fortranobject.c").write_text(text.replace(zeros, zeros.replace("0)", "0xFF)")))
+    (tree / "meson.build").write_text(meson.replace(place, "'fortranobject.c'"))
+
+
+def false_claims(build: Build, tree: Path, record: dict[str, str]) -> list[str]:
+    """Name all in which a build is not what it claims.
+
+    By what meson ran, and by what the loaded extension says of itself in `record`.
+    """
+    found = []
+    if not Path(record["extension"]).resolve().is_relative_to(tree.resolve()):
+        found.append(f"the extension was loaded from {record['extension']}")
+    if record["compiler"].split()[0] != build.family:
+        found.append(f"compiled by {record['compiler']}, not by {build.family}")
+    said = record["flags"].split()
+    expected = [f"-O{build.optimization}", *build.flags, f"-ffp-contract={build.contract}"]
+    found += [f"_build.py does not tell of {flag}" for flag in expected if flag not in said]
+    commands = [
+        each["command"].split()
+        for each in json.loads((tree / "build" / "compile_commands.json").read_text())
+        if "liboriginal" in each["output"]
+    ]
+    if not commands:
+        found.append("no file of the original programs was compiled")
+    for words in commands:
+        found += _wrong_words(build, words)
+    return sorted(set(found))
+
+
+def _wrong_words(build: Build, words: Sequence[str]) -> list[str]:
+    found = []
+    if Path(words[0]).name != Path(build.compiler).name:
+        found.append(f"meson ran {words[0]}, not {build.compiler}")
+    # Of several, compilers take the last.
+    for beginning, expected in (("-O", f"-O{build.optimization}"), *_contract(build)):
+        last = [word for word in words if word.startswith(beginning)][-1:]
+        if last != [expected]:
+            found.append(f"the original programs were compiled with {last}, not {expected}")
+    found += [f"meson ran without {flag}" for flag in build.flags if flag not in words]
+    return found
+
+
+def _contract(build: Build) -> tuple[tuple[str, str], ...]:
+    return (("-ffp-contract", f"-ffp-contract={build.contract}"),)
+
+
+def environment(folder: Path) -> Path:
+    """Make an environment with all packages of this one but the project itself; its Python.
+
+    An editable install puts a finder of its own before all folders; in a second environment that
+    reads the first one's packages as a plain folder there is none.
+    """
+    import sysconfig
+
+    shutil.rmtree(folder, ignore_errors=True)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
+    packages = Path(sysconfig.get_path("purelib"))
+    target = folder / packages.relative_to(sys.prefix)
+    (target / "packages.pth").write_text(f"{packages}\n")
+    return folder / "bin" / "python"
+
+
+def native_flag(compiler: str) -> str | None:
+    """Return the option that compiles for this very processor, or None where there is none."""
+    for flag in ("-march=native", "-mcpu=native"):
+        command = [compiler, flag, "-fsyntax-only", "-x", "f95", os.devnull]
+        if subprocess.run(command, capture_output=True, check=False).returncode == 0:
+            return flag
+    return None

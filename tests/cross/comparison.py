@@ -1,0 +1,45 @@
+"""Digests in, checks out: every cell of every build against the twin."""
+
+from collections.abc import Collection, Iterator, Mapping
+
+from pyharness.checks import Check
+from tests.cross.digests import replay
+
+
+def compared(
+    build: str,
+    digests: Mapping[str, str],
+    twin: Mapping[str, str],
+    listed: Collection[tuple[str, str]] = (),
+) -> Iterator[Check]:
+    """Yield a check for each cell of a build.
+
+    Parameters
+    ----------
+    build : str
+        Its name.
+    digests, twin : mapping
+        Cell to digest, of the build and of the Python twin.
+    listed : collection of (str, str)
+        Build and cell of the divergences that are known; one that no longer occurs fails.
+    """
+    known_cells = {cell for name, cell in listed if name == build}
+    for cell in sorted(digests.keys() | twin.keys() | known_cells):
+        differs = digests.get(cell) != twin.get(cell)
+        known = cell in known_cells
+        note = ""
+        if differs:
+            note = "listed" if known else "not the bits of the twin"
+        elif known:
+            note = "a listed divergence that no longer occurs"
+        yield Check(f"bits/{build}/{cell}", differs == known, None, None, again(build, cell), note)
+
+
+def again(build: str, cell: str) -> str:
+    """Return the command that replays a cell in a build."""
+    return inside(build, replay(cell))
+
+
+def inside(build: str, module: str, variables: str = "") -> str:
+    """Return the command that runs a module in the tree of a build."""
+    return f"cd build/cross/{build} && {variables}../environment/bin/python -m {module}"

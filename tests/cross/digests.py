@@ -1,0 +1,72 @@
+"""One digest for each cell, and what computed it: python -m tests.cross.digests LANGUAGE FILE."""
+
+import hashlib
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from pyharness import _build, _kernels
+from pyharness.cells import all_cells, all_listings, cell_name, listing_name
+from pyharness.listing import PROGRAMS
+from pyharness.methods import PROGRAM_REGISTRY
+from pyharness.scene_file import case_scene
+from pyharness.trajectory import Trajectory
+from tests.test_programs import NASTY
+
+
+def digest(run: Trajectory) -> str:
+    """Return a word for every bit of a trajectory; all NaN are one, as languages sign them."""
+    counters = [run.steps, run.evaluations, run.ended]
+    if run.stop is not None:
+        counters += [run.stop.step, run.stop.variable, float(run.stop.quotient).hex()]
+    summed = hashlib.sha256(repr(counters).encode())
+    for array in (run.time, run.recorded_time, run.omega, run.velocity):
+        assert array is not None
+        bits = np.ascontiguousarray(np.where(np.isnan(array), np.nan, array))
+        summed.update(repr(bits.shape).encode() + bits.tobytes())
+    if run.ier is not None:
+        summed.update(np.ascontiguousarray(run.ier, dtype=np.int32).tobytes())
+    return summed.hexdigest()[:16]
+
+
+def all_digests(language: str) -> Iterator[tuple[str, str]]:
+    """Yield name and digest of every cell, then of every listing on the nasty scenes."""
+    for listing, case in all_cells():
+        run = PROGRAM_REGISTRY[listing.program].run(case_scene(case), listing, language)
+        yield f"cells/{cell_name(listing, case)}", digest(run)
+    for name, scene in NASTY.items():
+        for program in PROGRAMS:
+            for listing in all_listings(program):
+                for may_stop in (True, False):
+                    run = PROGRAM_REGISTRY[program].run(scene, listing, language, may_stop=may_stop)
+                    end = "" if may_stop else "/no-stop"
+                    yield f"nasty/{program}/{name}/{listing_name(listing)}{end}", digest(run)
+
+
+def replay(cell: str) -> str:
+    """Return what follows `python -m` to hold Fortran against twin in a cell again."""
+    if cell.startswith("cells/"):
+        return f"pyharness verify --only {cell}"
+    _, program, name = cell.split("/")[:3]
+    return (
+        "pytest -q 'tests/test_programs.py::test_nasty_scenes_agree_to_the_last_bit"
+        f"[{program}-{name}]'"
+    )
+
+
+def main(language: str, file: str) -> None:
+    """Write the digests, and the build that they come from."""
+    record = {
+        "extension": _kernels.__file__,
+        "compiler": f"{_build.COMPILER} {_build.COMPILER_VERSION}",
+        "flags": _build.FLAGS,
+        "digests": dict(all_digests(language)),
+    }
+    Path(file).write_text(json.dumps(record))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -122,7 +122,8 @@ contains
     steps = 0
     status = COMPLETE
     growth = 1.0_dp
-    difference = ASIDE
+    ! With the signs of omega, so that a change of two signs changes no bit.
+    difference = sign(ASIDE, omega)
     w = omega
     w_low = 0.0_dp
     t = 0.0_dp

@@ -11,7 +11,7 @@ module gauss_collocation
   private
 
   integer, parameter :: MOST_ITERATIONS = 60
-  integer, parameter :: MOST_EVALUATIONS = 200000000 ! some ten seconds
+  integer, parameter :: MOST_EVALUATIONS = 400000000 ! some ten seconds
   real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling
   real(dp), parameter :: EXCESS = 1e-6_dp       ! of a step, rather than one step more
 

@@ -41,12 +41,14 @@ class Check:
 
 def bounded(id: str, value: float, limit: float, replay: str, note: str = "") -> Check:
     """Return the check that `value` does not exceed `limit`; NaN does."""
-    return Check(id, not math.isnan(value) and value <= limit, value, limit, replay, note)
+    # NumPy's numbers come here too, and are no JSON.
+    found, allowed = float(value), float(limit)
+    return Check(id, not math.isnan(found) and found <= allowed, found, allowed, replay, note)
 
 
 def described(id: str, value: float | None, replay: str, note: str = "") -> Check:
     """Return a finding without a bound, which can't fail."""
-    return Check(id, True, value, None, replay, note)
+    return Check(id, True, None if value is None else float(value), None, replay, note)
 
 
 def selected(id: str, only: Sequence[str]) -> bool:

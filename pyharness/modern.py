@@ -179,11 +179,13 @@ def _first_step(scene: Scene, times: Sequence[float]) -> float:
 
 
 def _driven(scene: Scene, time: float) -> float:
-    """Return the largest omega that torque alone gives until `time` (rad/s)."""
+    """Return the largest omega that torque alone gives until `time` (rad/s), or infinity."""
     _, constant, rate, sines, cosines = normalized(scene)
-    torque = np.abs(constant) + np.abs(rate * time)
-    torque += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
-    return float(torque.max()) * abs(time)
+    with np.errstate(over="ignore", invalid="ignore"):
+        torque = np.abs(constant) + np.abs(rate * time)
+        torque += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
+        driven = float(torque.max()) * abs(time)
+    return driven if math.isfinite(driven) else math.inf
 
 
 def _trajectory(

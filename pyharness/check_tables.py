@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pyharness.self_test import Caught
 
 _MOST_FAILURES = 50
+_FEW = 10  # checks, each of which is told
 
 
 def failure_lines(checks: Sequence[Check]) -> list[str]:
@@ -30,6 +31,20 @@ def failure_lines(checks: Sequence[Check]) -> list[str]:
     return lines
 
 
+def few_lines(checks: Sequence[Check]) -> list[str]:
+    """Return a line for each check that passed, with what was seen, where there are but few."""
+    if len(checks) > _FEW:
+        return []
+    lines = []
+    for check in checks:
+        if check.passed:
+            found = "" if check.value is None else f" {short(check.value)}"
+            allowed = "" if check.limit is None else f", limit {short(check.limit)}"
+            note = f" ({check.note})" if check.note else ""
+            lines += wrapped(f"{check.id}:{found}{allowed}{note}")
+    return lines
+
+
 def checks_table(title: Sequence[str], checks: Sequence[Check], depth: int = 1) -> str:
     """Return the failures, then a row for each group of checks that share `depth` parts."""
     groups: dict[str, list[Check]] = {}
@@ -42,7 +57,7 @@ def checks_table(title: Sequence[str], checks: Sequence[Check], depth: int = 1) 
         failed = sum(not check.passed for check in members)
         share = "-" if worst is None else short(_share(worst))
         rows.append([name, str(len(members)), str(failed), share])
-    failures = failure_lines(checks)
+    failures = failure_lines(checks) + few_lines(checks)
     lines = [line for each in title for line in wrapped(each)]
     lines += [""] if title else []
     lines += [*failures, ""] if failures else []

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from pyharness.check_tables import failure_lines, verdict
+from pyharness.check_tables import failure_lines, few_lines, verdict
 from pyharness.checks import Check
 from pyharness.stress import Trial
 from pyharness.tables import WIDTH, aligned, short, wrapped
@@ -16,7 +16,7 @@ _NOTE = (
 
 def stress_table(trials: Sequence[Trial], checks: Sequence[Check]) -> str:
     """Return the failures, then a table for each trial."""
-    failures = failure_lines(checks)
+    failures = failure_lines(checks) + few_lines(checks)
     lines = [*failures, ""] if failures else []
     for each in trials:
         own = [check for check in checks if check.kind == each.name]

@@ -12,7 +12,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from pyharness.exact_top import torque_free_top
+from pyharness.elliptic import torque_free
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
 
@@ -99,7 +99,7 @@ def orbit(scene: Scene) -> Orbit:
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
     times = np.linspace(0.0, 4.0 * math.pi / frequency, _SAMPLES).tolist()
-    states = floats(torque_free_top(scene.euler_coefficients, scene.omega, times))
+    states = floats([torque_free(scene, t, rounded=True) for t in times])
     largest = float(np.abs(states).max())
     slopes = a * np.roll(states, -1, 1) * np.roll(states, -2, 1)
     x, y, z = states.T
@@ -213,7 +213,7 @@ def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, fl
         )
         return float((after - before) / before)
 
-    truth = torque_free_top(scene.euler_coefficients, scene.omega, [time])[0]
+    truth = torque_free(scene, time, rounded=True)
     error = np.array([float(x - y) for x, y in zip(found, truth, strict=True)])
     x, y, z = (float(w) for w in truth)
     slope = np.array(scene.euler_coefficients) * np.array([y * z, z * x, x * y])

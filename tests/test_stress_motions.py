@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, brouwer, prepare, solve
+from pyharness.axial_top import axial_top
 from pyharness.checks import Check
-from pyharness.exact_top import axial_top, torque_free_top
+from pyharness.elliptic import torque_free
 from pyharness.reference import reference
 from pyharness.scene import Triple
 from pyharness.stress import TRIALS, trial, worst
@@ -38,20 +39,12 @@ def test_the_torque_free_top_has_forty_digits() -> None:
         a = a[turn:] + a[:turn]
         omega = [source.choice((-1.0, 1.0)) * 10 ** source.uniform(-2, 1) for _ in range(3)]
         at = source.choice((-1.0, 1.0)) * 10 ** source.uniform(-2, 7)
-        found = torque_free_top(a, omega, [at])[0]
+        scene = Scene("", (omega[0], omega[1], omega[2]), coefficients=(a[0], a[1], a[2]))
+        found = torque_free(scene, at)
         with mpmath.workdps(DIGITS):
             exact = exact_top(a, omega, at)
             error = max(abs(mpmath.mpf(str(x)) - y) for x, y in zip(found, exact, strict=True))
             assert error <= mpmath.mpf(10) ** -40 * max(map(abs, omega)), (a, omega, at)
-
-
-def test_the_torque_free_top_says_what_it_can_not_do() -> None:
-    with pytest.raises(InputError, match="of two signs"):
-        torque_free_top((1.0, 1.0, 1.0), (1.0, 2.0, 3.0), [1.0])
-    with pytest.raises(InputError, match="separatrix"):
-        torque_free_top((0.25, -0.5, 0.25), (1.0, 0.3, 1.0), [1.0])
-    steady = torque_free_top((0.25, -0.5, 0.25), (0.0, 0.0, 2.0), [1e6])
-    assert [float(w) for w in steady[0]] == [0.0, 0.0, 2.0]
 
 
 def test_the_axial_top_is_the_reference() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 from pyharness import brouwer
 from pyharness.brouwer import LAWS, Noise, Orbit
 from pyharness.checks import bounded, described, may_hold
+from pyharness.elliptic import torque_free
 from pyharness.errors import InputError
-from pyharness.exact_top import torque_free_top
 from pyharness.kernels import COMPLETE, extension, normalized
 from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
@@ -198,7 +198,7 @@ def orbit_of(motion: str) -> Orbit:
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
     """Return states of one motion, so that no lucky phase decides."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
-    rows = brouwer.floats(torque_free_top(scene.euler_coefficients, scene.omega, times)).tolist()
+    rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
     return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
 
 

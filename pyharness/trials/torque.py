@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pyharness.axial_top import axial_top
 from pyharness.checks import Check, bounded, described, may_hold, selected
 from pyharness.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.errors import InputError
-from pyharness.exact_top import axial_top
 from pyharness.listing import PROGRAMS, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
 from pyharness.reference import reference

@@ -8,9 +8,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness.elliptic import jacobi, torque_free
 from pyharness.reference import reference
 from pyharness.scene import Scene
+from pyharness.stability.elliptic import jacobi, torque_free
 
 _START = (0.4, -1.1, 0.7)
 

@@ -9,12 +9,13 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, brouwer, prepare, solve
-from pyharness.axial_top import axial_top
+from pyharness import InputError, Scene, TorqueLaw, prepare, solve
 from pyharness.checks import Check
-from pyharness.elliptic import torque_free
 from pyharness.reference import reference
 from pyharness.scene import Triple
+from pyharness.stability import brouwer
+from pyharness.stability.axial_top import axial_top
+from pyharness.stability.elliptic import torque_free
 from pyharness.stress import TRIALS, trial, worst
 from pyharness.trajectory import Array
 from pyharness.trials import invariance, length, threads

@@ -11,23 +11,29 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pyharness import collocation_matrices, kernels, methods
-from pyharness.amplification import Amplification, amplification, boundary, weight_of_squares
+from pyharness import kernels, methods
 from pyharness.checks import Check
 from pyharness.cli import main
-from pyharness.collocation_matrices import singular_below, solved
-from pyharness.disturbances import complex_step, moving_step
-from pyharness.divergence import divergence
 from pyharness.listing import Listing, corrected, original
 from pyharness.original import collocation
 from pyharness.original.linear_solver import leqt1f
 from pyharness.plants import plant_in_twin
 from pyharness.scene import Scene
 from pyharness.scene_file import case_scene
-from pyharness.schemes import FIXED_STEP, TERMS, Numbers, Series, local_error, spacing
-from pyharness.stability_plots import regions_picture
-from pyharness.stability_regions import regions
-from pyharness.step_errors import Forecaster, path
+from pyharness.stability import collocation_matrices
+from pyharness.stability.amplification import (
+    Amplification,
+    amplification,
+    boundary,
+    weight_of_squares,
+)
+from pyharness.stability.collocation_matrices import singular_below, solved
+from pyharness.stability.disturbances import complex_step, moving_step
+from pyharness.stability.divergence import divergence
+from pyharness.stability.region_plots import regions_picture
+from pyharness.stability.regions import regions
+from pyharness.stability.schemes import FIXED_STEP, TERMS, Numbers, Series, local_error, spacing
+from pyharness.stability.step_errors import Forecaster, path
 from pyharness.stress import stress
 from pyharness.trajectory import Trajectory
 

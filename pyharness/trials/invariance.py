@@ -19,10 +19,10 @@ from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
 from pyharness.scene import Scene, TorqueLaw, Triple
 from pyharness.solver import prepare
+from pyharness.stability.turned_scenes import shifted, turned
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
 from pyharness.trials.truth import OURS
-from pyharness.turned_scenes import shifted, turned
 
 _FIXED_STEP = ("improved-euler", "taylor-3", "rk4")
 _GAUSS = ("gauss-2", "gauss-4", "gauss-8")

@@ -7,16 +7,16 @@ from functools import cache
 
 import numpy as np
 
-from pyharness import brouwer
-from pyharness.brouwer import LAWS, Noise, Orbit
 from pyharness.checks import bounded, described, may_hold
-from pyharness.elliptic import torque_free
 from pyharness.errors import InputError
 from pyharness.kernels import COMPLETE, extension, normalized
 from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
 from pyharness.scene import Scene
 from pyharness.solver import prepare
+from pyharness.stability import brouwer
+from pyharness.stability.brouwer import LAWS, Noise, Orbit
+from pyharness.stability.elliptic import torque_free
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
 

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 from pyharness import kernels
 from pyharness.checks import Check, bounded, described, may_hold, selected
-from pyharness.collocation_matrices import (
+from pyharness.listing import Listing, corrected, original
+from pyharness.original.linear_solver import SINGULAR
+from pyharness.scene_file import case_scene
+from pyharness.stability.collocation_matrices import (
     PARTS,
     Solved,
     declared_singular_below,
     singular_below,
     solved,
 )
-from pyharness.listing import Listing, corrected, original
-from pyharness.original.linear_solver import SINGULAR
-from pyharness.scene_file import case_scene
 from pyharness.stress import Outcome, Trial, replay
 
 NAME = "matrices"

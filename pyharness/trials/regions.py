@@ -6,9 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.amplification import amplification, weight_of_squares
 from pyharness.checks import bounded, described, may_hold, selected
-from pyharness.disturbances import (
+from pyharness.listing import PROGRAMS, Listing, corrected, original, subset
+from pyharness.scene import Scene, Triple
+from pyharness.scene_file import case_scene
+from pyharness.stability.amplification import amplification, weight_of_squares
+from pyharness.stability.disturbances import (
     Probe,
     complex_step,
     eigenvalues,
@@ -18,9 +21,6 @@ from pyharness.disturbances import (
     moving_step,
     observed_boundary,
 )
-from pyharness.listing import PROGRAMS, Listing, corrected, original, subset
-from pyharness.scene import Scene, Triple
-from pyharness.scene_file import case_scene
 from pyharness.stress import Outcome, Trial, replay
 
 NAME = "regions"

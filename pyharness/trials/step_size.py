@@ -7,10 +7,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.amplification import amplification
 from pyharness.checks import Check, bounded, described, may_hold, selected
-from pyharness.collocation_matrices import PARTS, singular_below
-from pyharness.divergence import divergence, smallest_divergent
 from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.modern import FIXED_STEP as MODERN
@@ -19,8 +16,11 @@ from pyharness.original.linear_solver import SINGULAR
 from pyharness.reference import reference
 from pyharness.scene import Scene
 from pyharness.scene_file import case_scene
-from pyharness.schemes import FIXED_STEP
-from pyharness.step_errors import Forecaster, Path, path
+from pyharness.stability.amplification import amplification
+from pyharness.stability.collocation_matrices import PARTS, singular_below
+from pyharness.stability.divergence import divergence, smallest_divergent
+from pyharness.stability.schemes import FIXED_STEP
+from pyharness.stability.step_errors import Forecaster, Path, path
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array, Trajectory
 

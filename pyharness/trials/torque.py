@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.axial_top import axial_top
 from pyharness.checks import Check, bounded, described, may_hold, selected
 from pyharness.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.errors import InputError
@@ -15,6 +14,7 @@ from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw, Triple
 from pyharness.solver import prepare
+from pyharness.stability.axial_top import axial_top
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
 from pyharness.trials.truth import Truth, describe_programs, truth_of

@@ -9,7 +9,6 @@ import numpy as np
 
 from pyharness.checks import Check, bounded, described, may_hold, selected
 from pyharness.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.elliptic import torque_free
 from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
@@ -17,6 +16,7 @@ from pyharness.plan import closed_form
 from pyharness.reference import Reference, reference
 from pyharness.scene import Scene
 from pyharness.solver import prepare
+from pyharness.stability.elliptic import torque_free
 from pyharness.stress import Outcome, replay
 from pyharness.trials import promises
 from pyharness.trials.promises import FIXED, GAUSS

@@ -77,12 +77,12 @@ def _chosen(only: list[str]) -> list[str]:
 
 def _picture(name: str, checks: list[Check], path: str) -> dict[str, bytes]:
     if name == "regions":
-        from pyharness.stability_plots import regions_picture
-        from pyharness.stability_regions import regions
+        from pyharness.stability.region_plots import regions_picture
+        from pyharness.stability.regions import regions
 
         return regions_picture(regions(), path)
     if name == "length":
-        from pyharness.length_plot import curves, picture
+        from pyharness.stability.length_plot import curves, picture
 
         return picture(list(curves()), path)
     from pyharness.stress_plots import stress_picture

@@ -12,8 +12,8 @@ from decimal import Decimal
 
 import numpy as np
 
-from pyharness.elliptic import torque_free
 from pyharness.scene import Scene
+from pyharness.stability.elliptic import torque_free
 from pyharness.trajectory import Array
 
 ROUNDING = 2.0**-53

@@ -12,7 +12,7 @@ import numpy as np
 
 from pyharness.original.collocation import collocation_matrix
 from pyharness.original.linear_solver import SINGULAR, leqt1f
-from pyharness.rational import (
+from pyharness.stability.rational import (
     Exact,
     absolute,
     dot,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.stability_regions import Regions
+from pyharness.stability.regions import Regions
 from pyharness.tables import csv_text
 
 # Told apart without colour: by dash and width.

@@ -13,9 +13,9 @@ from fractions import Fraction
 import numpy as np
 from numpy.polynomial import legendre
 
-from pyharness.collocation_matrices import PARTS
-from pyharness.rational import inverse
 from pyharness.scene import Scene
+from pyharness.stability.collocation_matrices import PARTS
+from pyharness.stability.rational import inverse
 from pyharness.trajectory import Array
 
 # Powers of the step that are kept of a series.

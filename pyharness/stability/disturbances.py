@@ -1,6 +1,6 @@
 """What the programs themselves make of small disturbances: their steps, probed by running them.
 
-Held against `pyharness.amplification`, which knows the schemes but not the programs.
+Held against `pyharness.stability.amplification`, which knows the schemes but not the programs.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,15 +10,15 @@ from fractions import Fraction
 import numpy as np
 
 from pyharness import methods
-from pyharness.amplification import NEAREST, amplification, boundary, weight_of_squares
-from pyharness.collocation_matrices import points, solver_roundings
 from pyharness.conditioning import ROUNDING
 from pyharness.listing import Listing
 from pyharness.original import collocation
 from pyharness.original.equations import omega_rate
-from pyharness.rational import Exact
 from pyharness.scene import Scene, TorqueLaw, Triple
-from pyharness.schemes import Numbers, runge_kutta_punched, spacing
+from pyharness.stability.amplification import NEAREST, amplification, boundary, weight_of_squares
+from pyharness.stability.collocation_matrices import points, solver_roundings
+from pyharness.stability.rational import Exact
+from pyharness.stability.schemes import Numbers, runge_kutta_punched, spacing
 from pyharness.trajectory import Array
 
 # A step is a polynomial of omega: each product of stages doubles its degree.

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.amplification import Amplification
 from pyharness.methods import solve
 from pyharness.scene import Scene
+from pyharness.stability.amplification import Amplification
 from pyharness.trajectory import Array, Trajectory
 
 Runner = Callable[[Scene], Trajectory]

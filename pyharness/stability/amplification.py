@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.collocation_matrices import PARTS
 from pyharness.listing import Listing
-from pyharness.rational import Exact, inverse, product, times
+from pyharness.stability.collocation_matrices import PARTS
+from pyharness.stability.rational import Exact, inverse, product, times
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Coefficients = NDArray[np.object_]

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.amplification import Amplification, amplification
 from pyharness.listing import corrected, original, subset
+from pyharness.stability.amplification import Amplification, amplification
 from pyharness.trajectory import Array
 
 # The part of the plane in which the boundaries lie, and how fine it is sampled.

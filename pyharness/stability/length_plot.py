@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.brouwer import LAWS, root_mean_square
+from pyharness.stability.brouwer import LAWS, root_mean_square
 from pyharness.tables import csv_text
 from pyharness.trajectory import Array
 from pyharness.trials.length import CONTENDERS, MOTIONS, measured, orbit_of

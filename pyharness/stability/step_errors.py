@@ -1,7 +1,7 @@
 """What a step size costs, foretold: truncation and rounding of fixed steps at the end of a scene.
 
-Truncation is what each step misses (`pyharness.schemes`), carried to the end by the flow; rounding
-is that of each step, carried likewise. No method is run.
+Truncation is what each step misses (`schemes`), carried to the end by the flow; rounding is that
+of each step, carried likewise. No method is run.
 """
 
 import math
@@ -10,7 +10,6 @@ from functools import cache
 
 import numpy as np
 
-from pyharness.collocation_matrices import PARTS, singular_below, solver_roundings
 from pyharness.conditioning import (
     ROUNDING,
     Conditioning,
@@ -19,7 +18,8 @@ from pyharness.conditioning import (
     jacobians,
 )
 from pyharness.scene import Scene
-from pyharness.schemes import FIXED_STEP, TERMS, collocation_singular, local_error
+from pyharness.stability.collocation_matrices import PARTS, singular_below, solver_roundings
+from pyharness.stability.schemes import FIXED_STEP, TERMS, collocation_singular, local_error
 from pyharness.trajectory import Array
 
 _NODES_PER_RADIAN = 12.0
@@ -127,7 +127,7 @@ class Forecaster:
     """Forecasts for one method on one path, at any step."""
 
     def __init__(self, along: Path, method: str) -> None:
-        """Take the path and a name in `pyharness.schemes.FIXED_STEP`."""
+        """Take the path and a name in `pyharness.stability.schemes.FIXED_STEP`."""
         self._path = along
         self.method = FIXED_STEP[method]
         self._missed = cache(self._series)

@@ -1,0 +1,1 @@
+"""What the trials of `stress` stand on: derived steps, matrices, noise; nothing is tried here."""

@@ -28,6 +28,8 @@ INVALID = 1
 DIVIDE = 2 if _ON_ARM else 4
 TOO_LARGE = 4 if _ON_ARM else 8
 _TRAPPED = INVALID | DIVIDE | TOO_LARGE
+_TRIES_AGAIN = (_CODES[EITHER], _CODES["quick"])
+_EXTREME = 1e60  # the fifth power of a number overflows
 _NAMES = {INVALID: "invalid", DIVIDE: "divide by zero", TOO_LARGE: "overflow"}
 
 
@@ -61,11 +63,12 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
         if name == "solve_packed":
             found["status"] = int(args[0][_STATUS_AT])
-            if args[0][_METHOD_AT] == _CODES[EITHER]:
-                # The first attempt may overflow; then it is refused, and the series answers.
+            if args[0][_METHOD_AT] in _TRIES_AGAIN:
+                # An attempt with too long steps may overflow; then it is made again with shorter
+                # ones, or the series answers.
                 found["status"] = OVERFLOW
         untold = raised & ~_told(found, bool(raised & TOO_LARGE) or not _finite(args))
-        if not untold:
+        if not untold or _are_extreme((*args, found.get("rows", 0.0))):
             return answer
         words = ", ".join(word for bit, word in _NAMES.items() if untold & bit)
         print(f"\n{name}: {words}, untold; again with traps: {args}", file=sys.stderr)
@@ -91,11 +94,21 @@ def _told(found: dict[str, Any], has_infinity: bool) -> int:
         told |= _TRAPPED
     if np.isinf(found.get("stop_quotient", 0.0)):
         told |= DIVIDE
+    if has_infinity and "ier_rows" in found:
+        # A velocity beyond every number does not end a run: it is shown as it is.
+        if not np.isfinite(found["rows"][5:, : found["n_rows"]]).all():
+            told |= _TRAPPED
     return told
 
 
 def _finite(args: tuple[Any, ...]) -> bool:
     return all(np.isfinite(np.asarray(each, dtype=float)).all() for each in args)
+
+
+def _are_extreme(args: tuple[Any, ...]) -> bool:
+    """Whether there are numbers whose products are none: what becomes of them is held elsewhere."""
+    sizes = (np.abs(np.asarray(each, dtype=float)) for each in args)
+    return any(size[size == size].max(initial=0.0) > _EXTREME for size in sizes)
 
 
 @functools.cache

@@ -142,10 +142,11 @@ contains
       end if
       status = GAVE_UP
       gaps(:, 1) = gaps(:, 1)/GAIN
+      if (all(abs(gaps) <= 0.0_dp)) exit
       far = max(1.0_dp/(GAIN*(GAIN + 1.0_dp)), aim/FARTHEST)
       error = max(maxval(abs(gaps(:, 1)*motion%scale)), far*maxval(abs(gaps(:, 2)*motion%scale))) &
               /maxval(abs(top*motion%scale))
-      if (error <= aim .or. all(abs(gaps) <= 0.0_dp)) exit
+      if (error <= aim) exit
       n_steps = 4.0_dp + n_steps*min(8.0_dp, 1.1_dp*sqrt(sqrt(error/aim)))
       if (varies .and. motion%resolved < motion%waves) then
         faint = faint*min(0.1_dp, 0.1_dp*aim/error)

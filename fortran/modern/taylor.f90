@@ -231,7 +231,8 @@ contains
       else
         ! Its own change is a small difference too, and known; over what grows with the torque.
         size = max(roots(1)*abs(s%left(2, 1)), roots(2)*abs(s%left(1, 1)), &
-                   roots(3)*abs(s%right(1, 1)))/(abs(h)*(scale*scale))
+                   roots(3)*abs(s%right(1, 1)))
+        if (size > 0.0_dp) size = size/(abs(h)*(scale*scale))
       end if
       if (size < least_difference) least_difference = size
       if (size > growth*least_difference) growth = size/least_difference

@@ -270,6 +270,10 @@ def test_plants_leave_nothing_behind() -> None:
         (["--draws", "many"], "whole number"),
         (["--format", "csv"], "table, json, junit"),
         (["--update", "--only", "golden"], "--only has no meaning with --update"),
+        (
+            ["--update", "--self-test", "--record", "new"],
+            "--self-test has no meaning with --update",
+        ),
         (["--self-test", "--draws", "3"], "--draws has no meaning with --self-test"),
         (["--external", "nowhere.toml"], "nowhere.toml"),
     ],

@@ -186,5 +186,8 @@ def number(where: str, value: object) -> float:
 
 def kind_of(value: object) -> str:
     """Name the kind of a TOML value for a message."""
-    names = {str: "text", bool: "true or false", list: "a list", dict: "a table"}
+    names = {
+        str: "text", bool: "true or false", int: "a whole number", float: "a number",
+        list: "a list", dict: "a table",
+    }  # fmt: skip
     return names.get(type(value), f"a {type(value).__name__}")

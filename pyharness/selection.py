@@ -1,5 +1,6 @@
 """What to verify: which checks, which random draws, which record."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,6 +50,11 @@ class Selection:
     def may_ask(self, id: str) -> bool:
         """Whether a check below that name may be asked for."""
         return may_hold(id, self.only)
+
+    def replay_of_draw(self, id: str) -> str:
+        """Return the command that repeats a check of a random draw."""
+        draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
+        return f"{replay(id)}{draws} --seed {shlex.quote(self.seed)}"
 
 
 def replay(id: str) -> str:

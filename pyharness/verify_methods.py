@@ -150,12 +150,12 @@ def _random(chosen: Selection, drawn: Draw, number: int, names: Sequence[str]) -
     except InputError as refusal:
         # Nothing to hold it against: a run-away, or too fast a motion for any truth.
         id = f"random/{number}/no-truth"
-        again = f"{replay(f'random/{number}')} --seed {chosen.seed}"
+        again = chosen.replay_of_draw(f"random/{number}")
         yield described(id, None, again, f"{scene.name}: {refusal}")
         return
     for name in names:
         id = f"random/{number}/{name}"
-        again = f"{replay(id)} --seed {chosen.seed}"
+        again = chosen.replay_of_draw(id)
         if name == "prepared":
             tolerance = drawn.tolerance
             yield _held_prepared(id, again, scene, "auto", tolerance, standard)

@@ -44,7 +44,7 @@ def random_programs(chosen: Selection) -> Iterator[Check]:
             program.run(drawn.scene, drawn.listing, language, drawn.lipschitz, drawn.may_stop)
             for language in ("fortran", "python")
         )
-        again = f"{replay(id)} --seed {chosen.seed}"
+        again = chosen.replay_of_draw(id)
         yield agreement(id, again, drawn.scene, compiled, twin)
 
 

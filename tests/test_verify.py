@@ -23,7 +23,7 @@ from pyharness.listing import PROGRAMS
 from pyharness.methods import METHODS, PROGRAM_REGISTRY
 from pyharness.plants import PLANTS, Plant
 from pyharness.random_scenes import draw, weekly_seed
-from pyharness.selection import RECORD, Selection
+from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.verify import KINDS, verify
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
@@ -157,6 +157,15 @@ def test_random_failure_names_its_seed() -> None:
     assert all(check.replay.endswith(" --seed x") for check in failed)
 
 
+@pytest.mark.parametrize(("seed", "draws"), [("a b", 3), ("", 3), ("$(x)", DRAWS + 1)])
+def test_replay_of_a_draw_is_read_by_the_shell_as_it_was_given(seed: str, draws: int) -> None:
+    chosen = Selection(only=[f"random/{draws - 1}/program"], seed=seed, draws=draws)
+    [check] = verify(chosen)
+    words = shlex.split(check.replay)
+    assert words[words.index("--seed") + 1] == seed
+    assert main(words[3:]) == 0
+
+
 def test_record_is_what_is_produced(tmp_path: Path) -> None:
     files, news = update(RECORD)
     if {file["mathematics"] for file in read_record(RECORD).values()} == {mathematics()}:
@@ -261,6 +270,10 @@ def test_plants_leave_nothing_behind() -> None:
         (["--draws", "many"], "whole number"),
         (["--format", "csv"], "table, json, junit"),
         (["--update", "--only", "golden"], "--only has no meaning with --update"),
+        (
+            ["--update", "--self-test", "--record", "new"],
+            "--self-test has no meaning with --update",
+        ),
         (["--self-test", "--draws", "3"], "--draws has no meaning with --self-test"),
         (["--external", "nowhere.toml"], "nowhere.toml"),
     ],

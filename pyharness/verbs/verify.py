@@ -42,7 +42,8 @@ def run(options: argparse.Namespace) -> int:
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
-        shared.refuse(options, "--update", ("only", "seed", "draws", "external", "format", "out"))
+        refused = ("self_test", "only", "seed", "draws", "external", "format", "out")
+        shared.refuse(options, "--update", refused)
         return _update(chosen.record)
     if options.self_test:
         shared.refuse(options, "--self-test", ("only", "draws", "external"))

@@ -119,7 +119,8 @@ def junit_text(name: str, checks: Sequence[Check]) -> str:
         case = xml.SubElement(suite, "testcase", classname=f"{name}.{check.kind}", name=check.id)
         if not check.passed:
             message = f"{short(check.value)}, limit {short(check.limit)}"
-            failure = xml.SubElement(case, "failure", message=check.note or message)
+            message = f"{message}: {check.note}" if check.note else message
+            failure = xml.SubElement(case, "failure", message=message)
             failure.text = f"{message}\n{check.replay}"
     xml.indent(suite)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + xml.tostring(suite, "unicode") + "\n"

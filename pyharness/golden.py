@@ -7,6 +7,7 @@ how it ended, its first, tenth and last row as hexadecimal floats, and a digest 
 import hashlib
 import math
 import platform
+import shlex
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,17 +19,19 @@ import numpy as np
 from pyharness.agreement import ulps
 from pyharness.checks import Check
 from pyharness.conditioning import conditioning
+from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
 from pyharness.plan import closed_form
 from pyharness.scene import Scene
 from pyharness.scene_file import case_numbers, case_scene
-from pyharness.selection import Selection, replay
+from pyharness.selection import RECORD, Selection, replay
 from pyharness.trajectory import Array, Trajectory
 
 _STEPS = (1, 10)
 _RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
 _TOLERANCE = 1e-9
+_KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 
 @dataclass(frozen=True)
@@ -104,22 +107,30 @@ def golden(chosen: Selection) -> Iterator[Check]:
         entry = entries.get(each.command)
         if entry is None:
             note = "is not recorded; verify --update records it"
-            yield Check(id, False, None, None, replay(id), note)
+            yield Check(id, False, None, None, _again(id, chosen), note)
             continue
-        yield _check(id, each, entry, libraries == {mathematics()})
+        yield _check(id, _again(id, chosen), each, entry, libraries == {mathematics()})
     produced = {each.command for each in due}
     for command in sorted(set(entries) - produced):
-        id = f"golden/{_source(known, command)}/{command.partition(' run ')[2].replace(' ', '')}"
+        name = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
+        id = f"golden/{_source(known, command)}/{name}"
         if chosen.asks(id):
             note = "is recorded and no longer produced; verify --update forgets it"
-            yield Check(id, False, None, None, replay(id), note)
+            yield Check(id, False, None, None, _again(id, chosen), note)
 
 
-def _check(id: str, each: Recorded, entry: dict[str, Any], same_library: bool) -> Check:
+def _again(id: str, chosen: Selection) -> str:
+    """Return the command that repeats a check, with its record where that is not the checkout's."""
+    if chosen.record == RECORD:
+        return replay(id)
+    return f"{replay(id)} --record {shlex.quote(str(chosen.record))}"
+
+
+def _check(id: str, again: str, each: Recorded, entry: dict[str, Any], same_library: bool) -> Check:
     run = each.run()
     now = _entry(each, run)
     if now == entry:
-        return Check(id, True, 0.0, 0.0, replay(id))
+        return Check(id, True, 0.0, 0.0, again)
     moved = _moved(entry, now)
     waves = each.scene.torque.sines + each.scene.torque.cosines
     if each.tolerance is not None:
@@ -127,13 +138,15 @@ def _check(id: str, each: Recorded, entry: dict[str, Any], same_library: bool) -
     elif waves and not same_library:
         limit = conditioning(each.scene, each.scene.times()[-1]).rounding
     else:
-        return Check(id, False, None, 0.0, replay(id), moved)
+        return Check(id, False, None, 0.0, again, moved)
     old, new = _rows(entry), _rows(now)
     away = math.inf
-    if old.shape == new.shape and entry["ended"] == now["ended"]:
+    # Step, time and TIME have no error to be within.
+    same_times = old.shape == new.shape and np.array_equal(old[:, :3], new[:, :3])
+    if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
         away = float(np.abs(old[:, 3:6] - new[:, 3:6]).max(initial=0.0)) / scale
-    return Check(id, away <= limit, away, limit, replay(id), f"within its error: {moved}")
+    return Check(id, away <= limit, away, limit, again, f"within its error: {moved}")
 
 
 def _source(known: dict[str, dict[str, Any]], command: str) -> str:
@@ -146,13 +159,33 @@ def _source(known: dict[str, dict[str, Any]], command: str) -> str:
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the files of a record by name."""
-    return {path.stem: tomllib.loads(path.read_text()) for path in sorted(folder.glob("*.toml"))}
+    """Return the files of a record by name; InputError for one that is no record."""
+    found = {}
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            file = tomllib.loads(path.read_text(encoding="utf-8"))
+            for entry in file["trajectory"]:
+                _rows(entry)
+                _ = [entry[key] for key in _KEYS]
+            found[path.stem] = {"mathematics": str(file["mathematics"]), **file}
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(
+                f"'{path}': is no record ({' '.join(str(error).split()) or 'empty'}); "
+                "verify --update writes it anew"
+            ) from None
+    return found
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new record, and what moved against the one in `folder`."""
-    known = read_record(folder) if folder.is_dir() else {}
+    """Return the files of a new record, and what moved against the one in `folder`.
+
+    A file of the old record without a trajectory that is still produced is not among them.
+    """
+    try:
+        known = read_record(folder) if folder.is_dir() else {}
+    except InputError:
+        # Damaged: all of it is new.
+        known = {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
     files: dict[str, list[dict[str, Any]]] = {}
     news = []

@@ -150,11 +150,11 @@ def test_guard_lets_through_what_the_answer_tells_of(
             call()
 
 
-@pytest.mark.parametrize(("code", "is_told"), [(8, True), (7, False), (3, False)])
+@pytest.mark.parametrize(("code", "is_told"), [(8, True), (7, True), (3, False)])
 def test_guard_knows_an_attempt_that_is_refused(
     code: int, is_told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of the prepared methods only `quick or taylor` may overflow and be complete."""
+    """Of the prepared methods only `quick` tries again, and may overflow and be complete."""
     monkeypatch.setattr(traps, "_mathematics", lambda: _Flags(TOO_LARGE))
     packed = np.zeros(20)
     packed[0] = code

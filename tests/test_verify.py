@@ -223,6 +223,36 @@ def test_method_of_the_record_may_move_within_its_error(tmp_path: Path) -> None:
         path.write_text(text)
 
 
+@pytest.mark.parametrize("damage", ["junk=", "x = 1\n", "trajectory = 3\n", "\xff", ""])
+def test_record_that_is_none_is_told_in_one_line_and_mended(
+    damage: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a conflict of a merge leaves, for instance; and files of what is gone are removed."""
+    path = _written(tmp_path)
+    good = path.read_text()
+    path.write_bytes(damage.encode("latin-1"))
+    assert main(["verify", "--only", "golden", "--record", str(tmp_path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert "two-term.toml': is no record" in captured.err
+    (tmp_path / "rk9.toml").write_text(good)
+    assert main(["verify", "--update", "--record", str(tmp_path)]) == 0
+    assert path.read_text() == good
+    assert not (tmp_path / "rk9.toml").exists()
+
+
+def test_record_of_other_times_fails(tmp_path: Path) -> None:
+    _written(tmp_path)
+    path = tmp_path / "taylor.toml"
+    entry = read_record(tmp_path)["taylor"]["trajectory"][4]
+    row = entry["rows"][0]
+    other = (2.0 * float.fromhex(row[1])).hex()
+    path.write_text(path.read_text().replace(f'["1", "{row[1]}"', f'["1", "{other}"'))
+    checks = list(verify(Selection(only=["golden/taylor"], record=tmp_path)))
+    assert not all(check.passed for check in checks)
+    assert all(str(tmp_path) in check.replay for check in checks)
+
+
 def test_no_record_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with patch("pyharness.verbs.verify.RECORD", tmp_path / "none"):
         assert main(["verify", "--only", "golden,orders/rk4/case-5"]) == 0
@@ -274,6 +304,9 @@ def test_plants_leave_nothing_behind() -> None:
             ["--update", "--self-test", "--record", "new"],
             "--self-test has no meaning with --update",
         ),
+        (["--external", "x.toml", "--seed", "3"], "--seed has no meaning with --external"),
+        (["--external", "x.toml", "--only", "cells"], "with --external"),
+        (["--only", "random", "--draws", "0"], "no such check"),
         (["--self-test", "--draws", "3"], "--draws has no meaning with --self-test"),
         (["--external", "nowhere.toml"], "nowhere.toml"),
     ],

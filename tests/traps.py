@@ -94,10 +94,10 @@ def _told(found: dict[str, Any], has_infinity: bool) -> int:
         told |= _TRAPPED
     if np.isinf(found.get("stop_quotient", 0.0)):
         told |= DIVIDE
-    if has_infinity and "ier_rows" in found:
-        # A velocity beyond every number does not end a run: it is shown as it is.
-        if not np.isfinite(found["rows"][5:, : found["n_rows"]]).all():
-            told |= _TRAPPED
+    # A velocity beyond every number does not end a run: it is shown as it is.
+    velocity = found["rows"][5:, : found["n_rows"]] if "ier_rows" in found else np.zeros(1)
+    if has_infinity and not np.isfinite(velocity).all():
+        told |= _TRAPPED
     return told
 
 

@@ -55,7 +55,10 @@ def run(options: argparse.Namespace) -> int:
             shared.progress(f"{len(checks)}: {check.id}")
     shared.progress("")
     if not checks:
-        raise InputError(f"--only {options.only}: no such check; the kinds are {', '.join(KINDS)}")
+        if not chosen.record.is_dir() and chosen.may_ask("golden"):
+            raise InputError("there is no golden record here; give --record DIR, or a checkout")
+        asked = f"--only {options.only}" if options.only else "--draws 0"
+        raise InputError(f"{asked}: no such check; the kinds are {', '.join(KINDS)}")
     if form != "table":
         text = _machine_text(checks, form, chosen.seed)
     else:
@@ -89,6 +92,9 @@ def _selection(options: argparse.Namespace) -> Selection:
     if options.external is not None:
         from pyharness.external_file import read_problem
 
+        shared.refuse(options, "--external", ("seed", "draws", "record"))
+        if any(each.partition("/")[0] != "external" for each in only):
+            raise InputError(f"--only {options.only}: with --external, external/... is allowed")
         problems = [read_problem(options.external)]
         only = only or ["external"]
     for each in only:
@@ -124,9 +130,14 @@ def _update(record: Path) -> int:
     from pyharness.golden import update
     from pyharness.output import check_folder, write_folder
 
+    if not record.parent.is_dir():
+        raise InputError("there is no golden record here to update; give --record DIR")
     check_folder(str(record), (), "--record")
     files, news = update(record)
     write_folder(str(record), files, "--record")
+    for path in record.glob("*.toml"):
+        if path.name not in files:
+            path.unlink()
     lines = news or ["nothing moved"]
     shared.emit("".join(f"{line}\n" for line in [*lines, f"{len(files)} files in {record}"]), None)
     return 0

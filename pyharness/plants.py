@@ -312,6 +312,8 @@ PLANTS = (
     Plant("ulp-in-fortran", "one unit in the last place of one result",
           lambda: _compiled(_one_ulp)),
     Plant("velocity-in-fortran", "a sign in the velocity", lambda: _compiled(_velocity_sign)),
+    Plant("velocity-in-both", "a sign in the velocity, in both languages alike",
+          lambda: _both(lambda program, scene, runs: _velocity_sign(runs[0](scene)))),
     Plant("stale-fortran", "the result of the run before", lambda: _compiled(_stale())),
     Plant("stale-method", "the Taylor method answers with the result before",
           lambda: _stale_method("taylor")),

@@ -209,6 +209,23 @@ def _stale_solver() -> AbstractContextManager[Any]:
     return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
 
 
+def _refusing_solver(code: int) -> AbstractContextManager[Any]:
+    """Let a prepared solver refuse everything; `code` names its method in `prepared.f90`."""
+    entry = kernels.extension().solve_packed
+    refused = kernels.REFUSED
+
+    def faulty(packed: Array, omega: Array, *rest: Any) -> Array:
+        result: Array = entry(packed, omega, *rest)
+        if packed[0] == code:
+            packed[14] = refused
+            result[:] = np.nan
+        return result
+
+    import pyharness.solver as room
+
+    return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
+
+
 def _half_step(scene: Scene) -> Scene:
     return replace(scene, step_size=0.5 * scene.step_size)
 
@@ -318,6 +335,8 @@ PLANTS = (
     Plant("stale-method", "the Taylor method answers with the result before",
           lambda: _stale_method("taylor")),
     Plant("stale-solver", "a prepared solver leaves in its buffer what was there", _stale_solver),
+    Plant("quick-refuses", "the solver for few digits refuses every scene",
+          lambda: _refusing_solver(7)),
     Plant("label-in-fortran", "TIME shifted by half a step",
           lambda: _compiled(_half_step_label)),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",

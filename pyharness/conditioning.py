@@ -65,7 +65,9 @@ class Conditioning:
         float
             2, which says nothing, where it would be more.
         """
-        return min(2.0, made * self.amplification + self.rounding + steps * self.storing)
+        allowed = made * self.amplification + self.rounding + steps * self.storing
+        # What is no number allows nothing.
+        return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:

@@ -209,6 +209,23 @@ def _stale_solver() -> AbstractContextManager[Any]:
     return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
 
 
+def _refusing_solver(code: int) -> AbstractContextManager[Any]:
+    """Let a prepared solver refuse everything; `code` names its method in `prepared.f90`."""
+    entry = kernels.extension().solve_packed
+    refused = kernels.REFUSED
+
+    def faulty(packed: Array, omega: Array, *rest: Any) -> Array:
+        result: Array = entry(packed, omega, *rest)
+        if packed[0] == code:
+            packed[14] = refused
+            result[:] = np.nan
+        return result
+
+    import pyharness.solver as room
+
+    return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
+
+
 def _half_step(scene: Scene) -> Scene:
     return replace(scene, step_size=0.5 * scene.step_size)
 
@@ -223,6 +240,28 @@ def _label_both(program: Program, scene: Scene, runs: tuple[Any, ...]) -> Trajec
     (run,) = runs
     found: Trajectory = run(scene)
     return replace(found, time=found.time - 0.5 * scene.step_size)
+
+
+def _count_both(program: Program, scene: Scene, runs: tuple[Any, ...]) -> Trajectory:
+    (run,) = runs
+    found: Trajectory = run(scene)
+    return replace(found, evaluations=2 * found.evaluations)
+
+
+def _wrong_steps() -> AbstractContextManager[Any]:
+    """Let the results of the fixed-step methods and of Gauss collocation be too large."""
+    import pyharness.solver as room
+
+    entry = kernels.extension().solve_packed
+    steps = [code for name, code in room._CODES.items() if name.startswith(("gauss", "rk", "impr"))]
+
+    def faulty(packed: Array, omega: Array, *rest: Any) -> Array:
+        result: Array = entry(packed, omega, *rest)
+        if packed[0] in steps:
+            result *= 1.01
+        return result
+
+    return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
 
 
 def _shifted(scene: Scene, times: Sequence[float], solve: Callable[..., Trajectory]) -> Trajectory:
@@ -312,10 +351,14 @@ PLANTS = (
     Plant("ulp-in-fortran", "one unit in the last place of one result",
           lambda: _compiled(_one_ulp)),
     Plant("velocity-in-fortran", "a sign in the velocity", lambda: _compiled(_velocity_sign)),
+    Plant("velocity-in-both", "a sign in the velocity, in both languages alike",
+          lambda: _both(lambda program, scene, runs: _velocity_sign(runs[0](scene)))),
     Plant("stale-fortran", "the result of the run before", lambda: _compiled(_stale())),
     Plant("stale-method", "the Taylor method answers with the result before",
           lambda: _stale_method("taylor")),
     Plant("stale-solver", "a prepared solver leaves in its buffer what was there", _stale_solver),
+    Plant("quick-refuses", "the solver for few digits refuses every scene",
+          lambda: _refusing_solver(7)),
     Plant("label-in-fortran", "TIME shifted by half a step",
           lambda: _compiled(_half_step_label)),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",
@@ -324,6 +367,10 @@ PLANTS = (
           lambda: _method("closed-form", _shifted)),
     Plant("count-in-fortran", "one right-hand side too many in the count",
           lambda: _compiled(lambda run: replace(run, evaluations=run.evaluations + 1))),
+    Plant("count-in-both", "the count of right-hand sides, in both languages alike",
+          lambda: _both(_count_both)),
+    Plant("prepared-steps", "prepared solvers in fixed steps are wrong by a hundredth",
+          _wrong_steps),
     Plant("digit-of-the-print", "a digit of a published figure", _digit),
     Plant("scipy", "another SciPy, whose results are wrong in the fourth digit",
           lambda: _method("dop853", lambda scene, times, solve:

@@ -6,6 +6,7 @@ a power of two, which changes no digit.
 """
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -63,8 +64,20 @@ def factor_near_one(scene: Scene, time: float) -> float:
     # A step short of the ends of the exponents, where the factor itself would not be a number.
     exponent = max(-1000, min(1000, math.frexp(largest)[1]))
     factor = math.ldexp(1.0, -exponent)
-    fits = 0.0 < scene.step_size / factor * scene.steps < math.inf and abs(time) / factor < math.inf
-    return factor if fits else 1.0
+    return factor if _fits(scene, time, factor) else 1.0
+
+
+def _fits(scene: Scene, time: float, factor: float) -> bool:
+    """Whether times and torques are numbers of full length in the new units, or nothing at all."""
+    law = scene.torque
+    waves = law.sines + law.cosines
+    sizes = [abs(x) * factor * factor for a in (law.constant, *(a for a, _ in waves)) for x in a]
+    sizes += [abs(x) * factor * factor * factor for x in law.rate]
+    sizes += [abs(f) * factor for _, f in waves]
+    sizes += [scene.step_size / factor * scene.steps]
+    faster = abs(time) / factor
+    short = sizes[-1] < sys.float_info.min or 0.0 < faster < sys.float_info.min
+    return all(map(math.isfinite, (*sizes, faster))) and not short
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:

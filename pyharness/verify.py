@@ -21,9 +21,10 @@ golden
 from collections.abc import Callable, Iterator
 
 from pyharness.checks import Check
+from pyharness.errors import InputError
 from pyharness.external import external_checks, problems
 from pyharness.golden import golden
-from pyharness.selection import Selection
+from pyharness.selection import Selection, replay
 from pyharness.verify_methods import methods, orders, prepared, random_methods
 from pyharness.verify_programs import cells, random_programs
 
@@ -55,8 +56,20 @@ KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
 }
 
 
+# What these read is the user's.
+_OF_THE_USER = ("external", "golden")
+
+
 def verify(chosen: Selection) -> Iterator[Check]:
     """Make the checks asked for, one after another."""
     for kind, checks in KINDS.items():
-        if chosen.may_ask(kind):
+        if not chosen.may_ask(kind):
+            continue
+        try:
             yield from checks(chosen)
+        except InputError as refusal:
+            if kind in _OF_THE_USER:
+                raise
+            # Something refused what it has to take: a fault, and none of the user's.
+            note = f"ended here: {refusal}"
+            yield Check(f"{kind}/refused", False, None, None, replay(kind), note)

@@ -16,6 +16,10 @@ from pyharness.scene_file import case_scene
 from pyharness.selection import Selection, replay
 from pyharness.trajectory import Trajectory
 
+# Right-hand sides of a step: at the start and at each point of collocation, or at four stages. The
+# step in which a run overflows is counted.
+_EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
+
 
 def cells(chosen: Selection) -> Iterator[Check]:
     """Hold Fortran against twin in every program, case, subset of defects and reading."""
@@ -29,7 +33,7 @@ def cells(chosen: Selection) -> Iterator[Check]:
         scene = case_scene(case)
         program = PROGRAM_REGISTRY[listing.program]
         compiled, twin = program.run(scene, listing), program.run(scene, listing, "python")
-        yield agreement(id, replay(id), scene, compiled, twin, name in listed)
+        yield agreement(id, replay(id), listing.program, scene, compiled, twin, name in listed)
 
 
 def random_programs(chosen: Selection) -> Iterator[Check]:
@@ -45,12 +49,13 @@ def random_programs(chosen: Selection) -> Iterator[Check]:
             for language in ("fortran", "python")
         )
         again = chosen.replay_of_draw(id)
-        yield agreement(id, again, drawn.scene, compiled, twin)
+        yield agreement(id, again, drawn.listing.program, drawn.scene, compiled, twin)
 
 
 def agreement(
     id: str,
     again: str,
+    program: str,
     scene: Scene,
     compiled: Trajectory,
     twin: Trajectory,
@@ -63,6 +68,9 @@ def agreement(
     found = differences(compiled, twin)
     if not np.array_equal(compiled.time, np.arange(1, compiled.steps + 1) * scene.step_size):
         found.append("time is not n h")
+    evaluations = _EVALUATIONS[program] * (compiled.steps + (compiled.ended == "overflow"))
+    if compiled.evaluations != evaluations:
+        found.append(f"{compiled.evaluations} right-hand sides, due {evaluations}")
     note = ", ".join(found)
     if is_listed:
         note = f"listed: {note}" if found else "a listed divergence that no longer occurs"

@@ -90,3 +90,29 @@ def test_longer_motions_get_finer_steps_of_solve_ivp() -> None:
         for weights in (exact, exact * exact):
             drift = weights @ (run.omega[-1] ** 2 - np.array(scene.omega) ** 2)
             assert abs(drift) < 2e-6 * (weights @ np.abs(run.omega[-1]))
+
+
+@pytest.mark.parametrize("method", [*(m for m in _METHODS if m != "quick"), "sphere"])
+@pytest.mark.parametrize(
+    ("law", "time", "wanted"),
+    [
+        (TorqueLaw((1e-281, 2e-281, 0.0)), 1e-24, 1e-305),
+        (TorqueLaw((1e-290, 2e-290, 0.0)), 1e-15, 1e-305),
+        (TorqueLaw(rate=(1e20, 2e20, 0.0)), 1e-60, 5e-101),
+        (TorqueLaw(cosines=(((1e-281, 0.0, 0.0), 1.0),)), 1e-24, 1e-305),
+    ],
+)
+def test_a_scale_that_loses_time_or_torque_is_not_taken(
+    method: str, law: TorqueLaw, time: float, wanted: float
+) -> None:
+    """In other units the time would be 0, or the torque infinite."""
+    moments = (1.0, 1.0, 1.0) if method == "sphere" else (1.0, 2.0, 2.5)
+    scene = Scene("", (0.0, 0.0, 0.0), moments, torque=law, step_size=0.1 * time, steps=10)
+    name = "auto" if method == "sphere" else method
+    solver = prepare(scene, name, 1e-6)
+    found = solver(np.zeros(3), time)
+    assert solver.status == "complete"
+    assert found[0] == pytest.approx(wanted, rel=1e-6, abs=0.0)
+    tolerance = 1.0 if name in ("rk4", "improved-euler", "taylor-3") else 1e-6
+    rows = solve(scene, [time], name, tolerance)
+    assert rows.omega[0, 0] == pytest.approx(wanted, rel=1e-6, abs=0.0)

@@ -4,13 +4,15 @@ import datetime
 import json
 import math
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from pyharness import facts as facts_room
@@ -20,10 +22,12 @@ from pyharness.checks import bounded, selected
 from pyharness.cli import main
 from pyharness.golden import mathematics, read_record, update
 from pyharness.listing import PROGRAMS
-from pyharness.methods import METHODS, PROGRAM_REGISTRY
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
 from pyharness.plants import PLANTS, Plant
 from pyharness.random_scenes import draw, weekly_seed
+from pyharness.scene import Scene
 from pyharness.selection import DRAWS, RECORD, Selection
+from pyharness.trajectory import Trajectory
 from pyharness.verify import KINDS, verify
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
@@ -262,7 +266,8 @@ def test_no_record_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 # Those that need no second language: the rest is what `verify --self-test` is run for.
-QUICK = ("sign-in-both", "ulp-in-fortran", "stale-solver", "label-of-method", "digit-of-the-print")
+QUICK = ("sign-in-both", "ulp-in-fortran", "stale-solver", "label-of-method",
+         "digit-of-the-print", "velocity-in-both", "quick-refuses")  # fmt: skip
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -281,6 +286,33 @@ def test_plant_that_nothing_catches_is_a_failure(capsys: pytest.CaptureFixture[s
     output = capsys.readouterr().out
     assert "FAILED harmless" in output
     assert "1 plants and a control: 1 not as it should be" in output
+
+
+def test_method_that_fails_in_an_ordinary_scene_is_no_lack_of_a_truth() -> None:
+    """Limits follow a path of the method's own: what it makes endless is not excused."""
+    known = kernels.taylor
+
+    def wrong(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        found = known(scene, times, tolerance)
+        return replace(found, omega=found.omega * 1e9) if scene.name == "plain" else found
+
+    chosen = Selection(seed="fixed", only=["random"], draws=40)
+    with patch.object(kernels, "taylor", wrong):
+        failed = [check.id for check in verify(chosen) if not check.passed]
+    assert any(id.endswith("/no-truth") for id in failed)
+
+
+def test_programs_that_solve_no_linear_equations_are_told() -> None:
+    known = Program.run
+
+    def singular(self: Program, *rest: Any, **named: Any) -> Trajectory:
+        found = known(self, *rest, **named)
+        return found if found.ier is None else replace(found, ier=np.full_like(found.ier, 129))
+
+    chosen = Selection(only=["external/detest-b5"])
+    with patch.object(Program, "run", singular):
+        failed = [check.id for check in verify(chosen) if not check.passed]
+    assert failed == ["external/detest-b5/20/two-term", "external/detest-b5/20/four-term"]
 
 
 def test_plants_leave_nothing_behind() -> None:

@@ -95,11 +95,6 @@ contains
     end if
     power = max(-MOST_POWER, min(MOST_POWER, power))
     time = scale(t_end, power)
-    if (.not. abs(time) <= huge(time)) power = 0
-    if (power == 0) then
-      call solve_as_given(packed, n_packed, omega0, t_end, omega)
-      return
-    end if
     copy = packed
     copy(STEP) = scale(packed(STEP), power)
     do i = 0, 2
@@ -110,6 +105,13 @@ contains
       copy(i) = scale(packed(i), -power)
       if (mod(i - WAVES, 4) /= 3) copy(i) = scale(copy(i), -power)
     end do
+    ! In so short a time that it, or a torque, is no number then, products don't matter.
+    if (.not. (all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
+               .and. (abs(time) >= tiny(time) .or. .not. abs(t_end) > 0.0_dp))) power = 0
+    if (power == 0) then
+      call solve_as_given(packed, n_packed, omega0, t_end, omega)
+      return
+    end if
     do i = 1, 3
       start(i) = scale(omega0(i), -power)
     end do

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from pyharness.checks import Check, may_hold, selected
+from pyharness.errors import InputError
 from pyharness.scene import Scene
 
 # Each trial is a module of pyharness.trials, loaded when it is called for.
@@ -80,10 +81,16 @@ def stress(only: Sequence[str] = ()) -> Iterator[Outcome]:
         As they come.
     """
     for name in TRIALS:
-        if may_hold(name, only):
+        if not may_hold(name, only):
+            continue
+        try:
             for outcome in trial(name).run(only):
                 if selected(outcome.check.id, only):
                     yield outcome
+        except InputError as refusal:
+            # Something refused what it has to take: a fault, and none of the user's.
+            id = f"{name}/refused"
+            yield Outcome(Check(id, False, None, None, replay(name), f"ended here: {refusal}"))
 
 
 def replay(id: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 from xml.etree import ElementTree as xml
 
 import numpy as np
@@ -14,6 +15,8 @@ import pytest
 from pyharness import methods
 from pyharness.checks import Check
 from pyharness.cli import main
+from pyharness.errors import InputError
+from pyharness.methods import METHODS
 from pyharness.scene import Scene
 from pyharness.scene_file import read_scene
 from pyharness.stress import Outcome, stress, worst
@@ -328,3 +331,18 @@ def test_picture_shows_what_its_numbers_say(
     assert len(rows) == 1 + sum(check.value is not None for check in wanted)
     assert _run(capsys, *arguments)[0] == 0
     assert path.read_bytes() == first
+
+
+def test_method_that_refuses_what_it_has_to_take_fails() -> None:
+    def refuse(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        raise InputError("no")
+
+    only = ["torque/taylor/huge-1e+06", "shapes/taylor/case-6", "invariance/taylor/signs-12/free"]
+    known = METHODS["taylor"]
+    for each in only:
+        assert [o.check.passed for o in stress([each])].count(False) == 0
+    with patch.dict(METHODS, {"taylor": replace(known, solve=refuse)}):
+        for each in only:
+            checks = [outcome.check for outcome in stress([each])]
+            assert checks
+            assert not any(check.passed for check in checks), each

@@ -195,7 +195,7 @@ def turned_check(
         plain = end(scene, time, name, tolerance)
         other = symmetry.back(end(symmetry.turn(scene), time / symmetry.faster, name, tolerance))
     except InputError as refusal:
-        return described(id, None, replay(id), f"refused: {refusal}")
+        return Check(id, False, None, None, replay(id), f"refused: {refusal}")
     if name in symmetry.bitwise:
         return bounded(id, float(np.count_nonzero(plain != other)), 0.0, replay(id), "bits")
     flow = _flow(scene, time)

@@ -13,6 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import polynomial
 
+from pyharness.plan import closed_form
 from pyharness.scene import Scene
 from pyharness.scipy_methods import RADIANS
 
@@ -26,6 +27,8 @@ LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 COARSE = 1e-6
 QUICK_FINEST = 1e-7  # below it `auto` never asks the Runge-Kutta method for few digits
 _PATIENCE = 10.0  # times the budget, for the coarsest tolerance
+_SERIES = ("taylor", "auto", "prepared-auto")
+_TOO_MANY_RADIANS = 1e8  # of a wave, for a series
 _ORDERS = {"dop853": 8, "lsoda": 8, "radau": 5, "rk45": 5}
 _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
@@ -123,3 +126,16 @@ def _cost(name: str, tolerance: float, radians: float, amplification: float) -> 
         a_step = tolerance / (30.0 * max(1.0, radians / RADIANS[_SCIPY_NAMES[name]]))
         return _STAGES[name] * radians / math.pow(a_step, 1.0 / (_ORDERS[name] + 1))
     return 0.0
+
+
+def may_refuse(name: str, scene: Scene, time: float) -> bool:
+    """Whether a method may refuse a scene; anything else that refuses is at fault.
+
+    `closed-form` where there is none. `quick`, which takes three products and leaves to the series
+    what takes too many steps. The series where a wave turns more often than anyone waits for.
+    """
+    if name == "closed-form":
+        return closed_form(scene) is None
+    waves = scene.torque.sines + scene.torque.cosines
+    radians = max((abs(frequency * time) for _, frequency in waves), default=0.0)
+    return name == "quick" or (name in _SERIES and radians > _TOO_MANY_RADIANS)

@@ -17,6 +17,7 @@ from pyharness.solver import prepare
 from pyharness.stability.axial_top import axial_top
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
+from pyharness.trials.promises import may_refuse
 from pyharness.trials.truth import Truth, describe_programs, truth_of
 
 _MIDDLING = 1e-6
@@ -193,13 +194,14 @@ def tolerances(name: str) -> list[float]:
 
 
 def held(id: str, scene: Scene, truth: Truth, name: str, tolerance: float) -> Check:
-    """Hold one method against the truth; what it refuses is described."""
+    """Hold one method against the truth; it may refuse no more than `may_refuse` tells."""
     try:
         found, ended = _end(scene, truth.time, name, tolerance)
     except InputError as refusal:
-        return described(id, None, replay(id), f"refused: {refusal}")
+        may = may_refuse(name, scene, truth.time)
+        return Check(id, may, None, None, replay(id), f"refused: {refusal}")
     if ended in ("refused", "gave up"):
-        return described(id, None, replay(id), ended)
+        return Check(id, may_refuse(name, scene, truth.time), None, None, replay(id), ended)
     error = math.inf
     if ended == "complete":
         error = float(np.abs(found - truth.omega).max()) / truth.flow.largest

@@ -19,7 +19,7 @@ from pyharness.solver import prepare
 from pyharness.stability.elliptic import torque_free
 from pyharness.stress import Outcome, replay
 from pyharness.trials import promises
-from pyharness.trials.promises import FIXED, GAUSS
+from pyharness.trials.promises import FIXED, GAUSS, may_refuse
 
 # Ours at two tolerances: near the finest, where rounding shows, and a middling one.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
@@ -96,7 +96,7 @@ def hold_methods(
     The limit is what the method promises to be wrong by on the way, amplified by the flow;
     rounding amplified likewise; and what the truth itself may be wrong by. Where no more than two
     digits are left it says nothing. What a torque-free motion conserves is held always: the flow
-    does not amplify it. A method that refuses the scene says so: that is described.
+    does not amplify it. A method that refuses a scene which it has to take fails.
     """
     names = [m for m in methods if may_hold(f"{trial}/{m}/{circumstance}", only)]
     if not names:
@@ -165,7 +165,8 @@ def _held(
     try:
         run = run_method(name, scene, truth.time, tolerance)
     except InputError as refusal:
-        yield described(error_id, None, replay(error_id), f"refused: {refusal}")
+        may = may_refuse(name, scene, truth.time)
+        yield Check(error_id, may, None, None, replay(error_id), f"refused: {refusal}")
         return
     complete = run.ended == "complete"
     error = float(np.abs(run.omega - truth.omega).max()) / flow.largest if complete else math.inf

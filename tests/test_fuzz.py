@@ -35,9 +35,11 @@ BODY = "[body]\nmoments=[3,2,1]\n[initial]\nomega=[1,2,3]\n"
 def test_random_input_is_solved_or_refused_in_one_line(kind: str, tmp_path: Path) -> None:
     checks = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
+    # The same examples each time, so that what fails here fails again; the campaign varies.
     @settings(
-        max_examples=EXAMPLES[kind], deadline=None, database=None, suppress_health_check=checks
-    )
+        max_examples=EXAMPLES[kind], deadline=None, database=None, derandomize=True,
+        suppress_health_check=checks,
+    )  # fmt: skip
     @given(st.randoms(use_true_random=False))
     def every(random: Random) -> None:
         tried(kind, KINDS[kind].make(random), tmp_path)

@@ -214,7 +214,8 @@ def _faults(tree: Path) -> Iterator[Check]:
 
 
 def _run(tree: Path, arguments: list[str], traps: bool = False) -> subprocess.CompletedProcess[str]:
-    variables = {"PYHARNESS_TRAPS": "1"} if traps else {}
+    # Tests start processes in other folders.
+    variables = {"PYTHONPATH": str(tree)} | ({"PYHARNESS_TRAPS": "1"} if traps else {})
     return subprocess.run(
         [str(FOLDER / "environment" / "bin" / "python"), *arguments], cwd=tree, check=False,
         env=os.environ | variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,

@@ -42,4 +42,5 @@ def again(build: str, cell: str) -> str:
 
 def inside(build: str, module: str, variables: str = "") -> str:
     """Return the command that runs a module in the tree of a build."""
-    return f"cd build/cross/{build} && {variables}../environment/bin/python -m {module}"
+    python = f"PYTHONPATH=$PWD {variables}../environment/bin/python"
+    return f"cd build/cross/{build} && {python} -m {module}"

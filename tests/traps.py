@@ -29,7 +29,7 @@ DIVIDE = 2 if _ON_ARM else 4
 TOO_LARGE = 4 if _ON_ARM else 8
 _TRAPPED = INVALID | DIVIDE | TOO_LARGE
 _TRIES_AGAIN = (_CODES[EITHER], _CODES["quick"])
-_EXTREME = 1e60  # the fifth power of a number overflows
+_EXTREME = 1e60  # its fifth power overflows, and that of its inverse vanishes
 _NAMES = {INVALID: "invalid", DIVIDE: "divide by zero", TOO_LARGE: "overflow"}
 
 
@@ -107,8 +107,12 @@ def _finite(args: tuple[Any, ...]) -> bool:
 
 def _are_extreme(args: tuple[Any, ...]) -> bool:
     """Whether there are numbers whose products are none: what becomes of them is held elsewhere."""
-    sizes = (np.abs(np.asarray(each, dtype=float)) for each in args)
-    return any(size[size == size].max(initial=0.0) > _EXTREME for size in sizes)
+    for each in args:
+        sizes = np.abs(np.asarray(each, dtype=float))
+        sizes = sizes[sizes > 0.0]  # NaN is no size
+        if sizes.max(initial=1.0) > _EXTREME or sizes.min(initial=1.0) < 1.0 / _EXTREME:
+            return True
+    return False
 
 
 @functools.cache

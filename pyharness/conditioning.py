@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.errors import InputError
-from pyharness.scaling import scaled as scaled
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
 

@@ -113,7 +113,8 @@ def golden(chosen: Selection) -> Iterator[Check]:
     produced = {each.command for each in due}
     for command in sorted(set(entries) - produced):
         name = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
-        id = f"golden/{_source(known, command)}/{name}"
+        source = next(s for s, file in known.items() if entries[command] in file["trajectory"])
+        id = f"golden/{source}/{name}"
         if chosen.asks(id):
             note = "is recorded and no longer produced; verify --update forgets it"
             yield Check(id, False, None, None, _again(id, chosen), note)
@@ -149,15 +150,6 @@ def _check(id: str, again: str, each: Recorded, entry: dict[str, Any], same_libr
     return Check(id, away <= limit, away, limit, again, f"within its error: {moved}")
 
 
-def _source(known: dict[str, dict[str, Any]], command: str) -> str:
-    """Return the file in which a command is recorded."""
-    return next(
-        name
-        for name, file in known.items()
-        if any(entry["command"] == command for entry in file["trajectory"])
-    )
-
-
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
     """Return the files of a record by name; InputError for one that is no record."""
     found = {}
@@ -167,7 +159,8 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
             for entry in file["trajectory"]:
                 _rows(entry)
                 _ = [entry[key] for key in _KEYS]
-            found[path.stem] = {"mathematics": str(file["mathematics"]), **file}
+            _ = file["mathematics"]
+            found[path.stem] = file
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(
                 f"'{path}': is no record ({' '.join(str(error).split()) or 'empty'}); "

@@ -96,7 +96,7 @@ def gauss(stages: int) -> Solver:
         if times[-1] == 0.0:
             return _trajectory(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
         scale = max(map(abs, scene.omega))
-        start = max(scale, _driven(scene, times[-1]))
+        start = max(scale, _driven(torque, times[-1]))
         step, spent, reached = _first_step(scene, times), 0, 0.0
         before: _Solution | None = None
         counts = previous = _counts(times, step)
@@ -178,13 +178,13 @@ def _first_step(scene: Scene, times: Sequence[float]) -> float:
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
 
 
-def _driven(scene: Scene, time: float) -> float:
+def _driven(torque: tuple[Array, ...], time: float) -> float:
     """Return the largest omega that torque alone gives until `time` (rad/s), or infinity."""
-    _, constant, rate, sines, cosines = normalized(scene)
+    constant, rate, sines, cosines = torque
     with np.errstate(over="ignore", invalid="ignore"):
-        torque = np.abs(constant) + np.abs(rate * time)
-        torque += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
-        driven = float(torque.max()) * abs(time)
+        push = np.abs(constant) + np.abs(rate * time)
+        push += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
+        driven = float(push.max()) * abs(time)
     return driven if math.isfinite(driven) else math.inf
 
 

@@ -5,8 +5,8 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from pyharness.conditioning import scaled
 from pyharness.listing import PROGRAMS, Listing, names_of
+from pyharness.scaling import scaled
 from pyharness.scene import Scene, TorqueLaw, Triple, Wave
 
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)

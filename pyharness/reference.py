@@ -124,7 +124,7 @@ def reference(
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return the closed form of a sphere, or of a symmetric body without torque; else None."""
-    coefficients = _coefficients(scene)
+    coefficients = exact_coefficients(scene)
     if not any(coefficients):
         return [_sphere(scene, t) for t in times]
     if not scene.torque.is_zero:
@@ -226,7 +226,7 @@ class _Equations:
     """Equations 13-15, and dV/dt = F/m - omega x V, as recurrences of Taylor coefficients."""
 
     def __init__(self, scene: Scene, velocity: bool) -> None:
-        self._abc = _coefficients(scene)
+        self._abc = exact_coefficients(scene)
         self._torque = scene.torque
         self._moments = [Decimal(i) for i in scene.moments or (1, 1, 1)]
         self._velocity = velocity
@@ -283,7 +283,7 @@ def _product(x: Row, reversed_y: Row) -> Decimal:
     return sum(map(mul, x, reversed_y), Decimal(0))
 
 
-def _coefficients(scene: Scene) -> Row:
+def exact_coefficients(scene: Scene) -> Row:
     """Return A, B, C, exact to the digits of the arithmetic."""
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]

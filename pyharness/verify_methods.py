@@ -9,7 +9,7 @@ import numpy as np
 from pyharness.agreement import ulps
 from pyharness.checks import Check, bounded, described
 from pyharness.compare import ORDER_SLACK, measured_order, order_of
-from pyharness.conditioning import conditioning
+from pyharness.conditioning import Conditioning, conditioning
 from pyharness.contenders import FIXED_STEP
 from pyharness.errors import InputError
 from pyharness.kernels import extension, normalized
@@ -49,24 +49,12 @@ class Standard:
     ----------
     truth : Reference
         Its last time is the furthest from 0.
-    scale : float
-        Largest abs(omega) on the way (rad/s).
-    amplification : float
-        What a tolerance is multiplied by.
-    rounding : float
-        What rounding, amplified by the flow, and the truth's own error may add, over `scale`.
+    flow : Conditioning
+        What becomes of small errors, the truth's own among them.
     """
 
     truth: Reference
-    scale: float
-    amplification: float
-    rounding: float
-
-    def limit(self, tolerance: float) -> float:
-        """Return the error allowed, over `scale`."""
-        allowed = tolerance * self.amplification + self.rounding
-        # What is no number allows nothing.
-        return 0.0 if math.isnan(allowed) else min(2.0, allowed)
+    flow: Conditioning
 
 
 def methods(chosen: Selection) -> Iterator[Check]:
@@ -163,7 +151,7 @@ def random_methods(chosen: Selection) -> Iterator[Check]:
 
     Half of them are nasty: the limit grants what the flow amplifies.
     """
-    for number in range(0, 12, 3) if chosen.thin else range(0, chosen.draws, _EVERY):
+    for number in range(0, chosen.draws, _EVERY):
         if not chosen.may_ask(f"random/{number}"):
             continue
         drawn = draw(chosen.seed, number)
@@ -218,8 +206,9 @@ def _standard(scene: Scene, times: Sequence[float], amplified: bool = False) -> 
     flow = conditioning(scene, times[-1])
     # The reference's steps are good to 1e-22: where the flow amplifies more, more is asked.
     truth = reference(scene, times, precise=flow.amplification > 1e3)
+    amplification = flow.amplification if amplified else 1.0
     rounding = flow.rounding + truth.error / flow.largest
-    return Standard(truth, flow.largest, flow.amplification if amplified else 1.0, rounding)
+    return Standard(truth, replace(flow, amplification=amplification, rounding=rounding))
 
 
 def _held(
@@ -239,8 +228,8 @@ def _held(
         return Check(id, False, None, None, again, "solved what has no closed form")
     if run.ended != "complete" or not np.array_equal(run.time, times):
         return Check(id, False, None, None, again, f"{run.ended}, other times than asked for")
-    error = float(np.abs(run.omega - standard.truth.omega).max()) / standard.scale
-    return bounded(id, error, standard.limit(tolerance), again)
+    error = float(np.abs(run.omega - standard.truth.omega).max()) / standard.flow.largest
+    return bounded(id, error, standard.flow.limit(tolerance), again)
 
 
 def _held_prepared(
@@ -265,9 +254,9 @@ def _held_prepared(
         # Its unknowns need three products; and it leaves to the series what takes too many steps.
         may = not all(scene.euler_coefficients) if solver.status == "refused" else is_hard
         return Check(id, may, None, None, again, f"{_REFUSED}{solver.status}")
-    error = float(np.abs(found - standard.truth.omega[-1]).max()) / standard.scale
+    error = float(np.abs(found - standard.truth.omega[-1]).max()) / standard.flow.largest
     note = solver.status if math.isnan(error) else ""
-    return bounded(id, error, standard.limit(tolerance), again, note)
+    return bounded(id, error, standard.flow.limit(tolerance), again, note)
 
 
 def _tolerances(name: str, finest: float, thin: bool) -> list[float]:

@@ -38,7 +38,7 @@ def cells(chosen: Selection) -> Iterator[Check]:
 
 def random_programs(chosen: Selection) -> Iterator[Check]:
     """Hold Fortran against twin in scenes, listings and steps drawn from the seed."""
-    for number in range(12 if chosen.thin else chosen.draws):
+    for number in range(chosen.draws):
         id = f"random/{number}/program"
         if not chosen.asks(id):
             continue

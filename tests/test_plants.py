@@ -13,7 +13,7 @@ from pyharness import kernels
 from pyharness.agreement import differences
 from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, Listing, corrected, original
-from pyharness.plants import plant_in_twin
+from pyharness.planted_twins import plant_in_twin
 from pyharness.reference import reference
 from pyharness.scene_file import case_scene
 

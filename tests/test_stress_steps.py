@@ -17,7 +17,7 @@ from pyharness.cli import main
 from pyharness.listing import Listing, corrected, original
 from pyharness.original import collocation
 from pyharness.original.linear_solver import leqt1f
-from pyharness.plants import plant_in_twin
+from pyharness.planted_twins import plant_in_twin
 from pyharness.scene import Scene
 from pyharness.scene_file import case_scene
 from pyharness.stability import collocation_matrices

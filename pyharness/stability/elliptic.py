@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 from pyharness.decimal_functions import sine_cosine
+from pyharness.reference import exact_coefficients
 from pyharness.scene import Scene
 
 # Beside those that small components take by their squares.
@@ -47,15 +48,6 @@ def _decades(values: Row) -> int:
     """Return how many powers of ten lie between the largest and the smallest, zeros aside."""
     powers = [value.adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
-
-
-def exact_coefficients(scene: Scene) -> Row:
-    """Return A, B, C to the digits of the arithmetic."""
-    if scene.coefficients is not None:
-        return [Decimal(x) for x in scene.coefficients]
-    assert scene.moments is not None
-    i1, i2, i3 = (Decimal(x) for x in scene.moments)
-    return [(i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3]
 
 
 def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: Decimal) -> Row:

@@ -13,10 +13,11 @@ from functools import cache
 import numpy as np
 
 from pyharness.checks import Check, bounded, described, may_hold, selected
-from pyharness.conditioning import Conditioning, conditioning, scaled
+from pyharness.conditioning import Conditioning, conditioning
 from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.scaling import scaled
 from pyharness.scene import Scene, TorqueLaw, Triple
 from pyharness.solver import prepare
 from pyharness.stability.turned_scenes import shifted, turned

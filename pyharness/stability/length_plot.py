@@ -1,17 +1,17 @@
 """The picture of Brouwer's law: `stress --only length --plot FILE`; its rows as CSV."""
 
 import io
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.stability.brouwer import LAWS, root_mean_square
+from pyharness.stability.brouwer import LAWS
 from pyharness.tables import csv_text
-from pyharness.trajectory import Array
-from pyharness.trials.length import CONTENDERS, MOTIONS, measured, orbit_of
+
+if TYPE_CHECKING:
+    from pyharness.trials.length import Curve
 
 _SHOWN = ("energy", "phase")
 _STYLES: dict[str, dict[str, Any]] = {
@@ -22,38 +22,16 @@ _STYLES: dict[str, dict[str, Any]] = {
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """The error of one method over the number of steps, its bound, and by how many starts."""
-
-    motion: str
-    method: str
-    what: str
-    steps: Array
-    error: Array
-    limits: Array
-    starts: Array
-
-
-def curves() -> Iterator[Curve]:
-    """Measure every method on every motion, as the trial does."""
-    for motion, scene in MOTIONS.items():
-        for method, contender in CONTENDERS.items():
-            for what, found, steps, limits in measured(contender, scene, orbit_of(motion)):
-                starts = (~np.isnan(found)).sum(axis=0)
-                error = root_mean_square(found)
-                yield Curve(motion, method, what, steps, error, np.array(limits), starts)
-
-
-def picture(found: list[Curve], path: str) -> dict[str, bytes]:
+def picture(found: Sequence["Curve"], path: str) -> dict[str, bytes]:
     """Draw energy and phase of each motion; content by path, with CSV."""
     import matplotlib
     from matplotlib.figure import Figure
 
+    motions = list(dict.fromkeys(each.motion for each in found))
     figure = Figure(figsize=(10.0, 8.0), layout="constrained")
-    axes = figure.subplots(len(_SHOWN), len(MOTIONS), squeeze=False, sharex=True, sharey="row")
+    axes = figure.subplots(len(_SHOWN), len(motions), squeeze=False, sharex=True, sharey="row")
     for row, what in enumerate(_SHOWN):
-        for column, motion in enumerate(MOTIONS):
+        for column, motion in enumerate(motions):
             one = axes[row, column]
             own = [each for each in found if (each.motion, each.what) == (motion, what)]
             for each in own:

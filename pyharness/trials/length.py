@@ -164,6 +164,29 @@ def hold(name: str, contender: Contender, motion: str) -> Iterator[Outcome]:
         yield Outcome(bounded(id, power, due + _HALFWAY, replay(id), f"due {due}"), scene)
 
 
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The error of one method over the number of steps, its bound, and by how many starts."""
+
+    motion: str
+    method: str
+    what: str
+    steps: Array
+    error: Array
+    limits: Array
+    starts: Array
+
+
+def curves() -> Iterator[Curve]:
+    """Measure every method on every motion, as the trial does."""
+    for motion, scene in MOTIONS.items():
+        for method, contender in CONTENDERS.items():
+            for what, found, steps, limits in measured(contender, scene, orbit_of(motion)):
+                starts = (~np.isnan(found)).sum(axis=0)
+                error = brouwer.root_mean_square(found)
+                yield Curve(motion, method, what, steps, error, np.array(limits), starts)
+
+
 def measured(
     contender: Contender, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:

@@ -82,7 +82,8 @@ def _picture(name: str, checks: list[Check], path: str) -> dict[str, bytes]:
 
         return regions_picture(regions(), path)
     if name == "length":
-        from pyharness.stability.length_plot import curves, picture
+        from pyharness.stability.length_plot import picture
+        from pyharness.trials.length import curves
 
         return picture(list(curves()), path)
     from pyharness.stress_plots import stress_picture

@@ -1,0 +1,92 @@
+module taylor_plan
+  !! What a Taylor series is begun with: the order from the digits that are asked for, the share of
+  !! the error that a step may have, the first step from the rates of the problem.
+  use, intrinsic :: iso_fortran_env, only: int64
+  use euler_equations, only: MOST_ORDER, torque_t
+  use kinds, only: dp
+  implicit none(type, external)
+  private
+
+  real(dp), parameter :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
+  real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
+
+  public :: plan
+
+contains
+
+  pure subroutine plan(coefficients, torque, varies, scale, tolerance, time, best, most, share, h)
+    !! Order from the tolerance, the first step from the rates of the problem.
+    real(dp), intent(in) :: coefficients(3) !! A, B, C
+    type(torque_t), intent(in) :: torque
+    logical, intent(in) :: varies           !! torque with time
+    real(dp), intent(in) :: scale           !! largest |omega|, rad/s
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(in) :: time            !! to go, s
+    integer, intent(out) :: best            !! order
+    integer, intent(out) :: most            !! order
+    real(dp), intent(out) :: share          !! part of the scale that the last terms may have
+    real(dp), intent(out) :: h              !! s
+    real(dp) :: coupling
+    real(dp) :: push                        ! largest torque over moment, 1/s2
+    real(dp) :: gain                        ! speed that torques may add, rad/s
+    real(dp) :: rate                        ! 1/s
+    real(dp) :: turned                      ! by the waves, rad
+    integer :: n
+
+    turned = 0.0_dp
+    coupling = max(abs(coefficients(1)), abs(coefficients(2)), abs(coefficients(3)))
+    push = max(abs(torque%constant(1)), abs(torque%constant(2)), abs(torque%constant(3)))
+    gain = 0.5_dp*push*abs(time)
+    rate = coupling*scale + sqrt(coupling*push)
+    push = max(abs(torque%rate(1)), abs(torque%rate(2)), abs(torque%rate(3)))
+    if (push > 0.0_dp) then
+      gain = gain + push*time*time/6.0_dp
+      rate = rate + sqrt(coupling*push*abs(time))
+    end if
+    do n = 1, torque%n_sines
+      call add_wave_rates(torque%sines(:, n), coupling, time, gain, rate, turned)
+    end do
+    do n = 1, torque%n_cosines
+      call add_wave_rates(torque%cosines(:, n), coupling, time, gain, rate, turned)
+    end do
+    h = time
+    if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
+    ! An error turns into one of phase and grows with it; the weights are from the seven cases and
+    ! from random scenes.
+    ! Waves ask for more steps, and those may all err alike.
+    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain) + ALIKE*turned)
+    share = max(share, LEAST_SHARE)
+    best = order_for(share, varies)
+    most = min(best + 4, MOST_ORDER)
+  end subroutine plan
+
+  pure subroutine add_wave_rates(wave, coupling, time, gain, rate, turned)
+    !! What a wave of torque adds to the speed that may be gained, and to the rate of change.
+    real(dp), intent(in) :: wave(4)         !! amplitude (3) in 1/s2, frequency in rad/s
+    real(dp), intent(in) :: coupling
+    real(dp), intent(in) :: time            !! to go, s
+    real(dp), intent(inout) :: gain         !! rad/s
+    real(dp), intent(inout) :: rate         !! 1/s
+    real(dp), intent(inout) :: turned       !! rad
+    real(dp) :: push                        ! 1/s2
+
+    push = max(abs(wave(1)), abs(wave(2)), abs(wave(3)))
+    if (push > 0.0_dp) then
+      gain = gain + push*abs(time)/(1.0_dp + abs(wave(4)*time))
+      rate = rate + sqrt(coupling*push) + abs(wave(4))
+      turned = turned + abs(wave(4)*time)
+    end if
+  end subroutine add_wave_rates
+
+  pure integer function order_for(share, varies)
+    !! Even order with the least work, a line through measured ones. A torque that varies costs
+    !! the same at every order, so that fewer and longer steps pay.
+    real(dp), intent(in) :: share
+    logical, intent(in) :: varies  !! torque with time
+    integer(int64) :: bits  ! of accuracy
+
+    bits = 1023 - ishft(transfer(share, bits), -52)
+    order_for = min(MOST_ORDER - 4, 2*int((30 + 2*bits)/10) + merge(2, 0, varies))
+  end function order_for
+
+end module taylor_plan

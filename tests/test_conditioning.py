@@ -119,6 +119,12 @@ def test_a_wrong_sign_in_the_linearised_equations_is_seen(monkeypatch: pytest.Mo
     assert not 0.999 * sampled <= conditioning(scene, time).amplification <= 1.1 * sampled
 
 
+def test_limit_that_is_no_number_allows_nothing() -> None:
+    """min(2.0, nan) is 2.0, which would let anything pass."""
+    flow = room.Conditioning(1.0, math.nan, 0.0, 0.0, 1.0)
+    assert flow.limit(1e-9) == 0.0
+
+
 def test_limit_says_nothing_beyond_two() -> None:
     scene, time = _SCENES["beside the separatrix"]
     flow = conditioning(scene, time)

@@ -5,6 +5,8 @@ Each kind of check is the first part of its name:
 cells
     program x case x listing x reading: Fortran against twin, bit for bit over the whole
     trajectory, counters and stop.
+stops
+    where and why the Runge-Kutta program stops, against the formula of its test.
 methods, prepared
     modern methods against the reference, within the tolerance that they were given.
 orders
@@ -27,6 +29,7 @@ from pyharness.golden import golden
 from pyharness.selection import Selection, replay
 from pyharness.verify_methods import methods, orders, prepared, random_methods
 from pyharness.verify_programs import cells, random_programs
+from pyharness.verify_stops import stops
 
 
 def _random(chosen: Selection) -> Iterator[Check]:
@@ -47,6 +50,7 @@ _THIN_EXTERNAL = [
 
 KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
     "cells": cells,
+    "stops": stops,
     "methods": methods,
     "prepared": prepared,
     "orders": orders,

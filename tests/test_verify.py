@@ -23,6 +23,7 @@ from pyharness.cli import main
 from pyharness.golden import mathematics, read_record, update
 from pyharness.listing import PROGRAMS
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
+from pyharness.planted_twins import plant_in_twin
 from pyharness.plants import PLANTS, Plant
 from pyharness.random_scenes import draw, weekly_seed
 from pyharness.scene import Scene
@@ -50,6 +51,41 @@ def test_checks_have_names_of_their_own_and_all_pass() -> None:
     assert [check.id for check in checks if not check.passed] == []
     assert len({check.id for check in checks}) == len(checks)
     assert {check.kind for check in checks} == set(KINDS)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("_distances(slope[4], slope[1])", "_distances(slope[3], slope[1])"),
+        ("_distances(point[3], first_point)", "_distances(point[2], first_point)"),
+        ("_distances(result, base)", "_distances(result, point[3])"),
+        ("order = [3, 4, 5, 0, 1, 2]", "order = [0, 1, 2, 3, 4, 5]"),
+        ("else [0, 1, 2]", "else [0, 2, 1]"),
+        ("last = 6 if velocity_counts else 3", "last = 3"),
+        ("if norm_k > norm_u * lipschitz:", "if norm_k > 1.01 * norm_u * lipschitz:"),
+        ("total = total + each * each", "total = total + abs(each)"),
+        ("Stop(step + 1, *found)", "Stop(step, *found)"),
+    ],
+)
+def test_wrong_stop_test_in_both_languages_is_seen(right: str, wrong: str, tmp_path: Path) -> None:
+    only = [f"stops/case-{case}" for case in (1, 3, 5, 6)]
+    assert all(check.passed for check in verify(Selection(only=only)))
+    faulty = plant_in_twin("runge-kutta", "runge_kutta.py", right, wrong, tmp_path)
+    with patch.dict(PROGRAM_REGISTRY, {"runge-kutta": faulty}):
+        assert not all(check.passed for check in verify(Selection(only=only)))
+
+
+@pytest.mark.parametrize("change", [{"steps": 99}, {"velocity": None}])
+def test_stop_test_is_not_tried_on_part_of_a_run(change: dict[str, Any]) -> None:
+    whole = Program.run
+
+    def part(self: Program, *rest: Any, **named: Any) -> Trajectory:
+        return replace(whole(self, *rest, **named), **change)
+
+    with patch.object(Program, "run", part):
+        checks = list(verify(Selection(only=["stops"])))
+    assert len(checks) == 7
+    assert not any(check.passed for check in checks)
 
 
 def test_limit_is_not_passed_by_nan() -> None:

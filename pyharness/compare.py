@@ -7,26 +7,18 @@ error against the truth (in rad/s, never below what the reference itself may be 
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-
-import numpy as np
 
 from pyharness.agreement import Accuracy, accuracy, differences, distance
 from pyharness.errors import InputError, unknown
 from pyharness.listing import PROGRAMS, Listing, names_of, subset
-from pyharness.methods import PROGRAM_REGISTRY, SCIPY_METHODS, Program, solve
+from pyharness.methods import PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.orders import Order, measured_order
 from pyharness.reference import Reference, reference
 from pyharness.scene import Scene
-from pyharness.trajectory import Array, Trajectory
+from pyharness.trajectory import Trajectory
 
-# The order is measured where halving the step moves the result by less than this (relative to
-# the largest |omega|), and must come within half an order of the program's own.
-_SMALL_CHANGE = 1e-3
-_MOST_HALVINGS = 8
-ORDER_SLACK = 0.5
-# Rounding: so many units in the last place of the largest |omega| per step.
-_ROUNDING = 8.0 * 2.0**-53
 _TIMING_BATCHES = 3
 _TIMING_SECONDS = 3e-4
 
@@ -40,8 +32,7 @@ class ProgramFinding:
     accuracy: Accuracy
     ulps: float
     differences: tuple[str, ...]
-    order: float | None
-    misses_order: bool
+    order: Order | None
     seconds_per_step: float
 
 
@@ -75,13 +66,20 @@ class Comparison:
             who = f"{each.listing.program} {each.listing.label}"
             if each.differences:
                 found.append(f"{who}: Fortran and twin differ in {', '.join(each.differences)}")
-            if each.misses_order:
-                order = PROGRAM_REGISTRY[each.listing.program].order
-                seen = "does not settle" if each.order is None else f"order {each.order:.1f}"
-                found.append(
-                    f"{who}: misses the reference as the step is halved: {seen}, due {order}"
-                )
+            if each.order is not None and each.order.state == "misses":
+                seen = each.order.note or f"order {each.order.value:.1f}"
+                text = "misses the reference as the step is halved"
+                found.append(f"{who}: {text}: {seen}, due {each.order.due}")
         return tuple(found)
+
+    @property
+    def not_judged(self) -> tuple[str, ...]:
+        """Of which mended programs the scene can't tell whether they are right, and why."""
+        return tuple(
+            f"{each.listing.program} {each.listing.label}: {each.order.note}"
+            for each in self.programs
+            if each.order is not None and each.order.state == "not judged"
+        )
 
 
 def compare(
@@ -125,7 +123,6 @@ def compare(
         compiled = program.run(scene, listing, "fortran", lipschitz, may_stop)
         twin = program.run(scene, listing, "python", lipschitz, may_stop)
         judged = not listing.defects and not listing.readings
-        order, misses = measured_order(scene, program, listing, truth) if judged else (None, False)
         programs.append(
             ProgramFinding(
                 listing=listing,
@@ -133,8 +130,7 @@ def compare(
                 accuracy=accuracy(scene, compiled, truth),
                 ulps=distance(compiled, twin),
                 differences=tuple(differences(compiled, twin)),
-                order=order,
-                misses_order=misses,
+                order=measured_order(scene, program, listing, truth) if judged else None,
                 seconds_per_step=_seconds(
                     partial(program.run, scene, listing, "fortran", lipschitz, may_stop)
                 )
@@ -183,55 +179,6 @@ def listings_for(
             rows.insert(1, subset(program, base, mended, kept, selected))
         result += rows
     return result
-
-
-def measured_order(
-    scene: Scene, program: Program, listing: Listing, truth: Reference
-) -> tuple[float | None, bool]:
-    """Halve the step until it is small, and measure the power with which the error falls.
-
-    Returns
-    -------
-    float or None
-        The order; None where the error is that of rounding from the start, or where the
-        program does not settle however small the step.
-    bool
-        Whether the program misses the reference by more than its order allows.
-    """
-
-    def omega(finer: Scene) -> Array:
-        return program.run(finer, listing, may_stop=False, velocity=False).omega
-
-    return order_of(scene, omega, program.order, truth)
-
-
-def order_of(
-    scene: Scene, solution: Callable[[Scene], Array], due: int, truth: Reference
-) -> tuple[float | None, bool]:
-    """Measure the order of anything that solves a scene in its own steps; see `measured_order`."""
-    n = len(truth.time)
-    if n < scene.steps:
-        return None, False  # the solution itself leaves every bound
-    scale = float(np.abs(truth.omega).max(initial=max(map(abs, scene.omega))))
-    previous: Array | None = None
-    previous_error = math.inf
-    for halvings in range(_MOST_HALVINGS + 1):
-        parts = 2**halvings
-        try:
-            finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
-        except InputError:
-            return None, False  # does not fit in memory
-        omega = solution(finer)[parts - 1 :: parts]
-        if len(omega) < n:
-            continue  # overflow: the step is far too large
-        error = float(np.abs(omega - truth.omega).max())
-        if error <= _ROUNDING * scale * finer.steps + truth.error:
-            return None, False
-        if previous is not None and np.abs(omega - previous).max() < _SMALL_CHANGE * scale:
-            order = math.log2(previous_error / error)
-            return order, order < due - ORDER_SLACK
-        previous, previous_error = omega, error
-    return None, True
 
 
 def _method(scene: Scene, name: str, tolerance: float, truth: Reference) -> MethodFinding:

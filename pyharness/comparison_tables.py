@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from pyharness.agreement import Accuracy
 from pyharness.compare import Comparison
-from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.tables import aligned, heading, markdown_text, short, wrapped
 from pyharness.trajectory import Stop, Trajectory
 
@@ -47,24 +46,20 @@ def comparison_table(comparison: Comparison) -> str:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return the verdict: one line, or one for each thing that is not as it should be."""
-    if comparison.unexpected:
-        return [line for each in comparison.unexpected for line in wrapped(f"UNEXPECTED: {each}")]
+    """Return the verdict: one sentence, or one for each thing that is not as it should be."""
+    told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
+    told += [f"not judged: {each}" for each in comparison.not_judged]
+    return [line for each in told for line in wrapped(each)]
+
+
+def _as_expected(comparison: Comparison) -> str:
     same = sum(not each.differences for each in comparison.programs)
-    orders = [
-        f"{each.order:.1f}" if each.order is not None else "-"
-        for each in comparison.programs
-        if each.listing.label == "corrected" and not each.listing.readings
-    ]
     text = f"as expected: Fortran = Python bit for bit in {same} of {len(comparison.programs)}"
-    if orders:
-        wanted = [
-            str(PROGRAM_REGISTRY[each.listing.program].order)
-            for each in comparison.programs
-            if each.listing.label == "corrected" and not each.listing.readings
-        ]
-        text += f"; orders mended {', '.join(orders)} (due: {', '.join(wanted)})"
-    return [text]
+    orders = [each.order for each in comparison.programs if each.order is not None]
+    if not orders:
+        return text
+    seen = ", ".join("-" if each.value is None else f"{each.value:.1f}" for each in orders)
+    return f"{text}; orders mended {seen} (due: {', '.join(str(each.due) for each in orders)})"
 
 
 def comparison_rows(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:
@@ -87,7 +82,7 @@ def comparison_rows(comparison: Comparison) -> tuple[Sequence[str], list[list[st
             "stop_quotient": repr(run.stop.quotient) if run.stop else "",
             **_accuracy_cells(good),
             "ulps": _cell(each.ulps),
-            "order": _cell(each.order),
+            "order": _cell(each.order.value if each.order else None),
             "evaluations": str(run.evaluations),
             "seconds": _cell(each.seconds_per_step * run.steps),
         }

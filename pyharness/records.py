@@ -58,7 +58,7 @@ def comparison_record(comparison: Comparison, build: Build) -> dict[str, Any]:
                 **_accuracy(each.accuracy),
                 "ulps": each.ulps,
                 "differences": list(each.differences),
-                "order": each.order,
+                "order": each.order.value if each.order else None,
                 "seconds_per_step": each.seconds_per_step,
             }
             for each in comparison.programs
@@ -75,6 +75,7 @@ def comparison_record(comparison: Comparison, build: Build) -> dict[str, Any]:
             for each in comparison.methods
         ],
         "unexpected": list(comparison.unexpected),
+        "not_judged": list(comparison.not_judged),
         "build": asdict(build),
     }
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from pyharness.agreement import ulps
 from pyharness.checks import Check, bounded, described
-from pyharness.compare import ORDER_SLACK, measured_order, order_of
 from pyharness.conditioning import Conditioning, conditioning
 from pyharness.contenders import FIXED_STEP
 from pyharness.errors import InputError
 from pyharness.kernels import extension, normalized
 from pyharness.listing import PROGRAMS, corrected
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.orders import ORDER_SLACK, Order, measured_order, order_of
 from pyharness.plan import closed_form
 from pyharness.random_scenes import Draw, draw
 from pyharness.reference import Reference, reference
@@ -128,19 +128,19 @@ def orders(chosen: Selection) -> Iterator[Check]:
             for name in filter(asks.get, PROGRAMS):
                 program = PROGRAM_REGISTRY[name]
                 found = measured_order(scene, program, corrected(name), truth)
-                yield _order(f"orders/{name}/case-{case}", program.order, *found)
+                yield _order(f"orders/{name}/case-{case}", found)
         moves = {name: chosen.asks(f"orders/{name}/case-{case}/velocity") for name in PROGRAMS}
         if any(moves.values()):
             truth = _velocity(scene)
             for name in filter(moves.get, PROGRAMS):
                 due = PROGRAM_REGISTRY[name].order
                 found = order_of(scene, _velocity_of(name), due, truth)
-                yield _order(f"orders/{name}/case-{case}/velocity", due, *found)
+                yield _order(f"orders/{name}/case-{case}/velocity", found)
         if any(asks[name] for name in FIXED_STEP):
             truth = reference(scene, scene.times())
             for name in filter(asks.get, FIXED_STEP):
                 found = order_of(scene, _steps_of(name), FIXED_STEP[name][0], truth)
-                yield _order(f"orders/{name}/case-{case}", FIXED_STEP[name][0], *found)
+                yield _order(f"orders/{name}/case-{case}", found)
 
 
 _ORDERED = (*PROGRAMS, *FIXED_STEP)
@@ -267,11 +267,13 @@ def _tolerances(name: str, finest: float, thin: bool) -> list[float]:
     return [*(each for each in _TOLERANCES if each > finest), finest]
 
 
-def _order(id: str, due: int, order: float | None, misses: bool) -> Check:
-    if order is None:
-        note = "does not settle" if misses else "rounding from the start"
-        return Check(id, not misses, None, ORDER_SLACK, replay(id), note)
-    return Check(id, not misses, due - order, ORDER_SLACK, replay(id), f"order {order:.2f}")
+def _order(id: str, found: Order) -> Check:
+    """Return the check that the order is as due; what the cases can't judge fails."""
+    passed = found.state in ("as due", "rounding")
+    if found.value is None:
+        return Check(id, passed, None, ORDER_SLACK, replay(id), found.note or found.state)
+    missing = found.due - found.value
+    return Check(id, passed, missing, ORDER_SLACK, replay(id), f"order {found.value:.2f}")
 
 
 def _steps_of(name: str) -> Callable[[Scene], Array]:

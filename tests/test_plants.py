@@ -11,8 +11,8 @@ import pytest
 
 from pyharness import kernels
 from pyharness.agreement import differences
-from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, Listing, corrected, original
+from pyharness.orders import measured_order
 from pyharness.planted_twins import plant_in_twin
 from pyharness.reference import reference
 from pyharness.scene_file import case_scene
@@ -79,7 +79,7 @@ def test_fault_in_a_twin_is_caught(name: str, tmp_path: Path) -> None:
     listing = corrected(program)
     assert differences(kernels.run(scene, listing), planted.run(scene, listing)), "bits"
     truth = reference(scene, scene.times())
-    _, misses = measured_order(scene, planted, listing, truth)
+    misses = measured_order(scene, planted, listing, truth).state == "misses"
     assert misses == shows_in_truth, "truth"
 
 
@@ -91,7 +91,7 @@ def test_twin_without_a_fault_is_not_caught(tmp_path: Path) -> None:
         listing = corrected(program)
         assert differences(kernels.run(scene, listing), planted.run(scene, listing)) == []
         truth = reference(scene, scene.times())
-        assert not measured_order(scene, planted, listing, truth)[1]
+        assert measured_order(scene, planted, listing, truth).state == "as due"
 
 
 # file, what stands there, the fault, the cell that must notice

@@ -10,9 +10,9 @@ import pytest
 from pyharness import kernels
 from pyharness.agreement import differences, distance
 from pyharness.cells import all_cells, all_listings, cell_name
-from pyharness.compare import measured_order
 from pyharness.listing import PROGRAMS, corrected, names_of, original, subset
 from pyharness.methods import PROGRAM_REGISTRY
+from pyharness.orders import measured_order
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
@@ -149,13 +149,13 @@ def test_mended_programs_converge_with_their_order(program: str, case: int) -> N
 def test_measured_order_is_the_programs_own(program: str, case: int) -> None:
     scene = case_scene(case)
     truth = reference(scene, scene.times())
-    order, misses = measured_order(scene, PROGRAM_REGISTRY[program], corrected(program), truth)
-    assert not misses
+    order = measured_order(scene, PROGRAM_REGISTRY[program], corrected(program), truth)
     if case == 1:
-        assert order is None  # rounding from the start
+        assert order.state == "rounding"
     else:
-        assert order is not None
-        assert abs(order - PROGRAM_REGISTRY[program].order) < 0.3
+        assert order.state == "as due"
+        assert order.value is not None
+        assert abs(order.value - PROGRAM_REGISTRY[program].order) < 0.3
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -166,8 +166,8 @@ def test_programs_as_punched_are_caught_as_missing_their_order(program: str) -> 
     """
     scene = case_scene(7)
     truth = reference(scene, scene.times())
-    _, misses = measured_order(scene, PROGRAM_REGISTRY[program], original(program), truth)
-    assert misses
+    order = measured_order(scene, PROGRAM_REGISTRY[program], original(program), truth)
+    assert order.state == "misses"
 
 
 def test_every_defect_alone_changes_something() -> None:
@@ -205,8 +205,8 @@ def test_readings_not_adopted_lose_an_order(reading: str) -> None:
     scene = case_scene(5)
     truth = reference(scene, scene.times())
     listing = corrected(program, [reading])
-    order, misses = measured_order(scene, PROGRAM_REGISTRY[program], listing, truth)
-    assert misses, order
+    order = measured_order(scene, PROGRAM_REGISTRY[program], listing, truth)
+    assert order.state == "misses", order
 
 
 def test_recorded_time_is_what_tape5_got() -> None:

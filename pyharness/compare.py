@@ -67,18 +67,17 @@ class Comparison:
             if each.differences:
                 found.append(f"{who}: Fortran and twin differ in {', '.join(each.differences)}")
             if each.order is not None and each.order.state == "misses":
-                seen = each.order.note or f"order {each.order.value:.1f}"
                 text = "misses the reference as the step is halved"
-                found.append(f"{who}: {text}: {seen}, due {each.order.due}")
+                found.append(f"{who}: {text}: {each.order}, due {each.order.due}")
         return tuple(found)
 
     @property
     def not_judged(self) -> tuple[str, ...]:
         """Of which mended programs the scene can't tell whether they are right, and why."""
         return tuple(
-            f"{each.listing.program} {each.listing.label}: {each.order.note}"
+            f"{each.listing.program} {each.listing.label}: {each.order}"
             for each in self.programs
-            if each.order is not None and each.order.state == "not judged"
+            if each.order is not None and not each.order.is_judged
         )
 
 

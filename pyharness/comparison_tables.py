@@ -67,7 +67,7 @@ def comparison_rows(comparison: Comparison) -> tuple[Sequence[str], list[list[st
     head = (
         "method", "listing", "active", "steps", "ended", "stop_variable", "stop_quotient",
         "error_w1", "error_w2", "error_w3", "error_v", "energy_drift", "momentum_drift", "ulps",
-        "order", "evaluations", "seconds",
+        "order", "order_state", "evaluations", "seconds",
     )  # fmt: skip
     rows = []
     for each in comparison.programs:
@@ -83,6 +83,7 @@ def comparison_rows(comparison: Comparison) -> tuple[Sequence[str], list[list[st
             **_accuracy_cells(good),
             "ulps": _cell(each.ulps),
             "order": _cell(each.order.value if each.order else None),
+            "order_state": each.order.state if each.order else "",
             "evaluations": str(run.evaluations),
             "seconds": _cell(each.seconds_per_step * run.steps),
         }

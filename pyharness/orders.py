@@ -10,24 +10,32 @@ import numpy as np
 
 from pyharness.errors import InputError
 from pyharness.listing import Listing
-from pyharness.methods import Program
+from pyharness.methods import Program, solve
 from pyharness.reference import Reference
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
 
 # An order must come within half an order of the one that is due.
 ORDER_SLACK = 0.5
-# It is measured where halving the step moves the result by less than this, relative to the largest
-# |omega|; torques that the steps skip can look like that, so that a miss has to come again.
+# It is measured where halving the step moves the result by less than this, relative to the
+# largest, and a step turns body and torque by fewer radians: steps that skip periods of the torque
+# seem to have settled too.
 _SMALL_CHANGE = 1e-3
-_MISSES = 4
-# A step far too long is halved until this many are taken, and eight times at least.
+_SMALL_ANGLE = 0.5
+# Steps are halved until this many are taken, and eight times at least.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
-# Radians of a step in which nothing can be missed: who does not settle there will not.
-_SMALL_ANGLE = 0.01
-# Rounding: so many units in the last place of the largest |omega| per step.
+# Where a textbook method of its order settles with so many times fewer steps, it is the program's
+# fault that it does not.
+_MARGIN = 4
+_TEXTBOOK = {2: "improved-euler", 4: "rk4"}
+# Rounding: so many units in the last place of the largest per step.
 _ROUNDING = 8.0 * 2.0**-53
+# A matrix with a larger condition number may be found singular.
+_CONDITION = 1e15
+
+State = Literal["as due", "rounding", "misses", "unsettled", "singular", "unbounded"]
+Quantity = Literal["omega", "velocity"]
 
 
 @dataclass(frozen=True)
@@ -38,87 +46,157 @@ class Order:
     ----------
     due : int
         The order that the method has.
-    state : {"as due", "rounding", "misses", "not judged"}
-        Whether it showed; `rounding`: the error was that of rounding from the start.
+    state : {"as due", "rounding", "misses", "unsettled", "singular", "unbounded"}
+        Whether it showed. `rounding`: the error was that of rounding before it could. The last
+        three: it can't be told, for no step was small enough, the program found its matrix
+        singular, or the solution itself leaves every bound.
     value : float or None
         As measured, if it could be.
-    note : str
-        Why it is `not judged`, or that it does not settle.
+    step_size : float
+        The finest step that was tried (s); of `singular` the longest that makes it so.
+    steps : int
+        How many were taken in the finest run that could be held against the truth.
     """
 
     due: int
-    state: Literal["as due", "rounding", "misses", "not judged"]
-    value: float | None = None
-    note: str = ""
+    state: State
+    value: float | None
+    step_size: float
+    steps: int
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether it is known if the method has its order."""
+        return self.state in ("as due", "rounding", "misses")
+
+    def __str__(self) -> str:
+        """Return what was seen, in a few words."""
+        if self.value is not None:
+            return f"order {self.value:.2f}"
+        return {
+            "singular": f"IER = 129 at steps of {self.step_size:.1e} s",
+            "unbounded": "the solution itself leaves every bound",
+            "rounding": "rounding from the start",
+        }.get(self.state, f"does not settle down to steps of {self.step_size:.1e} s")
 
 
 class _SingularError(Exception):
-    """The matrix of a program is found singular, so that it is not the method it was."""
+    """A matrix was found singular that has to be: the program is another method then."""
 
 
-def measured_order(scene: Scene, program: Program, listing: Listing, truth: Reference) -> Order:
-    """Measure the order of a program, by its runs without IER; see `order_of`."""
+def measured_order(
+    scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
+) -> Order:
+    """Measure the order of a program's omega; see `order_of`.
+
+    That it does not settle is a miss if a textbook method does.
+    """
 
     def omega(finer: Scene) -> Array:
         run = program.run(finer, listing, may_stop=False, velocity=False)
-        if run.ier is not None and run.ier.any():
-            raise _SingularError(f"IER = {run.ier.max()} at steps of {finer.step_size:.1e} s")
+        failed = run.steps < finer.steps or (run.ier is not None and run.ier.any())
+        if failed and _may_be_singular(program.name, finer.step_size):
+            raise _SingularError
         return run.omega
 
-    return order_of(scene, omega, program.order, truth)
+    def textbook(finer: Scene) -> Array:
+        return solve(finer, finer.times(), _TEXTBOOK[program.order], 1.0).omega
+
+    found = order_of(scene, omega, program.order, truth, pairs=pairs)
+    if found.state in ("unsettled", "singular"):
+        fewer = found.steps // _MARGIN
+        if order_of(scene, textbook, program.order, truth, most_steps=fewer).is_judged:
+            return replace(found, state="misses")
+    return found
 
 
-def order_of(scene: Scene, solution: Callable[[Scene], Array], due: int, truth: Reference) -> Order:
+def order_of(
+    scene: Scene,
+    solution: Callable[[Scene], Array],
+    due: int,
+    truth: Reference,
+    quantity: Quantity = "omega",
+    pairs: int = 2,
+    most_steps: int | None = None,
+) -> Order:
     """Halve the step until it is small, and measure the power with which the error falls.
 
     Parameters
     ----------
+    scene : Scene
+        With the longest step.
     solution : callable
-        Returns omega, shape (n, 3), after each step of the scene that it is given.
+        Returns what is judged after each step of the scene that it is given, shape (n, 3);
+        fewer rows where it overflows.
+    due : int
+        The order that it has.
     truth : Reference
-        At the scene's own times.
+        At the times of `scene`.
+    quantity : {"omega", "velocity"}
+        What of the truth is meant.
+    pairs : int
+        Halvings, one after another, in which the order has to show, or not to.
+    most_steps : int, optional
+        How far to go; by default 2**18, or eight halvings.
     """
     n = len(truth.time)
     if n < scene.steps:
-        return Order(due, "not judged", note="the solution itself leaves every bound")
-    scale = float(np.abs(truth.omega).max(initial=max(map(abs, scene.omega))))
+        return Order(due, "unbounded", None, scene.step_size, 0)
+    right = truth.omega if quantity == "omega" else truth.velocity
+    assert right is not None
+    start = max(map(abs, scene.omega)) if quantity == "omega" else 0.0
+    scale = float(np.abs(right).max(initial=start))
+    fastest = _fastest(scene, truth.omega)
+    state: State = "unsettled"
+    step_size, steps = scene.step_size, 0
     previous: Array | None = None
     previous_error = math.inf
-    misses: list[float] = []
-    restless, note = False, "too few steps to tell"
-    for finer in _halved(scene):
+    orders: list[float] = []
+    for finer in _halved(scene, most_steps):
+        parts = finer.steps // n
         try:
-            omega = solution(finer)[finer.steps // n - 1 :: finer.steps // n]
-        except _SingularError as found:
-            note = note if restless else str(found)
-            break
-        note = f"does not settle down to steps of {finer.step_size:.1e} s"
-        restless = finer.step_size * _fastest(scene, scale) <= _SMALL_ANGLE
-        if len(omega) < n:
-            continue  # overflow: the step is far too large
-        error = float(np.abs(omega - truth.omega).max())
-        if not misses and error <= _ROUNDING * scale * finer.steps + truth.error:
-            return Order(due, "rounding")
-        if previous is None:
-            restless = False
-        elif np.abs(omega - previous).max() < _SMALL_CHANGE * scale:
-            order = math.log2(previous_error / error) if error else math.inf
-            if order >= due - ORDER_SLACK:
-                return Order(due, "as due", order)
-            misses.append(order)
-            if len(misses) == _MISSES:
-                break
-        previous, previous_error = omega, error
-    if misses:
-        return Order(due, "misses", misses[-1])
-    return Order(due, "misses" if restless else "not judged", note=note)
+            found = solution(finer)[parts - 1 :: parts]
+        except _SingularError:
+            if state != "singular":
+                state, step_size = "singular", finer.step_size
+            previous = None
+            continue
+        steps = finer.steps
+        if state != "singular":
+            step_size = finer.step_size
+        if len(found) < n:  # overflow: the step is far too large
+            previous = None
+            continue
+        error = float(np.abs(found - right).max())
+        if error <= _ROUNDING * scale * steps + truth.error:
+            shown = [each for each in orders if _shows(each, due)]
+            value = shown[-1] if shown else None
+            return Order(due, "as due" if shown else "rounding", value, finer.step_size, steps)
+        settles = previous is not None and np.abs(found - previous).max() < _SMALL_CHANGE * scale
+        if settles and finer.step_size * fastest <= _SMALL_ANGLE:
+            order = math.log2(previous_error / error)
+            if orders and _shows(order, due) != _shows(orders[-1], due):
+                orders.clear()
+            orders.append(order)
+            if len(orders) == pairs:
+                verdict: State = "as due" if _shows(order, due) else "misses"
+                return Order(due, verdict, order, finer.step_size, steps)
+        previous, previous_error = found, error
+    if orders and _shows(orders[-1], due):
+        return Order(due, "as due", orders[-1], step_size, steps)
+    return Order(due, state, None, step_size, steps)
 
 
-def _halved(scene: Scene) -> Iterator[Scene]:
+def _shows(order: float, due: int) -> bool:
+    return order >= due - ORDER_SLACK
+
+
+def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
     """Yield the scene in its own steps, in half of them, and so on."""
+    most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():
         parts = 2**halvings
-        if halvings > _HALVINGS and scene.steps * parts > _MOST_STEPS:
+        if scene.steps * parts > most:
             return
         try:
             yield replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
@@ -126,8 +204,23 @@ def _halved(scene: Scene) -> Iterator[Scene]:
             return  # does not fit in memory
 
 
-def _fastest(scene: Scene, largest: float) -> float:
-    """Return a rate (rad/s) that neither the motion nor the torque exceeds."""
-    turning = 2.0 * largest * max(map(abs, scene.euler_coefficients))
+def _fastest(scene: Scene, omega: Array) -> float:
+    """Return a rate (rad/s) above those of small disturbances of omega, and of the torque."""
+    sizes = np.abs(np.vstack([scene.omega, omega]))
+    others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
     waves = scene.torque.sines + scene.torque.cosines
+    turning = float((np.abs(scene.euler_coefficients) * others).max())
     return max([turning, *(abs(frequency) for _, frequency in waves)])
+
+
+def _may_be_singular(program: str, step_size: float) -> bool:
+    """Whether the matrix of collocation at such steps (s) may be found singular."""
+    from pyharness.stability.collocation_matrices import PARTS
+
+    if program not in PARTS:
+        return False
+    points = np.array([[step_size * part] for part in map(float, PARTS[program])])
+    powers = np.arange(len(points))
+    with np.errstate(all="ignore"):
+        matrix = (powers + 1) * points**powers
+    return not (np.isfinite(matrix).all() and np.linalg.cond(matrix) < _CONDITION)

@@ -59,6 +59,7 @@ def comparison_record(comparison: Comparison, build: Build) -> dict[str, Any]:
                 "ulps": each.ulps,
                 "differences": list(each.differences),
                 "order": each.order.value if each.order else None,
+                "order_state": each.order.state if each.order else None,
                 "seconds_per_step": each.seconds_per_step,
             }
             for each in comparison.programs

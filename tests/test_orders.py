@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +11,13 @@ import pytest
 from pyharness.build import build
 from pyharness.compare import compare
 from pyharness.comparison_tables import comparison_table
-from pyharness.listing import PROGRAMS, corrected, original
+from pyharness.listing import PROGRAMS, Listing, corrected
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.orders import Order, measured_order, order_of
+from pyharness.planted_twins import plant_in_twin
 from pyharness.records import comparison_record
 from pyharness.reference import reference
-from pyharness.scene import Scene
+from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
 from pyharness.trajectory import Array
 
@@ -24,11 +26,9 @@ def _steps(case: int, step_size: float, steps: int) -> Scene:
     return replace(case_scene(case), step_size=step_size, steps=steps)
 
 
-def _order(scene: Scene, program: str, punched: bool = False) -> Order:
-    listing = original(program) if punched else corrected(program)
-    return measured_order(
-        scene, PROGRAM_REGISTRY[program], listing, reference(scene, scene.times())
-    )
+def _order(scene: Scene, program: str) -> Order:
+    truth = reference(scene, scene.times())
+    return measured_order(scene, PROGRAM_REGISTRY[program], corrected(program), truth)
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -48,26 +48,71 @@ def test_step_far_too_long_is_halved_until_the_order_shows(
     assert order.value == pytest.approx(order.due, abs=0.5)
 
 
-def test_what_can_t_be_told_is_not_judged() -> None:
-    order = _order(_steps(4, 100.0, 3), "two-term")
-    assert (order.state, order.value) == ("not judged", None)
-    assert "does not settle" in order.note
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_fast_torque_that_the_steps_skip_is_no_miss(program: str) -> None:
+    torque = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e4),))
+    scene = Scene("wave", (0.0, 1.0, 1.0), (40.0, 30.0, 20.0), torque=torque, steps=10)
+    assert _order(scene, program).state == "as due"
 
 
-def test_singular_matrix_is_named_and_no_miss() -> None:
+@pytest.mark.parametrize(("case", "step_size", "steps"), [(4, 100.0, 3), (2, 0.2, 10000)])
+def test_motion_too_long_for_any_step_is_not_judged(
+    case: int, step_size: float, steps: int
+) -> None:
+    """A textbook method of the same order comes no further."""
+    order = _order(_steps(case, step_size, steps), "two-term")
+    assert (order.state, order.value, order.is_judged) == ("unsettled", None, False)
+    assert "does not settle" in str(order)
+
+
+@pytest.mark.parametrize("step_size", [1e-6, 1e-5, 3e-5])
+def test_singular_matrix_is_named_and_no_miss(step_size: float) -> None:
     """Each step is then one of order 1; the program says so by IER."""
-    for step_size in (1e-5, 3e-5):
-        order = _order(_steps(5, step_size, 100), "four-term")
-        assert (order.state, order.value) == ("not judged", None)
-        assert "IER = 129" in order.note
+    order = _order(_steps(5, step_size, 100), "four-term")
+    assert (order.state, order.value, order.is_judged) == ("singular", None, False)
+    assert "IER = 129" in str(order)
 
 
-@pytest.mark.parametrize("program", ["two-term", "four-term"])
-def test_that_it_does_not_settle_in_small_steps_is_a_miss(program: str) -> None:
-    """As punched, TIME runs away and the torque of Case 7 with it."""
-    order = _order(case_scene(7), program, punched=True)
+@pytest.mark.parametrize("step_size", [1e6, 1e7])
+def test_steps_so_long_that_the_matrix_is_singular_are_passed_over(step_size: float) -> None:
+    """The motion of Case 4, and the time that it takes, in other units."""
+    known = case_scene(4)
+    factor = step_size / known.step_size
+    first, second, third = known.omega
+    slow = (first / factor, second / factor, third / factor)
+    scene = replace(known, omega=slow, step_size=step_size)
+    order = _order(scene, "four-term")
+    assert order.state == "as due"
+
+
+@pytest.mark.parametrize(
+    ("program", "file", "right", "wrong"),
+    [
+        ("two-term", "two_term.py", "2.0 * dt / 3.0]", "dt / 3.0]"),
+        ("four-term", "four_term.py", "dt * 0.6,", "dt * 0.4,"),
+        ("four-term", "linear_solver.py", "if n + biggest == n:", "if n + biggest > n:"),
+    ],
+)
+def test_matrix_that_a_fault_makes_singular_is_a_miss(
+    program: str, file: str, right: str, wrong: str, tmp_path: Path
+) -> None:
+    planted = plant_in_twin(program, file, right, wrong, tmp_path)
+    scene = case_scene(5)
+    truth = reference(scene, scene.times())
+    order = measured_order(scene, planted, corrected(program), truth)
+    assert order.state == "misses"
+    assert order.value == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("steps", [150, 300])
+def test_program_that_does_not_settle_where_others_do_misses(steps: int) -> None:
+    """As punched, TIME runs away and the torque with it."""
+    scene = _steps(6, 0.01, steps)
+    listing = Listing("two-term", frozenset({"dt-accumulates"}))
+    truth = reference(scene, scene.times())
+    order = measured_order(scene, PROGRAM_REGISTRY["two-term"], listing, truth)
     assert (order.state, order.value) == ("misses", None)
-    assert "does not settle" in order.note
+    assert "does not settle" in str(order)
 
 
 def _exact(scene: Scene) -> Array:
@@ -96,17 +141,29 @@ def _erratic(scene: Scene) -> Array:
         (_exact, "rounding", None),
         (_first_order, "misses", 1.0),
         (partial(_shifted, by=1e-3), "misses", 0.0),
-        (_overflowing, "misses", None),
-        (_erratic, "misses", None),
+        (_overflowing, "unsettled", None),
+        (_erratic, "unsettled", None),
     ],
 )
-def test_every_way_to_be_wrong_is_a_miss(
+def test_only_what_shows_the_order_is_as_due(
     solution: Callable[[Scene], Array], state: str, value: float | None
 ) -> None:
     scene = _steps(3, 0.01, 4)
-    order = order_of(scene, solution, 2, reference(scene, scene.times()))
+    order = order_of(scene, solution, 2, reference(scene, scene.times()), most_steps=2**10)
     assert order.state == state
     assert order.value == (None if value is None else pytest.approx(value, abs=1e-6))
+
+
+def test_one_halving_is_no_proof() -> None:
+    """An error that falls once as it should, and then no more."""
+    scene = _steps(3, 0.01, 4)
+
+    def once(finer: Scene) -> Array:
+        return _exact(finer) + (1e-3 if finer.steps == 4 else 2.5e-4)
+
+    truth = reference(scene, scene.times())
+    assert order_of(scene, once, 2, truth, pairs=1).state == "as due"
+    assert order_of(scene, once, 2, truth).state == "misses"
 
 
 def test_compare_tells_what_it_does_not_judge() -> None:

@@ -130,7 +130,7 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     for k in range(len(steps) - 1, -1, -1):
         propagators[k] = np.clip(propagators[k + 1] @ pieces[k], -_HUGE, _HUGE)
     sizes = np.abs(propagators)
-    source = _magnitudes(scene, times, omega)
+    source = magnitudes(scene, times, omega)
 
     def gathered(made: Array) -> Array:
         arriving = (sizes @ made[:, :, None])[:, :, 0]
@@ -166,7 +166,7 @@ def jacobians(scene: Scene, omega: Array) -> Array:
     return np.array(rows).transpose(2, 0, 1)
 
 
-def _magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
+def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sum of the sizes of all terms of each right-hand side, shape (n, 3).
 
     A wave counts with its angle: a rounding of frequency times t is a rounding of that many

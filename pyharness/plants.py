@@ -271,6 +271,7 @@ def _digit() -> AbstractContextManager[Any]:
     return patch("pyharness.verify.problems", altered)
 
 
+_COEFFICIENT = ("runge_kutta.py", "r2 + b * u[2]", "r2 + 1.000000001 * b * u[2]")
 _STAGE = ("runge_kutta.py", "_distances(slope[4], slope[1])", "_distances(slope[3], slope[1])")
 _SIGN = ("equations.py", "m[2] + c * u[0]", "m[2] - c * u[0]")
 
@@ -302,6 +303,8 @@ PLANTS = (
     Plant("velocity-in-fortran", "a sign in the velocity", lambda: _compiled(_velocity_sign)),
     Plant("velocity-in-both", "a sign in the velocity, in both languages alike",
           lambda: _both(lambda program, scene, runs: _velocity_sign(runs[0](scene)))),
+    Plant("coefficient-in-both", "a coefficient off by a part in 1e9, in both languages alike",
+          lambda: _twin("runge-kutta", *_COEFFICIENT, both=True)),
     Plant("stop-in-both", "the stop test looks at another stage, in both languages alike",
           lambda: _twin("runge-kutta", *_STAGE, both=True)),
     Plant("stale-fortran", "the result of the run before", lambda: _compiled(_stale())),

@@ -5,6 +5,8 @@ Each kind of check is the first part of its name:
 cells
     program x case x listing x reading: Fortran against twin, bit for bit over the whole
     trajectory, counters and stop.
+schemes
+    every step of the mended programs against its scheme, to rounding.
 stops
     where and why the Runge-Kutta program stops, against the formula of its test.
 methods, prepared
@@ -29,6 +31,7 @@ from pyharness.golden import golden
 from pyharness.selection import Selection, replay
 from pyharness.verify_methods import methods, orders, prepared, random_methods
 from pyharness.verify_programs import cells, random_programs
+from pyharness.verify_schemes import schemes
 from pyharness.verify_stops import stops
 
 
@@ -50,6 +53,7 @@ _THIN_EXTERNAL = [
 
 KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
     "cells": cells,
+    "schemes": schemes,
     "stops": stops,
     "methods": methods,
     "prepared": prepared,

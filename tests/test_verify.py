@@ -62,7 +62,8 @@ def test_checks_have_names_of_their_own_and_all_pass() -> None:
         ("order = [3, 4, 5, 0, 1, 2]", "order = [0, 1, 2, 3, 4, 5]"),
         ("else [0, 1, 2]", "else [0, 2, 1]"),
         ("last = 6 if velocity_counts else 3", "last = 3"),
-        ("if norm_k > norm_u * lipschitz:", "if norm_k > 1.01 * norm_u * lipschitz:"),
+        ("if norm_k > norm_u * lipschitz:", "if norm_k > 1.0000000001 * norm_u * lipschitz:"),
+        ("> change_u[index] * lipschitz", "> 1.0000001 * change_u[index] * lipschitz"),
         ("total = total + each * each", "total = total + abs(each)"),
         ("Stop(step + 1, *found)", "Stop(step, *found)"),
     ],
@@ -75,16 +76,46 @@ def test_wrong_stop_test_in_both_languages_is_seen(right: str, wrong: str, tmp_p
         assert not all(check.passed for check in verify(Selection(only=only)))
 
 
-@pytest.mark.parametrize("change", [{"steps": 99}, {"velocity": None}])
-def test_stop_test_is_not_tried_on_part_of_a_run(change: dict[str, Any]) -> None:
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("m[1] + b * u[0]", "m[1] + 1.000000001 * b * u[0]"),
+        ("m[0] + a * u[1]", "1.000000001 * m[0] + a * u[1]"),
+        ("acceleration[1] + v[2]", "1.000000001 * acceleration[1] + v[2]"),
+        ("- v[1] * u[0]", "+ v[1] * u[0]"),
+    ],
+)
+def test_small_fault_in_both_languages_is_seen(
+    program: str, right: str, wrong: str, tmp_path: Path
+) -> None:
+    """Far below what an order shows."""
+    chosen = Selection(only=[f"schemes/{program}/case-{case}" for case in (5, 7)])
+    assert all(check.passed for check in verify(chosen))
+    file, parts = "equations.py", (right, wrong)
+    if program == "runge-kutta" and "v[" not in right:
+        # It has the equations of omega in its own text.
+        file = "runge_kutta.py"
+        parts = {
+            "m[1] + b * u[0]": ("r2 + b * u[2]", "r2 + 1.000000001 * b * u[2]"),
+            "m[0] + a * u[1]": ("[r1 + a", "[1.000000001 * r1 + a"),
+        }[right]
+    faulty = plant_in_twin(program, file, *parts, tmp_path)
+    with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
+        assert not all(check.passed for check in verify(chosen))
+
+
+@pytest.mark.parametrize("kind", ["schemes", "stops"])
+@pytest.mark.parametrize("change", [{"omega": np.zeros((99, 3))}, {"velocity": None}])
+def test_part_of_a_run_fails(kind: str, change: dict[str, Any]) -> None:
     whole = Program.run
 
     def part(self: Program, *rest: Any, **named: Any) -> Trajectory:
         return replace(whole(self, *rest, **named), **change)
 
     with patch.object(Program, "run", part):
-        checks = list(verify(Selection(only=["stops"])))
-    assert len(checks) == 7
+        checks = list(verify(Selection(only=[f"{kind}"])))
+    assert len(checks) == {"schemes": 21, "stops": 56}[kind]
     assert not any(check.passed for check in checks)
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from pyharness.conditioning import ROUNDING, conditioning
 from pyharness.errors import InputError
 from pyharness.listing import Listing
 from pyharness.methods import Program, solve
@@ -29,12 +30,12 @@ _HALVINGS = 8
 # fault that it does not.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
-# Rounding: so many units in the last place of the largest per step.
-_ROUNDING = 8.0 * 2.0**-53
+# Roundings of a step.
+_ROUNDINGS = 8.0
 # A matrix with a larger condition number may be found singular.
 _CONDITION = 1e15
 
-State = Literal["as due", "rounding", "misses", "unsettled", "singular", "unbounded"]
+State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"]
 Quantity = Literal["omega", "velocity"]
 
 
@@ -46,23 +47,27 @@ class Order:
     ----------
     due : int
         The order that the method has.
-    state : {"as due", "rounding", "misses", "unsettled", "singular", "unbounded"}
+    state : {"as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"}
         Whether it showed. `rounding`: the error was that of rounding before it could. The last
-        three: it can't be told, for no step was small enough, the program found its matrix
-        singular, or the solution itself leaves every bound.
+        four: it can't be told, for no step was small enough, the program found its matrix
+        singular, the motion multiplies rounding too much, or the solution leaves every bound.
     value : float or None
         As measured, if it could be.
     step_size : float
         The finest step that was tried (s); of `singular` the longest that makes it so.
     steps : int
         How many were taken in the finest run that could be held against the truth.
+    error, time : float
+        The largest error of that run (rad/s), and when it had it (s).
     """
 
     due: int
     state: State
     value: float | None
     step_size: float
-    steps: int
+    steps: int = 0
+    error: float = math.inf
+    time: float = math.nan
 
     @property
     def is_judged(self) -> bool:
@@ -75,6 +80,7 @@ class Order:
             return f"order {self.value:.2f}"
         return {
             "singular": f"IER = 129 at steps of {self.step_size:.1e} s",
+            "sensitive": "the error may be rounding that the motion has multiplied",
             "unbounded": "the solution itself leaves every bound",
             "rounding": "rounding from the start",
         }.get(self.state, f"does not settle down to steps of {self.step_size:.1e} s")
@@ -89,7 +95,8 @@ def measured_order(
 ) -> Order:
     """Measure the order of a program's omega; see `order_of`.
 
-    That it does not settle is a miss if a textbook method does.
+    An error that rounding may have grown to is no miss. That it does not settle is one, if a
+    textbook method of its order does.
     """
 
     def omega(finer: Scene) -> Array:
@@ -103,6 +110,8 @@ def measured_order(
         return solve(finer, finer.times(), _TEXTBOOK[program.order], 1.0).omega
 
     found = order_of(scene, omega, program.order, truth, pairs=pairs)
+    if found.state in ("misses", "unsettled", "singular") and _is_grown_rounding(scene, found):
+        return replace(found, state="sensitive", value=None)
     if found.state in ("unsettled", "singular"):
         fewer = found.steps // _MARGIN
         if order_of(scene, textbook, program.order, truth, most_steps=fewer).is_judged:
@@ -141,7 +150,7 @@ def order_of(
     """
     n = len(truth.time)
     if n < scene.steps:
-        return Order(due, "unbounded", None, scene.step_size, 0)
+        return Order(due, "unbounded", None, scene.step_size)
     right = truth.omega if quantity == "omega" else truth.velocity
     assert right is not None
     start = max(map(abs, scene.omega)) if quantity == "omega" else 0.0
@@ -149,6 +158,7 @@ def order_of(
     fastest = _fastest(scene, truth.omega)
     state: State = "unsettled"
     step_size, steps = scene.step_size, 0
+    error, worst = math.inf, math.nan
     previous: Array | None = None
     previous_error = math.inf
     orders: list[float] = []
@@ -167,11 +177,13 @@ def order_of(
         if len(found) < n:  # overflow: the step is far too large
             previous = None
             continue
-        error = float(np.abs(found - right).max())
-        if error <= _ROUNDING * scale * steps + truth.error:
+        errors = np.abs(found - right).max(axis=1)
+        error, worst = float(errors.max()), float(truth.time[errors.argmax()])
+        if error <= _ROUNDINGS * ROUNDING * scale * steps + truth.error:
             shown = [each for each in orders if _shows(each, due)]
             value = shown[-1] if shown else None
-            return Order(due, "as due" if shown else "rounding", value, finer.step_size, steps)
+            state = "as due" if shown else "rounding"
+            return Order(due, state, value, step_size, steps, error, worst)
         settles = previous is not None and np.abs(found - previous).max() < _SMALL_CHANGE * scale
         if settles and finer.step_size * fastest <= _SMALL_ANGLE:
             order = math.log2(previous_error / error)
@@ -179,12 +191,12 @@ def order_of(
                 orders.clear()
             orders.append(order)
             if len(orders) == pairs:
-                verdict: State = "as due" if _shows(order, due) else "misses"
-                return Order(due, verdict, order, finer.step_size, steps)
+                state = "as due" if _shows(order, due) else "misses"
+                return Order(due, state, order, step_size, steps, error, worst)
         previous, previous_error = found, error
     if orders and _shows(orders[-1], due):
-        return Order(due, "as due", orders[-1], step_size, steps)
-    return Order(due, state, None, step_size, steps)
+        return Order(due, "as due", orders[-1], step_size, steps, error, worst)
+    return Order(due, state, None, step_size, steps, error, worst)
 
 
 def _shows(order: float, due: int) -> bool:
@@ -211,6 +223,17 @@ def _fastest(scene: Scene, omega: Array) -> float:
     waves = scene.torque.sines + scene.torque.cosines
     turning = float((np.abs(scene.euler_coefficients) * others).max())
     return max([turning, *(abs(frequency) for _, frequency in waves)])
+
+
+def _is_grown_rounding(scene: Scene, found: Order) -> bool:
+    """Whether the motion may have made the error of roundings on the way; if unknown, it may."""
+    if not found.steps or not math.isfinite(found.error):
+        return False
+    try:
+        flow = conditioning(scene, found.time)
+    except InputError:
+        return True
+    return found.error <= flow.limit(0.0, _ROUNDINGS * found.steps) * flow.largest
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:

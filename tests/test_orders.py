@@ -65,6 +65,20 @@ def test_motion_too_long_for_any_step_is_not_judged(
     assert "does not settle" in str(order)
 
 
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize(
+    ("wobble", "step_size", "steps"),
+    [(1e-10, 60.0, 3), (1e-6, 1.0, 200), (1e-6, 5.0, 50), (1e-3, 10.0, 200)],
+)
+def test_rounding_that_the_motion_multiplies_is_no_miss(
+    program: str, wobble: float, step_size: float, steps: int
+) -> None:
+    """Spin about the middle axis, disturbed: after some flips no step settles."""
+    scene = replace(_steps(4, step_size, steps), omega=(wobble, 1.0, wobble))
+    order = _order(scene, program)
+    assert (order.state, order.value, order.is_judged) == ("sensitive", None, False)
+
+
 @pytest.mark.parametrize("step_size", [1e-6, 1e-5, 3e-5])
 def test_singular_matrix_is_named_and_no_miss(step_size: float) -> None:
     """Each step is then one of order 1; the program says so by IER."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from pyharness.agreement import Accuracy
 from pyharness.compare import Comparison
+from pyharness.orders import Order
 from pyharness.tables import aligned, heading, markdown_text, short, wrapped
 from pyharness.trajectory import Stop, Trajectory
 
@@ -58,8 +59,14 @@ def _as_expected(comparison: Comparison) -> str:
     orders = [each.order for each in comparison.programs if each.order is not None]
     if not orders:
         return text
-    seen = ", ".join("-" if each.value is None else f"{each.value:.1f}" for each in orders)
+    seen = ", ".join(map(_seen, orders))
     return f"{text}; orders mended {seen} (due: {', '.join(str(each.due) for each in orders)})"
+
+
+def _seen(order: Order) -> str:
+    if order.value is None:
+        return "rounding" if order.is_judged else "-"
+    return f"{order.value:.1f}"
 
 
 def comparison_rows(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:

@@ -184,5 +184,13 @@ def test_compare_tells_what_it_does_not_judge() -> None:
     found = compare(_steps(5, 1e-5, 100), [corrected("four-term")])
     assert found.unexpected == ()
     assert len(found.not_judged) == 1
-    assert "not judged: four-term corrected: IER = 129" in comparison_table(found)
+    table = comparison_table(found)
+    assert "not judged: four-term corrected: IER = 129" in table
+    assert "orders mended - (due: 2)" in table
     assert comparison_record(found, build())["not_judged"] == list(found.not_judged)
+
+
+def test_compare_names_rounding() -> None:
+    found = compare(case_scene(1), [corrected("two-term")])
+    assert "orders mended rounding (due: 2)" in comparison_table(found)
+    assert found.not_judged == ()

@@ -97,6 +97,19 @@ def measured_order(
 
     An error that rounding may have grown to is no miss. That it does not settle is one, if a
     textbook method of its order does.
+
+    Parameters
+    ----------
+    scene : Scene
+        With the longest step.
+    program : Program
+        Its compiled code is judged.
+    listing : Listing
+        Its defects and readings.
+    truth : Reference
+        At the times of `scene`.
+    pairs : int
+        As in `order_of`.
     """
 
     def omega(finer: Scene) -> Array:
@@ -113,7 +126,7 @@ def measured_order(
     if found.state in ("misses", "unsettled", "singular") and _is_grown_rounding(scene, found):
         return replace(found, state="sensitive", value=None)
     if found.state in ("unsettled", "singular"):
-        fewer = found.steps // _MARGIN
+        fewer = min(found.steps, _MOST_STEPS) // _MARGIN
         if order_of(scene, textbook, program.order, truth, most_steps=fewer).is_judged:
             return replace(found, state="misses")
     return found

@@ -165,6 +165,13 @@ def test_run_for_people_fits_the_terminal(form: str, capsys: Capture) -> None:
         assert out.count("\n") == 302
 
 
+def test_one_is_not_many(capsys: Capture) -> None:
+    assert main([*RUN, "--program", "two-term", "--steps", "1", "--step-size", "20"]) == 0
+    out = capsys.readouterr().out
+    assert "1 step of 20 s" in out
+    assert "(1 step, " in out
+
+
 def test_options_reach_the_program(capsys: Capture) -> None:
     base = [*RUN, "--program", "runge-kutta", "--format", "json"]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyharness.bench import Finding, Row, Workload
 from pyharness.bench_tables import bench_rows
+from pyharness.output import numbers_beside
 from pyharness.tables import csv_text
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def bench_picture(finding: Finding, path: str) -> dict[str, bytes]:
             buffer, format=form, dpi=100, metadata={"Date": None} if form == "svg" else None
         )
     numbers = csv_text(*bench_rows(finding))
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
 
 
 def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -156,4 +157,4 @@ def growth_picture(found: "Mapping[int, Sequence[Growth]]", path: str) -> dict[s
     buffer = io.BytesIO()
     figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
     numbers = csv_text(("case", "time", "error", "one_rounding"), rows)
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}

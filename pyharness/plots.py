@@ -8,6 +8,7 @@ import numpy as np
 
 from pyharness.compare import Comparison
 from pyharness.errors import InputError
+from pyharness.output import numbers_beside
 from pyharness.tables import csv_text
 from pyharness.trajectory import Trajectory
 
@@ -85,8 +86,7 @@ def comparison_picture(comparison: Comparison, path: str) -> dict[str, bytes]:
     )
     buffer = io.BytesIO()
     figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
-    numbers = str(Path(path).with_suffix(".csv"))
-    return {path: buffer.getvalue(), numbers: _numbers(comparison).encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): _numbers(comparison).encode()}
 
 
 def trajectory_picture(title: str, trajectory: Trajectory, path: str) -> dict[str, bytes]:
@@ -106,7 +106,7 @@ def trajectory_picture(title: str, trajectory: Trajectory, path: str) -> dict[st
     buffer = io.BytesIO()
     figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
     numbers = csv_text(*trajectory_rows(trajectory))
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
 
 
 def _frame(axes: "Axes", truth: np.ndarray) -> None:

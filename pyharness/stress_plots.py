@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyharness.checks import Check
+from pyharness.output import numbers_beside
 from pyharness.stress import Trial
 from pyharness.tables import csv_text
 
@@ -55,7 +56,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str
         figure.savefig(buffer, format=kind, dpi=110, metadata=metadata)
     rows_out = [[check.id, repr(check.value), repr(check.limit), check.note] for check in drawn]
     numbers = csv_text(["id", "value", "limit", "note"], rows_out)
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
 
 
 def _places(names: Sequence[str]) -> dict[str, float]:

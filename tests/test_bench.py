@@ -125,6 +125,15 @@ def test_table_shows_ratios_refusals_and_fits() -> None:
     ]  # fmt: skip
     assert "slow: no tolerance below 2.2e-14 (case 5 at 1e-15)" in lines
     assert "slow: overflow (case 5 at 1e-06)" in lines
+    assert "slow: refused (case 5 at 1e-15, case 6)" in bench_table(
+        replace(
+            KNOWN,
+            refused=[
+                Refusal(SHORT, "slow", 1e-15, "refused"),
+                Refusal(OTHER, "slow", None, "refused"),
+            ],
+        )
+    )
     assert "above 1 is faster" in text
     assert "heyoka 0.50" in text
 
@@ -346,6 +355,10 @@ MISTAKES = [
     (["--methods", "tailor"], "unknown method 'tailor'; did you mean 'taylor'"),
     (["--peers", "heyoca"], "unknown peer 'heyoca'; did you mean 'heyoka'"),
     (["--methods", "none", "--peers", "none"], "no method and no peer is left"),
+    (
+        ["--case", "5", "--methods", "closed-form", "--peers", "none"],
+        "nothing could be measured: closed-form: closed-form can't take this scene: it has torque",
+    ),
     (["--horizon", "0"], "--horizon: 0; allowed: a number above 0"),
     (["--horizon", "-3"], "--horizon: -3; allowed"),
     (["--horizon", "nan"], "not finite"),

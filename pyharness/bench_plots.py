@@ -121,14 +121,19 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def _slopes(axes: "Axes") -> None:
-    """Draw how the error of an order falls, from the upper left."""
+    """Draw how the error of an order falls: a fan in the upper right, where no method belongs."""
     low, high = axes.get_xlim()
+    begin = high * (low / high) ** 0.3
     for order in _SLOPES:
-        begin, end = low * 2.0, min(high, low * 2.0 * 10.0 ** (15.0 / order))
+        end = min(begin * (high / begin) ** 0.7, begin * 10.0 ** (6.0 / order))
         last = 0.5 * (end / begin) ** -order
-        axes.plot([begin, end], [0.5, last], color="#b0b0b0", linewidth=1.0, zorder=0)
-        x = begin * (end / begin) ** 0.5
-        axes.text(x, 0.5 * (x / begin) ** -order, str(order), color="#707070", fontsize=9)
+        axes.plot([begin, end], [0.5, last], color="#909090", linewidth=1.0, zorder=0)
+        # On white, above what might stand there all the same.
+        axes.annotate(
+            f"order {order}", (end, last), (0, -2), textcoords="offset points", color="#505050",
+            fontsize=8, ha="center", va="top", zorder=5,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )  # fmt: skip
     axes.set_xlim(low, high)
 
 

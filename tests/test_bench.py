@@ -23,6 +23,7 @@ from pyharness.bench import (
     relative_error,
     workloads,
 )
+from pyharness.bench_plots import _slopes
 from pyharness.bench_scores import groups, means, scores, yardstick
 from pyharness.bench_tables import bench_markdown, bench_record, bench_rows, bench_table, ratio
 from pyharness.build import build, machine
@@ -395,3 +396,21 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
 def test_a_package_stands_for_its_contenders() -> None:
     names = [each.name for each in chosen(peers(), "numba,odeint", "peer", "--peers")]
     assert names == ["numba-rk4", "numba-dop8", "odeint"]
+
+
+@pytest.mark.parametrize("order", [2, 4, 8])
+def test_slopes_stand_where_no_curve_does(order: int) -> None:
+    figure_module = pytest.importorskip("matplotlib.figure")
+    axes = figure_module.Figure().subplots()
+    count = np.geomspace(50.0, 1e6, 60)
+    shown = 2.0 * (count / 50.0) ** -order > 1e-15
+    axes.loglog(count[shown], 2.0 * (count[shown] / 50.0) ** -float(order))
+    axes.set_xlim(20.0, 2e6)
+    axes.set_ylim(1e-17, 1.0)
+    _slopes(axes)
+    axes.figure.draw_without_rendering()
+    curve = axes.transData.transform(axes.lines[0].get_xydata())
+    for label in axes.texts:
+        box = label.get_window_extent()
+        assert box.x1 <= axes.bbox.x1
+        assert not any(box.contains(x, y) for x, y in curve), label.get_text()

@@ -50,7 +50,8 @@ def bench_picture(finding: Finding, path: str) -> dict[str, bytes]:
             _draw(right, name, counted, styles[name])
         _frame(left, load, "microseconds per solve")
         _frame(right, load, "right-hand sides per solve")
-        _slopes(right)
+        if any(row.evaluations for row in rows):
+            _slopes(right)
     handles: dict[str, Any] = {}
     for each in axes.flat:
         found, labels = each.get_legend_handles_labels()

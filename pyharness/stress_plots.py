@@ -107,7 +107,7 @@ def _panel(axes: "Axes", name: str, checks: Sequence[Check], places: dict[str, f
             axes.plot(
                 [places[check.id.split("/")[2]] for check in own],
                 [_inside(check.value) for check in own],
-                _MARKERS.get(what, "s"), markersize=3.0, color=color, linestyle="none",
+                _marker(rank, what), markersize=3.0, color=color, linestyle="none",
                 markerfacecolor=color if judged else "none", markeredgewidth=0.6,
             )  # fmt: skip
         for kind in dict.fromkeys(_kind(check.id.split("/")[2]) for check in members):
@@ -138,11 +138,15 @@ def _key(checks: Sequence[Check]) -> "list[Line2D]":
 
     return [
         Line2D(
-            [], [], marker=_MARKERS.get(what, "s"), color=_COLORS.get(rank, "black"),
+            [], [], marker=_marker(rank, what), color=_COLORS.get(rank, "black"),
             linestyle="none", markersize=4.0, label=f"{rank} {what}".strip() or "no setting",
         )
         for rank, what in dict.fromkeys(map(_series, checks))
     ]  # fmt: skip
+
+
+def _marker(rank: str, what: str) -> str:
+    return _MARKERS[what] if what else "s" if rank else "D"
 
 
 def _series(check: Check) -> tuple[str, str]:

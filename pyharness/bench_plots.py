@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyharness.bench import Finding, Row, Workload
 from pyharness.bench_tables import bench_rows
+from pyharness.output import numbers_beside
 from pyharness.tables import csv_text
 
 if TYPE_CHECKING:
@@ -49,7 +50,8 @@ def bench_picture(finding: Finding, path: str) -> dict[str, bytes]:
             _draw(right, name, counted, styles[name])
         _frame(left, load, "microseconds per solve")
         _frame(right, load, "right-hand sides per solve")
-        _slopes(right)
+        if any(row.evaluations for row in rows):
+            _slopes(right)
     handles: dict[str, Any] = {}
     for each in axes.flat:
         found, labels = each.get_legend_handles_labels()
@@ -73,7 +75,7 @@ def bench_picture(finding: Finding, path: str) -> dict[str, bytes]:
             buffer, format=form, dpi=100, metadata={"Date": None} if form == "svg" else None
         )
     numbers = csv_text(*bench_rows(finding))
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
 
 
 def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -120,14 +122,19 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def _slopes(axes: "Axes") -> None:
-    """Draw how the error of an order falls, from the upper left."""
+    """Draw how the error of an order falls: a fan in the upper right, where no method belongs."""
     low, high = axes.get_xlim()
+    begin = high * (low / high) ** 0.3
     for order in _SLOPES:
-        begin, end = low * 2.0, min(high, low * 2.0 * 10.0 ** (15.0 / order))
+        end = min(begin * (high / begin) ** 0.7, begin * 10.0 ** (6.0 / order))
         last = 0.5 * (end / begin) ** -order
-        axes.plot([begin, end], [0.5, last], color="#b0b0b0", linewidth=1.0, zorder=0)
-        x = begin * (end / begin) ** 0.5
-        axes.text(x, 0.5 * (x / begin) ** -order, str(order), color="#707070", fontsize=9)
+        axes.plot([begin, end], [0.5, last], color="#909090", linewidth=1.0, zorder=0)
+        # On white, above what might stand there all the same.
+        axes.annotate(
+            f"order {order}", (end, last), (0, -2), textcoords="offset points", color="#505050",
+            fontsize=8, ha="center", va="top", zorder=5,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )  # fmt: skip
     axes.set_xlim(low, high)
 
 
@@ -156,4 +163,4 @@ def growth_picture(found: "Mapping[int, Sequence[Growth]]", path: str) -> dict[s
     buffer = io.BytesIO()
     figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
     numbers = csv_text(("case", "time", "error", "one_rounding"), rows)
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}

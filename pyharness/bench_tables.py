@@ -138,14 +138,16 @@ def _parts(finding: Finding) -> list[tuple[str, list[str], list[list[str]]]]:
             for seconds, relative in zip(score.seconds, score.ratios, strict=True):
                 row += [microseconds(seconds), ratio(relative)]
             rows.append([*row, short(score.best)])
-        parts.append((_title(finding, load), head, rows))
+        if rows:
+            parts.append((_title(finding, load), head, rows))
     for group, loads in groups(finding).items():
         if len(loads) > 1:
             labels = ", ".join(load.label for load in loads)
             rows = [[each.method, *map(ratio, each.ratios)] for each in means(finding, loads)]
             rows = [row for row in rows if set(row[1:]) != {"-"}]
             title = f"Geometric mean of {by} time / own time: {group} (cases {labels})"
-            parts.append((title, ["ratio at", *targets], rows))
+            if rows:
+                parts.append((title, ["ratio at", *targets], rows))
     return parts
 
 
@@ -170,21 +172,28 @@ def _notes(finding: Finding) -> list[str]:
     told = [f"{name} {seconds:.2f}" for name, seconds in compiling.items() if seconds >= 0.05]
     if told:
         lines.append(f"preparation and compiling, not in the times, s a case: {', '.join(told)}")
+    return lines + not_measured(finding)
+
+
+def not_measured(finding: Finding) -> list[str]:
+    """Return what came to nothing, a line for each contender and reason, with the first places."""
+    lines = []
     reasons: dict[tuple[str, str], list[str]] = {}
     for each in finding.refused:
         # What a call would take differs from case to case; the reason does not.
         reason = each.reason.split(", a call would take")[0]
-        setting = "" if each.setting is None else f" at {each.setting:g}"
-        reasons.setdefault((each.method, reason), []).append(f"{each.workload.label}{setting}")
+        reasons.setdefault((each.method, reason), []).append(_place(each.workload, each.setting))
     for row in finding.rows:
         if row.error is None:
             reason = row.note.split(" at step")[0]
-            place = (
-                f"{row.workload.label} at {row.setting:g}" if row.setting else row.workload.label
-            )
+            place = _place(row.workload, row.setting)
             reasons.setdefault((row.method, reason), []).append(place)
     for (method, reason), places in reasons.items():
         shown = ", ".join(places[:_MOST_SHOWN])
         more = f" and {len(places) - _MOST_SHOWN} more" if len(places) > _MOST_SHOWN else ""
-        lines.append(f"{method}: {reason} (case {shown}{more})")
+        lines.append(f"{method}: {reason} ({shown}{more})")
     return lines
+
+
+def _place(load: Workload, setting: float | None) -> str:
+    return f"case {load.label}" if setting is None else f"case {load.label} at {setting:g}"

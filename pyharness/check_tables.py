@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyharness.build import Build
 from pyharness.checks import Check
-from pyharness.tables import aligned, short, wrapped
+from pyharness.tables import aligned, counted, short, wrapped
 
 if TYPE_CHECKING:
     from pyharness.self_test import Caught
@@ -87,7 +87,8 @@ def self_test_table(title: Sequence[str], found: Sequence["Caught"]) -> str:
 def verdict(checks: Sequence[Check]) -> str:
     """Say in a line how many checks were made and how many failed."""
     failed = sum(not check.passed for check in checks)
-    return f"{len(checks)} checks, {failed} failed" if failed else f"{len(checks)} checks, all well"
+    made = counted(len(checks), "check")
+    return f"{made}, {failed} failed" if failed else f"{made}, all well"
 
 
 def checks_record(checks: Sequence[Check], build: Build, **extra: Any) -> dict[str, Any]:

@@ -41,7 +41,9 @@ def comparison_table(comparison: Comparison) -> str:
         "stop: variable and its Lipschitz quotient against the limit. us/step: Fortran, the call "
         "included."
     )
-    lines += [f"failed: {m.method}: {m.failure}" for m in comparison.methods if m.failure]
+    for each in comparison.methods:
+        if each.failure:
+            lines += wrapped(f"failed: {each.method}: {each.failure}")
     lines += verdict(comparison)
     return "\n".join(lines) + "\n"
 
@@ -147,7 +149,7 @@ def _method_rows(comparison: Comparison) -> list[list[str]]:
 
 def _stop(stop: Stop, limit: float) -> str:
     quotient = "inf" if math.isinf(stop.quotient) else f"{stop.quotient:.0f}"
-    if len(quotient) > 6:
+    if len(quotient) > 5:
         quotient = short(stop.quotient)
     return f"{stop.variable} {quotient}>{limit:g}"
 

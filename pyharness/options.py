@@ -218,15 +218,18 @@ def check_outputs(options: argparse.Namespace) -> None:
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:
         return
-    from pyharness.output import check_writable
+    from pyharness.output import check_apart, check_writable, numbers_beside
 
     if picture is not None:
         from pyharness.plots import check_picture
 
         check_picture(picture)
-        check_writable(picture, "--plot")
+        for path in (picture, numbers_beside(picture)):
+            check_writable(path, "--plot")
     if options.out is not None:
         check_writable(options.out, "--out")
+    if picture is not None and options.out is not None:
+        check_apart(picture, options.out)
 
 
 def write(contents: dict[str, bytes], option: str) -> None:

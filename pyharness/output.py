@@ -31,6 +31,20 @@ def check_writable(path: str, option: str) -> None:
     raise InputError(f"{option} '{path}': {reason}; give a file in a folder that can be written")
 
 
+def numbers_beside(picture: str) -> str:
+    """Return where the numbers of a picture go."""
+    return str(Path(picture).with_suffix(".csv"))
+
+
+def check_apart(picture: str, out: str) -> None:
+    """Refuse a result that would overwrite the picture or its numbers."""
+    for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
+        if os.path.realpath(path) == os.path.realpath(out):
+            raise InputError(
+                f"--out '{out}': there --plot '{picture}' puts {what}; give a file of another name"
+            )
+
+
 def write_files(contents: dict[str, bytes], option: str) -> None:
     """Write all files: each to a temporary name first, then all are renamed.
 

@@ -88,7 +88,8 @@ def plan(
     form = closed_form(scene)
     if method == "auto":
         few_digits = tolerance >= (_WAVES_DIGITS if scene.torque.varies else _FEW_DIGITS)
-        method = "closed-form" if form else EITHER if few_digits else "taylor"
+        # Runge-Kutta gives the end alone.
+        method = "closed-form" if form else EITHER if few_digits and not rows else "taylor"
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
     closed = method == "closed-form"

@@ -1,6 +1,8 @@
 """Pictures: findings in, picture and its numbers out; nothing is computed here."""
 
 import io
+import textwrap
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,11 +10,13 @@ import numpy as np
 
 from pyharness.compare import Comparison
 from pyharness.errors import InputError
+from pyharness.output import numbers_beside
 from pyharness.tables import csv_text
 from pyharness.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg", "pdf")
 # Told apart without colour: by dash and width.
@@ -22,6 +26,19 @@ _STYLES: dict[str, dict[str, Any]] = {
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
+# Of what has one row, which no line shows; those of one place can all be seen.
+_MARKERS: dict[str, dict[str, Any]] = {
+    "reference": {"marker": "s", "markersize": 11.0},
+    "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
+    "custom": {"marker": "D", "markersize": 5.0, "markerfacecolor": "none"},
+    "corrected": {"marker": ".", "markersize": 5.0},
+}
+_END: dict[str, Any] = {
+    "color": "black", "marker": "x", "linestyle": "none", "clip_on": False, "zorder": 5,
+}  # fmt: skip
+# Of a title in letters of size 10.
+_LETTERS_PER_INCH = 12.5
+_MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
@@ -53,22 +70,22 @@ def comparison_picture(comparison: Comparison, path: str) -> dict[str, bytes]:
         axes[0, column].set_title(name)
         axes[3, column].set_xlabel("time (s)")
         for row in range(3):
-            axes[row, column].plot(truth.time, truth.omega[:, row], label="reference", **_REFERENCE)
+            _line(axes[row, column], truth.time, truth.omega[:, row], "reference")
         for each in comparison.programs:
             if each.listing.program != name:
                 continue
             run, label = each.trajectory, each.listing.label
-            style = _STYLES[label]
             for row in range(3):
-                axes[row, column].plot(run.time, run.omega[:, row], label=label, **style)
-                if run.ended != "complete":
-                    axes[row, column].plot(run.time[-1:], run.omega[-1:, row], "kx")
+                _line(axes[row, column], run.time, run.omega[:, row], label)
             error = each.accuracy.error
             shown = np.isfinite(error) & (error > 0.0)
-            axes[3, column].plot(run.time[: len(error)][shown], error[shown], label=label, **style)
+            _line(axes[3, column], run.time[: len(error)][shown], error[shown], label)
+    ended = [each for each in comparison.programs if each.trajectory.ended != "complete"]
     for row in range(3):
         axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         _frame(axes[row, 0], truth.omega[:, row])
+        for each in ended:
+            _end(axes[row, names.index(each.listing.program)], each.trajectory, row)
     axes[3, 0].set_yscale("log")
     axes[3, 0].set_ylabel("error of any $\\omega$ (rad/s)")
     for column in range(len(names)):
@@ -78,35 +95,65 @@ def comparison_picture(comparison: Comparison, path: str) -> dict[str, bytes]:
     axes[0, 0].legend(loc="best", handlelength=4)
     scene = comparison.scene
     title = f"Case {scene.case}: {scene.name}" if scene.case else scene.name
-    ended = any(each.trajectory.ended != "complete" for each in comparison.programs)
-    note = "\nx: the program stopped or overflowed" if ended else ""
-    figure.suptitle(
-        f"{title}; thin line: error of the reference{note}", fontsize=10, parse_math=False
-    )
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
-    numbers = str(Path(path).with_suffix(".csv"))
-    return {path: buffer.getvalue(), numbers: _numbers(comparison).encode()}
+    note = "x: the program stopped or overflowed; at the edge: out of view" if ended else ""
+    _title(figure, f"{title}; thin line: error of the reference", note)
+    return {path: _saved(figure, path), numbers_beside(path): _numbers(comparison).encode()}
 
 
 def trajectory_picture(title: str, trajectory: Trajectory, path: str) -> dict[str, bytes]:
     """Draw the components of one trajectory over time; return content by path, with the CSV."""
     from matplotlib.figure import Figure
 
-    from pyharness.tables import trajectory_rows
+    from pyharness.tables import ending, trajectory_rows
 
     figure = Figure(figsize=(7.0, 7.0), layout="constrained")
     axes = figure.subplots(3, 1, sharex=True)
     for row in range(3):
-        axes[row].plot(trajectory.time, trajectory.omega[:, row], color="black", linewidth=1.2)
+        marker = "o" if len(trajectory.time) == 1 else ""
+        style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "marker": marker}
+        axes[row].plot(trajectory.time, trajectory.omega[:, row], **style)
+        if trajectory.ended != "complete":
+            _end(axes[row], trajectory, row)
         axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         axes[row].grid(visible=True, linewidth=0.3)
     axes[2].set_xlabel("time (s)")
-    figure.suptitle(title, fontsize=10, parse_math=False)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
+    _title(figure, title, f"x: {ending(trajectory)}" if trajectory.ended != "complete" else "")
     numbers = csv_text(*trajectory_rows(trajectory))
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: _saved(figure, path), numbers_beside(path): numbers.encode()}
+
+
+def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> None:
+    style = _REFERENCE if label == "reference" else _STYLES[label]
+    marker = _MARKERS[label] if len(time) == 1 else {}
+    axes.plot(time, values, label=label, **style, **marker)
+
+
+def _end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
+    """Mark where a program ended, at the edge where it has left the frame."""
+    bottom, top = axes.get_ylim()
+    axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
+    axes.set_ylim(bottom, top)
+
+
+def _title(figure: "Figure", *paragraphs: str) -> None:
+    room = int(_LETTERS_PER_INCH * figure.get_figwidth())
+    lines = [
+        line
+        for each in paragraphs
+        for line in textwrap.wrap(
+            each, room, max_lines=_MOST_LINES, placeholder=" ...", break_on_hyphens=False
+        )
+    ]
+    figure.suptitle("\n".join(lines), fontsize=10, parse_math=False)
+
+
+def _saved(figure: "Figure", path: str) -> bytes:
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        # A box stands for a letter that the font lacks, as everywhere.
+        warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
+        figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
+    return buffer.getvalue()
 
 
 def _frame(axes: "Axes", truth: np.ndarray) -> None:

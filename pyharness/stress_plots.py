@@ -2,22 +2,26 @@
 
 import io
 import re
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyharness.checks import Check
+from pyharness.output import numbers_beside
 from pyharness.stress import Trial
 from pyharness.tables import csv_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
 
 _FLOOR = 1e-18  # what is less, or exactly 0, lies here
 _TOP = 3.0
 _COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
 _MARKERS = {"error": "o", "drift": "v"}
 _COLUMNS = 2
+_COARSE = 1e-6
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
 
@@ -45,9 +49,19 @@ def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str
         axes.set_xticks(list(places.values()), [_label(name) for name in places], rotation=90)
         axes.tick_params(axis="x", labelsize=6)
     grid[0, 0].set_ylim(_FLOOR / 2.0, _TOP * 2.0)
-    title = f"{trial.name}: {trial.title}"
-    key = "o error, v drift of energy and momentum; lines: limits; open: described, no limit"
-    figure.suptitle(f"{title}\n{key}", fontsize=9)
+    handles = _key(drawn)
+    inches = width * columns
+    told = (
+        f"{trial.name}: {trial.title}",
+        "Drift: of energy and momentum. Lines: limits. Open: described, no limit. "
+        f"Coarse: tolerances of {_COARSE:g} and more, fine: below.",
+    )
+    lines = [line for each in told for line in textwrap.wrap(each, int(13.0 * inches))]
+    # The title is the key's: they would not make room for each other.
+    figure.legend(
+        handles=handles, loc="outside upper center", ncols=min(len(handles), int(inches)),
+        frameon=False, fontsize=8, title="\n".join(lines), title_fontsize=9,
+    )  # fmt: skip
     buffer = io.BytesIO()
     with matplotlib.rc_context(_REPRODUCIBLE):
         kind = Path(path).suffix.lstrip(".").lower()
@@ -55,7 +69,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str
         figure.savefig(buffer, format=kind, dpi=110, metadata=metadata)
     rows_out = [[check.id, repr(check.value), repr(check.limit), check.note] for check in drawn]
     numbers = csv_text(["id", "value", "limit", "note"], rows_out)
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
 
 
 def _places(names: Sequence[str]) -> dict[str, float]:
@@ -85,10 +99,7 @@ def _label(name: str) -> str:
 def _panel(axes: "Axes", name: str, checks: Sequence[Check], places: dict[str, float]) -> None:
     series: dict[tuple[str, str], list[Check]] = {}
     for check in checks:
-        what = check.id.split("/")[-1]
-        series.setdefault((_rank(_setting(check)), what if what in _MARKERS else ""), []).append(
-            check
-        )
+        series.setdefault(_series(check), []).append(check)
     for (rank, what), members in series.items():
         color = _COLORS.get(rank, "black")
         for judged in (True, False):
@@ -96,9 +107,8 @@ def _panel(axes: "Axes", name: str, checks: Sequence[Check], places: dict[str, f
             axes.plot(
                 [places[check.id.split("/")[2]] for check in own],
                 [_inside(check.value) for check in own],
-                _MARKERS.get(what, "s"), markersize=3.0, color=color, linestyle="none",
+                _marker(rank, what), markersize=3.0, color=color, linestyle="none",
                 markerfacecolor=color if judged else "none", markeredgewidth=0.6,
-                label=f"{rank} {what}".strip() if judged and own and what else None,
             )  # fmt: skip
         for kind in dict.fromkeys(_kind(check.id.split("/")[2]) for check in members):
             limited = [
@@ -112,15 +122,37 @@ def _panel(axes: "Axes", name: str, checks: Sequence[Check], places: dict[str, f
                 color=color, linewidth=0.8, linestyle=(0, (1, 1.2)) if what == "drift" else "-",
             )  # fmt: skip
     axes.set_yscale("log")
-    axes.set_title(name, fontsize=9, loc="left", fontweight="bold")
+    # Above the names of the kinds.
+    axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
     axes.grid(visible=True, axis="y", linewidth=0.3)
     axes.tick_params(labelsize=7)
     for kind in dict.fromkeys(map(_kind, places)):
         own_places = [place for each, place in places.items() if _kind(each) == kind]
         middle = 0.5 * (min(own_places) + max(own_places))
         axes.text(middle, 1.01, kind, fontsize=7, ha="center", transform=axes.get_xaxis_transform())
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(fontsize=6, loc="upper left", ncols=2, framealpha=0.7)
+
+
+def _key(checks: Sequence[Check]) -> "list[Line2D]":
+    """Return a handle for every series of any panel."""
+    from matplotlib.lines import Line2D
+
+    return [
+        Line2D(
+            [], [], marker=_marker(rank, what), color=_COLORS.get(rank, "black"),
+            linestyle="none", markersize=4.0, label=f"{rank} {what}".strip() or "no setting",
+        )
+        for rank, what in dict.fromkeys(map(_series, checks))
+    ]  # fmt: skip
+
+
+def _marker(rank: str, what: str) -> str:
+    return _MARKERS[what] if what else "s" if rank else "D"
+
+
+def _series(check: Check) -> tuple[str, str]:
+    """Return what sets a mark apart: the kind of setting, and error or drift where it is either."""
+    what = check.id.split("/")[-1]
+    return _rank(_setting(check)), what if what in _MARKERS else ""
 
 
 def _setting(check: Check) -> str:
@@ -134,7 +166,7 @@ def _rank(setting: str) -> str:
         tolerance = float(setting)
     except ValueError:
         return setting
-    return "coarse" if tolerance >= 1e-6 else "fine"
+    return "coarse" if tolerance >= _COARSE else "fine"
 
 
 def _inside(value: float | None) -> float:

@@ -44,7 +44,8 @@ def trajectory_table(title: Sequence[str], scene: Scene, trajectory: Trajectory)
 
 def ending(trajectory: Trajectory) -> str:
     """Say in a line how a run ended."""
-    counts = f"{trajectory.steps} steps, {trajectory.evaluations} right-hand sides"
+    steps = counted(trajectory.steps, "step")
+    counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
         stop = trajectory.stop
         return (
@@ -113,6 +114,11 @@ def short(x: float | None) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
+def counted(number: int, what: str) -> str:
+    """Say a number of things: 1 step, 2 steps."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
 def heading(scene: Scene) -> list[str]:
     """Say what a scene is: body, torque, start, steps."""
     title = f"Case {scene.case}: {scene.name}" if scene.case else scene.name
@@ -125,7 +131,7 @@ def heading(scene: Scene) -> list[str]:
     torque = f"N = {_law(scene)} {unit}" if not scene.torque.is_zero else "no torque"
     lines += wrapped(
         f"{body}; {torque}; omega(0) = {_tuple(scene.omega)} rad/s; "
-        f"{scene.steps} steps of {scene.step_size:g} s"
+        f"{counted(scene.steps, 'step')} of {scene.step_size:g} s"
     )
     if scene.is_impossible:
         lines.append("no rigid body has these moments: the largest exceeds the sum of the others")
@@ -150,7 +156,9 @@ def _tuple(values: Sequence[float]) -> str:
 
 def wrapped(text: str) -> list[str]:
     """Return the lines of a text of any length."""
-    return textwrap.wrap(text, WIDTH, subsequent_indent="  ") or [""]
+    # A name with a hyphen stays whole, for it is there to be typed.
+    lines = textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    return lines or [""]
 
 
 def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], left: int) -> list[str]:

@@ -23,6 +23,7 @@ from pyharness.bench import (
     relative_error,
     workloads,
 )
+from pyharness.bench_plots import _slopes
 from pyharness.bench_scores import groups, means, scores, yardstick
 from pyharness.bench_tables import bench_markdown, bench_record, bench_rows, bench_table, ratio
 from pyharness.build import build, machine
@@ -125,6 +126,15 @@ def test_table_shows_ratios_refusals_and_fits() -> None:
     ]  # fmt: skip
     assert "slow: no tolerance below 2.2e-14 (case 5 at 1e-15)" in lines
     assert "slow: overflow (case 5 at 1e-06)" in lines
+    assert "slow: refused (case 5 at 1e-15, case 6)" in bench_table(
+        replace(
+            KNOWN,
+            refused=[
+                Refusal(SHORT, "slow", 1e-15, "refused"),
+                Refusal(OTHER, "slow", None, "refused"),
+            ],
+        )
+    )
     assert "above 1 is faster" in text
     assert "heyoka 0.50" in text
 
@@ -346,6 +356,10 @@ MISTAKES = [
     (["--methods", "tailor"], "unknown method 'tailor'; did you mean 'taylor'"),
     (["--peers", "heyoca"], "unknown peer 'heyoca'; did you mean 'heyoka'"),
     (["--methods", "none", "--peers", "none"], "no method and no peer is left"),
+    (
+        ["--case", "5", "--methods", "closed-form", "--peers", "none"],
+        "nothing could be measured: closed-form: closed-form can't take this scene: it has torque",
+    ),
     (["--horizon", "0"], "--horizon: 0; allowed: a number above 0"),
     (["--horizon", "-3"], "--horizon: -3; allowed"),
     (["--horizon", "nan"], "not finite"),
@@ -382,3 +396,21 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
 def test_a_package_stands_for_its_contenders() -> None:
     names = [each.name for each in chosen(peers(), "numba,odeint", "peer", "--peers")]
     assert names == ["numba-rk4", "numba-dop8", "odeint"]
+
+
+@pytest.mark.parametrize("order", [2, 4, 8])
+def test_slopes_stand_where_no_curve_does(order: int) -> None:
+    figure_module = pytest.importorskip("matplotlib.figure")
+    axes = figure_module.Figure().subplots()
+    count = np.geomspace(50.0, 1e6, 500)
+    error = 0.5 * (count / 43.0) ** -float(order)
+    axes.loglog(count[error > 1e-15], error[error > 1e-15])
+    axes.set_xlim(20.0, 2e6)
+    axes.set_ylim(1e-17, 1.0)
+    _slopes(axes)
+    axes.figure.draw_without_rendering()
+    curve = axes.transData.transform(axes.lines[0].get_xydata())
+    for label in axes.texts:
+        box = label.get_window_extent()
+        assert box.x1 <= axes.bbox.x1
+        assert not any(box.contains(x, y) for x, y in curve), label.get_text()

@@ -60,6 +60,15 @@ MISTAKES = [
     ([*COMPARE, "--plot", "x.gif"], "unknown picture format"),
     ([*COMPARE, "--plot", "no/such/folder/x.png"], "there is no folder"),
     ([*COMPARE, "--out", "a\0b"], "--out"),
+    ([*COMPARE, "--plot", "a.png", "--out", "a.png"], "puts the picture; give a file of another"),
+    ([*COMPARE, "--plot", "a.png", "--out", "./a.csv"], "puts its numbers; give a file of another"),
+    ([*RUN, "--method", "auto", "--plot", "a.svg", "--out", "a.csv"], "puts its numbers"),
+    (["bench", "--case", "5", "--plot", "a.pdf", "--out", "a.csv"], "puts its numbers"),
+    (["bench", "--growth", "--plot", "a.pdf", "--out", "a.csv"], "puts its numbers"),
+    (
+        ["stress", "--only", "separatrix", "--plot", "a.png", "--out", "a.csv"],
+        "puts its numbers",
+    ),
     (RUN, "either --program"),
     ([*RUN, "--program", "two-term", "--method", "dop853"], "either --program"),
     ([*RUN, "--program", "five-term"], "unknown program 'five-term'"),
@@ -67,6 +76,9 @@ MISTAKES = [
     ([*RUN, "--program", "four-term", "--times", "1"], "--times has no meaning with --program"),
     ([*RUN, "--program", "four-term", "--lipschitz", "1"], "--lipschitz has no meaning"),
     ([*RUN, "--program", "four-term", "--no-stop"], "--no-stop has no meaning"),
+    ([*RUN, "--program", "runge-kutta", "--lipschitz", "5", "--no-stop"], "with --no-stop"),
+    ([*COMPARE, "--lipschitz", "5", "--no-stop"], "--lipschitz has no meaning with --no-stop"),
+    ([*COMPARE, "--program", "four-term", "--no-stop"], "--no-stop has no meaning with --program"),
     ([*RUN, "--program", "four-term", "--implementation", "c"], "unknown implementation 'c'"),
     ([*RUN, "--method", "dop835"], "did you mean 'dop853'"),
     ([*RUN, "--method", "dop853", "--fix", "stage-base"], "--fix has no meaning with --method"),
@@ -163,6 +175,13 @@ def test_run_for_people_fits_the_terminal(form: str, capsys: Capture) -> None:
         assert "complete (300 steps, 1500 right-hand sides)" in out
     else:
         assert out.count("\n") == 302
+
+
+def test_one_is_not_many(capsys: Capture) -> None:
+    assert main([*RUN, "--program", "two-term", "--steps", "1", "--step-size", "20"]) == 0
+    out = capsys.readouterr().out
+    assert "1 step of 20 s" in out
+    assert "(1 step, " in out
 
 
 def test_options_reach_the_program(capsys: Capture) -> None:

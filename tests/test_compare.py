@@ -53,6 +53,17 @@ def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> N
     assert row.split()[2:5] == ["25", "V2", "3305>500"]
 
 
+@pytest.mark.parametrize(
+    ("case", "step_size", "words"),
+    [(4, 100.0, "failed: radau: Radau gave up"), (3, 1e-5, "U2 2.4e5>500")],
+)
+def test_table_of_extreme_steps_fits(case: int, step_size: float, words: str) -> None:
+    scene = replace(case_scene(case), step_size=step_size, steps=3)
+    text = comparison_table(compare(scene, listings_for()))
+    assert words in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
 def test_drift_only_without_torque(case_2: room.Comparison) -> None:
     assert all(each.accuracy.energy is not None for each in case_2.programs)
     found = compare(case_scene(5), listings_for(["runge-kutta"]))

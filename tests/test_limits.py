@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
+from pyharness.cli import main
 from pyharness.limits import NOTHING, invisible, limit, tends_elsewhere
 from pyharness.listing import original
 from pyharness.methods import PROGRAM_REGISTRY
@@ -74,6 +75,12 @@ def test_wrong_limit_is_not_taken_for_the_right_one(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(room, "_limit_solution", wrong)
     for program in ("two-term", "runge-kutta"):
         assert not tends_elsewhere(limit(program, case_scene(5)))
+
+
+def test_names_stay_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["limits", "--case", "4", "--halvings", "1"]) == 0
+    out = capsys.readouterr().out
+    assert not [line for line in out.splitlines() if line.endswith("-")]
 
 
 def test_defects_that_the_known_solutions_hide() -> None:

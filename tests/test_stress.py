@@ -346,3 +346,38 @@ def test_method_that_refuses_what_it_has_to_take_fails() -> None:
             checks = [outcome.check for outcome in stress([each])]
             assert checks
             assert not any(check.passed for check in checks), each
+
+
+def test_every_mark_has_a_key_and_no_title_meets_another(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Programs have marks of their own, and a long name stands above the kinds of disturbance."""
+    figure_module = pytest.importorskip("matplotlib.figure")
+    figures: list[Any] = []
+    real = figure_module.Figure.savefig
+
+    def keep(figure: Any, *arguments: Any, **options: Any) -> None:
+        figures.append(figure)
+        real(figure, *arguments, **options)
+
+    monkeypatch.setattr(figure_module.Figure, "savefig", keep)
+    only = "separatrix/improved-euler,separatrix/gauss-1,separatrix/two-term"
+    assert _run(capsys, "--only", only, "--plot", str(tmp_path / "x.png"))[0] == 0
+    (figure,) = figures
+    (key,) = figure.legends
+    assert {each.get_text() for each in key.get_texts()} == {
+        "coarse error", "coarse drift", "steps error", "steps drift", "original", "corrected",
+        "no setting",
+    }  # fmt: skip
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    for axes in shown:
+        title = axes.get_title(loc="left")
+        (name,) = (each for each in axes.get_children() if _says(each, title))
+        kinds = [each.get_window_extent() for each in axes.texts]
+        assert kinds
+        assert all(not name.get_window_extent().overlaps(box) for box in kinds), title
+        assert not key.get_window_extent().overlaps(name.get_window_extent())
+
+
+def _says(artist: Any, text: str) -> bool:
+    return hasattr(artist, "get_text") and artist.get_text() == text

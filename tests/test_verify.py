@@ -166,7 +166,7 @@ def test_failure_is_told_with_the_command_that_repeats_it(
         assert main(command[3:]) == 1
         assert lines[place] in capsys.readouterr().out
     assert main(command[3:]) == 0
-    assert "1 checks, all well" in capsys.readouterr().out
+    assert "1 check, all well" in capsys.readouterr().out
 
 
 @contextmanager

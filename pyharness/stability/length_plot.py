@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.output import numbers_beside
 from pyharness.stability.brouwer import LAWS
 from pyharness.tables import csv_text
 
@@ -79,4 +80,4 @@ def picture(found: Sequence["Curve"], path: str) -> dict[str, bytes]:
         for n, e, limit, count in zip(each.steps, each.error, each.limits, each.starts, strict=True)
     ]
     numbers = csv_text(("motion", "method", "what", "steps", "error", "limit", "starts"), rows)
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): numbers.encode()}
+    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.output import numbers_beside
 from pyharness.stability.regions import Regions
 from pyharness.tables import csv_text
 
@@ -80,7 +81,7 @@ def regions_picture(found: Regions, path: str) -> dict[str, bytes]:
         figure.savefig(
             buffer, format=form, dpi=100, metadata={"Date": None} if form == "svg" else None
         )
-    return {path: buffer.getvalue(), str(Path(path).with_suffix(".csv")): _numbers(found)}
+    return {path: buffer.getvalue(), numbers_beside(path): _numbers(found)}
 
 
 def _numbers(found: Regions) -> bytes:

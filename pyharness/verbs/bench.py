@@ -63,6 +63,10 @@ def run(options: argparse.Namespace) -> int:
     loads = workloads(None if options.case is None else int(options.case), horizon)
     found = measure(loads, contenders, shared.progress)
     shared.progress("")
+    if not found.rows:
+        from pyharness.bench_tables import not_measured
+
+        raise InputError(f"bench: nothing could be measured: {'; '.join(not_measured(found))}")
     absent = "not installed: pip install 'pyharness[peers]'"
     found.refused.extend(
         Refusal(load, each.name, None, absent) for each in missing for load in loads

@@ -36,6 +36,10 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:g} to 1")
     if options.ablate:
         return _ablate(options, scene, form)
+    if options.program not in (None, "runge-kutta"):
+        shared.refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
+    if options.no_stop:
+        shared.refuse(options, "--no-stop", ("lipschitz",))
     lipschitz = shared.positive(options.lipschitz, "--lipschitz", shared.default_lipschitz())
     listings = listings_for(
         PROGRAMS if options.program is None else (options.program,),

@@ -18,7 +18,9 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument("--method", metavar="M", help="auto (default), or a name")
     parser.add_argument("--tolerance", metavar="E", help="relative (default 1e-12)")
     parser.add_argument("--velocity", action="store_true", help="the velocity is wanted too")
-    parser.add_argument("--rows", action="store_true", help="results on the way are wanted too")
+    parser.add_argument(
+        "--rows", action="store_true", help="results on the way are wanted too, as in run"
+    )
     parser.add_argument("--format", metavar="F", help=", ".join(shared.FORMATS))
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
 

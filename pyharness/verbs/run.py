@@ -98,6 +98,8 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     name = listing.program
     if name != "runge-kutta":
         shared.refuse(options, f"--program {name}", ("lipschitz", "no_stop"))
+    if options.no_stop:
+        shared.refuse(options, "--no-stop", ("lipschitz",))
     implementation = options.implementation or "fortran"
     if implementation not in methods.IMPLEMENTATIONS:
         raise unknown("implementation", implementation, methods.IMPLEMENTATIONS, "--implementation")

@@ -4,6 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+# How the note of a check begins whose method said that it can't, or that it would take too long.
+REFUSED = "refused: "
+
 
 @dataclass(frozen=True)
 class Check:

@@ -6,14 +6,14 @@ itself may be wrong by, plus what rounding the numbers of the problem to binary6
 
 import math
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from pyharness.checks import Check, bounded, may_hold, selected
+from pyharness.checks import REFUSED, Check, bounded, may_hold, selected
 from pyharness.errors import InputError
 from pyharness.external_file import UNITS, Problem, Value, problems, read_problem
 from pyharness.listing import PROGRAMS, corrected
@@ -36,6 +36,10 @@ _HALF_ULP = 2.0**-53
 # A number is rounded when it is read, and once more in what a method makes of it.
 _ROUNDING = 2.0 * _HALF_ULP
 _STEP_ASIDE = 2.0**-30
+# These answer wherever a method does: a choice of method, and a formula.
+_MAY_NOT_REFUSE = ("auto", "closed-form")
+
+_Row = TypeVar("_Row")
 
 
 @dataclass(frozen=True)
@@ -81,37 +85,71 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
 def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
     scene = problem.scene
     times = [float(value.time) for value in values]
-    rounding = _rounding(scene, times)
+    rounding = _rounding(scene, values)
+    given = problem.path is not None
     for method in (*_SOLVED, *PROGRAMS):
         ids = [f"external/{problem.name}/{value.time}/{method}" for value in values]
         if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
             continue
-        results: list[_Result | None]
-        try:
-            if method in PROGRAMS:
-                prints = [_accuracy(problem, value) for value in values]
-                results = [
-                    _program(scene, time, method, accuracy)
-                    for time, accuracy in zip(times, prints, strict=True)
-                ]
-            else:
-                results = [*_solved(scene, times, method, rounding)]
-            note = f"ended before t = {times[min(len(results), len(times) - 1)]:g} s"
-        except InputError as error:
-            results, note = [], str(error)
+        results, refusal = _as_far_as_solved(_solver(problem, method, rounding), values)
         for row, (id, value) in enumerate(zip(ids, values, strict=True)):
             if not selected(id, only):
                 continue
             replay = _replay(problem, id)
             if row >= len(results):
-                yield Check(id, False, None, None, replay, note)
+                # The figures of a file may be for a time that takes a method too long.
+                may = bool(refusal) and given and method not in _MAY_NOT_REFUSE
+                note = f"{REFUSED}{refusal}" if refusal else f"ended before t = {times[row]:g} s"
+                yield Check(id, may, None, None, replay, note)
             elif (result := results[row]) is not None:
-                yield _check(id, problem.unit, value, result, rounding[row], replay)
+                yield _check(id, problem.unit, value, result, rounding[value.time], replay)
             else:
                 # In the problems that come with the project LEQT1F solves the longest steps.
-                given = problem.path is not None
                 note = "no step long enough for the linear equations"
                 yield Check(id, given, None, None, replay, note)
+
+
+def _as_far_as_solved(
+    solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
+) -> tuple[list[_Row], str]:
+    """Return a row for each value, and why there are no more; all are solved together.
+
+    Where that is refused they are solved one by one up to the first that is refused: what takes
+    too long to the furthest time may not to the nearest.
+    """
+    try:
+        return solve(values), ""
+    except InputError as refusal:
+        if len(values) == 1:
+            return [], str(refusal)
+    rows: list[_Row] = []
+    for value in values:
+        try:
+            found = solve([value])
+        except InputError as refusal:
+            return rows, str(refusal)
+        if not found:
+            break
+        rows += found
+    return rows, ""
+
+
+def _solver(
+    problem: Problem, method: str, rounding: dict[str, Array]
+) -> Callable[[Sequence[Value]], list[_Result | None]]:
+    """Return what solves a problem by a method, to the times of the values that it is given."""
+    scene = problem.scene
+
+    def solve(values: Sequence[Value]) -> list[_Result | None]:
+        if method in PROGRAMS:
+            return [
+                _program(scene, float(value.time), method, _accuracy(problem, value))
+                for value in values
+            ]
+        moved = [rounding[value.time] for value in values]
+        return [*_solved(scene, [float(value.time) for value in values], method, moved)]
+
+    return solve
 
 
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
@@ -126,12 +164,17 @@ def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
 
 
 def _solved(
-    scene: Scene, times: Sequence[float], method: str, rounding: Array
+    scene: Scene, times: Sequence[float], method: str, rounding: Sequence[Array]
 ) -> Iterator[_Result]:
     tolerance = _TOLERANCES.get(method) or METHODS[method].finest
     if method == "quick":
         solver, start = prepare(scene, method, tolerance), np.array(scene.omega)
-        rows = np.array([solver(start, time).copy() for time in times])
+        found = []
+        for time in times:
+            found.append(solver(start, time).copy())
+            if solver.status in ("refused", "gave up"):
+                raise InputError(f"{method} {solver.status}")
+        rows = np.array(found)
     else:
         rows = solve(scene, times, method, tolerance).omega
     for omega, moved in zip(rows, rounding, strict=False):
@@ -205,22 +248,34 @@ def _scale(scene: Scene, omega: Array) -> float:
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
-def _rounding(scene: Scene, times: Sequence[float]) -> Array:
+def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
+    """Return by how much rounding the numbers of a scene moves omega, by time (rad/s).
+
+    Nothing where that can't be solved, and so not be excused: the method's own check tells.
+    """
+
+    def solve(values: Sequence[Value]) -> list[Array]:
+        return [*_moves(scene, [float(value.time) for value in values])]
+
+    rows, _ = _as_far_as_solved(solve, values)
+    nothing = np.zeros(3)
+    return {
+        value.time: rows[row] if row < len(rows) else nothing for row, value in enumerate(values)
+    }
+
+
+def _moves(scene: Scene, times: Sequence[float]) -> Array:
     """Return by how much rounding the numbers of a scene and its times moves omega (rad/s).
 
-    The sum over all numbers of what each moves alone, to first order; no more rows than the
-    motion has.
+    The sum over all numbers of what each moves alone, to first order; nothing in the rows that
+    the motion does not have.
     """
     moved = np.zeros((len(times), 3))
-    try:
-        here = solve(scene, times, "taylor", METHODS["taylor"].finest).omega
-        for other in _moved(scene):
-            there = solve(other, times, "taylor", METHODS["taylor"].finest).omega
-            rows = min(len(here), len(there))
-            moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
-    except InputError:
-        # What can't be solved can't be excused: the method's own check tells.
-        return np.zeros((len(times), 3))
+    here = solve(scene, times, "taylor", METHODS["taylor"].finest).omega
+    for other in _moved(scene):
+        there = solve(other, times, "taylor", METHODS["taylor"].finest).omega
+        rows = min(len(here), len(there))
+        moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
     slope = scene.right_hand_side()
     for row, (time, omega) in enumerate(zip(times, here, strict=False)):
         moved[row] += np.abs(slope(time, omega.tolist())) * abs(time) * _ROUNDING

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pyharness.agreement import ulps
-from pyharness.checks import Check, bounded, described
+from pyharness.checks import REFUSED, Check, bounded, described
 from pyharness.conditioning import Conditioning, conditioning
 from pyharness.contenders import FIXED_STEP
 from pyharness.errors import InputError
@@ -38,7 +38,6 @@ _IVP, _IVP_TOLERANCE = "dop853", 7e-13
 _EVERY = 3
 # Halvings in which an order has to show, one after another.
 _PAIRS = 4
-_REFUSED = "refused: "
 # Random scenes that may run away, or be too fast for any truth and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 
@@ -195,7 +194,7 @@ def _random(chosen: Selection, drawn: Draw, number: int, names: Sequence[str]) -
             # A series or a collocation may say that it would take too long for such a scene; the
             # choice of a method for a scene, and a closed form, may not.
             is_free = name not in ("auto", "closed-form") and scene.name in _MAY_REFUSE
-            if found.note.startswith(_REFUSED) and is_free:
+            if found.note.startswith(REFUSED) and is_free:
                 found = described(id, None, again, found.note)
             yield found
 
@@ -226,7 +225,7 @@ def _held(
     try:
         run = solve(scene, times.tolist(), name, tolerance)
     except InputError as refusal:
-        return Check(id, not has_form, None, None, again, f"{_REFUSED}{refusal}")
+        return Check(id, not has_form, None, None, again, f"{REFUSED}{refusal}")
     if not has_form:
         return Check(id, False, None, None, again, "solved what has no closed form")
     if run.ended != "complete" or not np.array_equal(run.time, times):
@@ -256,7 +255,7 @@ def _held_prepared(
     if name == "quick" and solver.status in ("refused", "gave up"):
         # Its unknowns need three products; and it leaves to the series what takes too many steps.
         may = not all(scene.euler_coefficients) if solver.status == "refused" else is_hard
-        return Check(id, may, None, None, again, f"{_REFUSED}{solver.status}")
+        return Check(id, may, None, None, again, f"{REFUSED}{solver.status}")
     error = float(np.abs(found - standard.truth.omega[-1]).max()) / standard.flow.largest
     note = solver.status if math.isnan(error) else ""
     return bounded(id, error, standard.flow.limit(tolerance), again, note)

@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     if form != "table":
         text = _machine_text(checks, form, chosen.seed)
     else:
-        text = checks_table(_title(chosen), checks)
+        text = checks_table([*_title(chosen), *_unjudged(chosen, checks)], checks)
     shared.emit(text, options.out)
     return 0 if all(check.passed for check in checks) else 1
 
@@ -115,6 +115,14 @@ def _title(chosen: Selection) -> list[str]:
     if chosen.may_ask("golden") and not chosen.record.is_dir():
         title.append("there is no golden record here (it stands in the checkout): not compared")
     return title
+
+
+def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
+    """Say that figures of the user's were not judged: no failure shows it."""
+    count = sum(check.passed and check.value is None for check in checks)
+    if chosen.problems is None or not count:
+        return []
+    return [f"{count} of {len(checks)} judge nothing: too much for the method (--format json: why)"]
 
 
 def _machine_text(checks: list[Check], form: str, seed: str) -> str:

@@ -1,5 +1,6 @@
 """`scipy.integrate.solve_ivp` as methods; SciPy is imported when one is used."""
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 
@@ -8,6 +9,8 @@ import numpy as np
 from pyharness.errors import InputError
 from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
+
+RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 # SciPy controls the error of a step, a tolerance here is on the error at the times asked for:
 # a thirtieth kept every method within it in all seven cases (tests/test_methods.py), which are
@@ -25,6 +28,8 @@ _LARGEST_PHASE = 1e13
 # costs, and Radau solves linear systems besides.
 _MOST_EVALUATIONS = 500_000
 _RADAU_SHARE = 2
+# LSODA squares the span for its first step: below 1e-150 s that is none at all, and it stands.
+_SHORTEST_SPAN = 2.0**-300
 
 
 def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
@@ -45,7 +50,8 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
         if radians > RADIANS[name]:
             share = _STEP_SHARE * RADIANS[name] / radians
             step_tolerance = max(_FINEST_STEP, tolerance * share)
-        right_hand_side = scene.right_hand_side()
+        unit = _unit(times[-1])
+        right_hand_side = _in_units(scene.right_hand_side(), unit)
         evaluations = 0
         waves = len(scene.torque.sines) + len(scene.torque.cosines)
         most = _MOST_EVALUATIONS * 8 // (8 + waves)
@@ -57,13 +63,13 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             evaluations += 1
             if evaluations > most:
                 raise InputError(
-                    f"{name} gave up at t = {time:.6g} s after {most} right-hand "
+                    f"{name} gave up at t = {time * unit:.6g} s after {most} right-hand "
                     "sides; take a shorter time or a larger tolerance"
                 )
             return right_hand_side(time, omega)
 
         def phase_left(time: float, omega: Sequence[float]) -> float:
-            return _LARGEST_PHASE - rate * abs(time) * max(map(abs, omega))
+            return _LARGEST_PHASE - rate * abs(time * unit) * max(map(abs, omega))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
         # LSODA warns of what the rows that are missing say already.
@@ -71,10 +77,10 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             try:
                 result = solve_ivp(
                     counted,
-                    (0.0, times[-1]),
+                    (0.0, times[-1] / unit),
                     scene.omega,
                     method=name,
-                    t_eval=times,
+                    t_eval=[time / unit for time in times],
                     events=phase_left,
                     rtol=step_tolerance,
                     atol=step_tolerance * (largest or 1.0),
@@ -98,6 +104,18 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
         return rows_trajectory(times[:count], rows[:count], int(result.nfev), len(times), ended)
 
     return solve
+
+
+def _unit(span: float) -> float:
+    """Return the unit of time in which a span is no tiny number, a power of 2; 1 for most."""
+    return 1.0 if abs(span) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(span)[1])
+
+
+def _in_units(right_hand_side: RightHandSide, unit: float) -> RightHandSide:
+    """Return the same equations in another unit of time."""
+    if unit == 1.0:
+        return right_hand_side
+    return lambda time, omega: [unit * slope for slope in right_hand_side(unit * time, omega)]
 
 
 def rows_trajectory(

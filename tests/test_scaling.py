@@ -81,6 +81,20 @@ def test_solve_ivp_says_overflow_where_omega_leaves_the_range(method: str) -> No
         pytest.fail("refused")
 
 
+@pytest.mark.parametrize("method", ["lsoda", "dop853", "rk45", "radau"])
+def test_solve_ivp_in_spans_whose_square_is_no_number(method: str) -> None:
+    """LSODA squares the span: in one below 1e-150 s it stood still."""
+    for size in (1e-120, 1e-150, 1e-160, 1e-200, 1e-300):
+        scene = replace(case_scene(3), omega=(size, size, size))
+        np.testing.assert_allclose(solve(scene, [1.0], method, 1e-9).omega / size, 1.0, rtol=1e-9)
+    power = 2.0**530
+    slow = Scene("", (0.3, 1.0, 1.0), coefficients=(1.0, -1.0, -0.51))
+    fast = replace(slow, coefficients=(power, -power, -0.51 * power))
+    found = solve(fast, [-10.0 / power, -20.0 / power], method, 1e-6)
+    wanted = solve(slow, [-10.0, -20.0], "taylor", 1e-12)
+    np.testing.assert_allclose(found.omega, wanted.omega, rtol=0.0, atol=2e-6)
+
+
 def test_longer_motions_get_finer_steps_of_solve_ivp() -> None:
     """Errors of steps add up: thirty times as long, and still within the tolerance."""
     scene = Scene("", (1e-2, 1.0, 0.3), moments=(6.0, 5.0, 2.0))

@@ -132,6 +132,11 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
     if method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
+    if chosen.finest == 1.0 and tolerance != 1.0:
+        raise InputError(
+            f"tolerance is {tolerance:g}; {method} takes none: it goes in the scene's steps, "
+            "whatever their error; give no tolerance, or 1"
+        )
     if not chosen.finest <= tolerance <= 1.0:
         raise InputError(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"

@@ -20,6 +20,26 @@ class InputError(ValueError):
         super().__init__(line)
 
 
+class TimedError(InputError):
+    """One whose message has a time in it, which is in the units of whoever was asked.
+
+    Attributes
+    ----------
+    time : float
+        The time (s).
+    """
+
+    def __init__(self, message: str, time: float) -> None:
+        """Put the time where ``{time}`` stands."""
+        super().__init__(message.replace("{time}", f"{time:.6g}"))
+        self.time = time
+        self._message = message
+
+    def slower(self, factor: float) -> "TimedError":
+        """Return the error of a motion whose times are `factor` as long."""
+        return TimedError(self._message, self.time * factor)
+
+
 class NotBuiltError(RuntimeError):
     """The compiled extension is missing: exit code 3 on the command line."""
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.errors import InputError, NotBuiltError
+from pyharness.errors import InputError, NotBuiltError, TimedError
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scene import Scene, Wave
 from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
@@ -136,8 +136,11 @@ def taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory
         *normalized(scene), scene.omega, times, tolerance
     )
     if status == GAVE_UP:
-        raise InputError(
-            f"taylor gave up after {steps} steps; take a shorter time or a larger tolerance"
+        count = "1 step" if steps == 1 else f"{steps} steps"
+        raise TimedError(
+            f"taylor gave up before t = {{time}} s after {count}; take a shorter time or a larger "
+            "tolerance",
+            times[n_rows],
         )
     time = np.array(times[:n_rows], dtype=float)
     ended = "overflow" if status else "complete"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from pyharness.errors import InputError, unknown
+from pyharness.errors import InputError, TimedError, unknown
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scaling import factor_near_one, scaled, unscaled
 from pyharness.scene import Scene
@@ -147,7 +147,10 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
         trajectory = chosen.solve(scene, ordered, tolerance)
     else:
         faster = [t / factor for t in ordered]
-        found = chosen.solve(scaled(scene, factor), faster, tolerance)
+        try:
+            found = chosen.solve(scaled(scene, factor), faster, tolerance)
+        except TimedError as refusal:
+            raise refusal.slower(factor) from None
         trajectory = unscaled(found, ordered, factor)
     if not turned:
         return trajectory

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.errors import InputError
+from pyharness.errors import InputError, TimedError
 from pyharness.kernels import COMPLETE, GAVE_UP, REFUSED, extension, normalized
 from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
@@ -54,9 +54,10 @@ def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Traje
             "coefficients A, B, C not all of one sign, none of them zero between equal signs"
         )
     if status == GAVE_UP:
-        raise InputError(
-            f"closed-form: at t = {times[n_rows]:g} s the phase is beyond 1e15 radians and has "
-            "no digit left; take a shorter time"
+        raise TimedError(
+            "closed-form: at t = {time} s the phase is beyond 1e15 radians and has no digit left; "
+            "take a shorter time",
+            times[n_rows],
         )
     return _trajectory(times, rows, n_rows, status, len(times), 0)
 
@@ -74,9 +75,10 @@ def fixed_step(name: str) -> Solver:
             scene.step_size,
         )  # fmt: skip
         if status == GAVE_UP:
-            raise InputError(
-                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {scene.step_size:g} s "
-                "are too many; take a larger step or a shorter time"
+            raise TimedError(
+                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s are too many; "
+                "take a larger step or a shorter time",
+                scene.step_size,
             )
         return _trajectory(times, rows, n_rows, status, steps, evaluations)
 
@@ -103,9 +105,10 @@ def gauss(stages: int) -> Solver:
         while True:
             # Each step takes two iterations at the least.
             if not step or spent + 2.0 * stages * float(counts.sum()) > _MOST_EVALUATIONS:
-                raise InputError(
-                    f"gauss-{stages} gave up at t = {reached:.6g} s after {spent} right-hand "
-                    "sides; take a shorter time, a larger tolerance or more stages"
+                raise TimedError(
+                    f"gauss-{stages} gave up at t = {{time}} s after {spent} right-hand sides; "
+                    "take a shorter time, a larger tolerance or more stages",
+                    reached,
                 )
             found = _Solution(
                 *extension().gauss_solution(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pyharness.errors import InputError
+from pyharness.errors import InputError, TimedError
 from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
 
@@ -62,9 +62,10 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             nonlocal evaluations
             evaluations += 1
             if evaluations > most:
-                raise InputError(
-                    f"{name} gave up at t = {time * unit:.6g} s after {most} right-hand "
-                    "sides; take a shorter time or a larger tolerance"
+                raise TimedError(
+                    f"{name} gave up at t = {{time}} s after {most} right-hand sides; take a "
+                    "shorter time or a larger tolerance",
+                    time * unit,
                 )
             return right_hand_side(time, omega)
 

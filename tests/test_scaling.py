@@ -95,6 +95,32 @@ def test_solve_ivp_in_spans_whose_square_is_no_number(method: str) -> None:
     np.testing.assert_allclose(found.omega, wanted.omega, rtol=0.0, atol=2e-6)
 
 
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        *((name, f"{name} gave up at t = ") for name in ("LSODA", "DOP853", "RK45", "Radau")),
+        ("gauss-2", "gauss-2 gave up at t = 0 s"),
+        ("taylor", "taylor gave up before t = 0.75 s after 1 step;"),
+        ("auto", "closed-form: at t = 0.75 s the phase is beyond"),
+        ("rk4", "steps of 1e-12 s are too many"),
+    ],
+)
+def test_a_refusal_tells_the_time_in_the_seconds_of_the_scene(
+    method: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pyharness.scipy_methods._MOST_EVALUATIONS", 10_000)
+    monkeypatch.setattr("pyharness.modern._MOST_EVALUATIONS", 10_000)
+    scene = replace(case_scene(3), omega=(1e100, 1e100, 1e100), step_size=1e-12)
+    tolerance = 1.0 if method == "rk4" else 1e-6
+    with pytest.raises(InputError) as caught:
+        solve(scene, [0.75] if method != "rk4" else [1e4], method.lower(), tolerance)
+    message = str(caught.value)
+    assert words in message
+    if words.endswith("t = "):
+        time = float(message.partition("t = ")[2].split()[0])
+        assert 0.0 < time < 1e-90
+
+
 def test_longer_motions_get_finer_steps_of_solve_ivp() -> None:
     """Errors of steps add up: thirty times as long, and still within the tolerance."""
     scene = Scene("", (1e-2, 1.0, 0.3), moments=(6.0, 5.0, 2.0))

@@ -11,6 +11,8 @@ from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.verify import KINDS, verify
 
 FORMATS = ("table", "json", "junit")
+# Options that no other kind looks at.
+_OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 
 
 def declare(parser: shared.Parser) -> None:
@@ -100,6 +102,9 @@ def _selection(options: argparse.Namespace) -> Selection:
     for each in only:
         if each.partition("/")[0] not in KINDS:
             raise unknown("kind", each.partition("/")[0], KINDS, "--only")
+    for kind, names in _OF_ONE_KIND.items():
+        if only and not any(each.partition("/")[0] == kind for each in only):
+            shared.refuse(options, f"--only {options.only}", names)
     draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
     if draws < 0:
         raise InputError(f"--draws: {draws}; allowed: 0 or more")

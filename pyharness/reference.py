@@ -123,7 +123,32 @@ def reference(
 
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
-    """Return the closed form of a sphere, or of a symmetric body without torque; else None."""
+    """Return the closed form of a sphere, or of a symmetric body without torque; else None.
+
+    To as many decimals as the arithmetic has digits: a phase of 1e41 radians needs 41 more.
+    """
+    with decimal.localcontext() as context:
+        context.prec += _digits_before_the_point(scene, max(map(abs, times)))
+        return _known_rows(scene, times)
+
+
+def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
+    """Return those of the largest number on the way to a known solution, or some more."""
+    law = scene.torque
+    omega = max(Decimal(abs(w)) for w in scene.omega)
+    rate = max(map(abs, exact_coefficients(scene))) * omega
+    sizes = [omega, rate * time]
+    least = min(map(Decimal, scene.moments or (1,)))
+    pushes = [(law.constant, time), (law.rate, time * time)]
+    for amplitude, frequency in law.sines + law.cosines:
+        turns = Decimal(abs(frequency))
+        sizes.append(turns * time)
+        pushes.append((amplitude, 1 / turns if turns else time))
+    sizes += [Decimal(max(map(abs, push))) * length / least for push, length in pushes]
+    return max(0, max(sizes).adjusted() + 1)
+
+
+def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     coefficients = exact_coefficients(scene)
     if not any(coefficients):
         return [_sphere(scene, t) for t in times]

@@ -50,6 +50,37 @@ def test_symmetric_body_about_every_axis(
     np.testing.assert_allclose(reference(scene, [0.5, 7.0]).omega, known.omega, rtol=1e-15)
 
 
+@pytest.mark.parametrize("time", [1e20, 1e39, 1e40, -1e41, 1e100, 1e300])
+@pytest.mark.parametrize("third", [10.0, 10.1, -1e30, 1e-200])
+def test_a_symmetric_body_after_any_time(time: float, third: float) -> None:
+    """The phase has as many digits before the point, and 40 after it are needed."""
+    scene = Scene("", (0.3, 1.0, third), moments=(40.0, 40.0, 20.0))
+    found = reference(scene, [time])
+    with mpmath.workdps(700):
+        phase = mpmath.mpf(third) / 2 * mpmath.mpf(time)
+        sine, cosine = mpmath.sin(phase), mpmath.cos(phase)
+        wanted = [mpmath.mpf(0.3) * cosine + sine, cosine - mpmath.mpf(0.3) * sine]
+        off = [abs(x - y) for x, y in zip(_whole(found, 0)[:2], wanted, strict=True)]
+        assert max(off) < 1e-31
+    assert np.abs(found.omega[0, :2] - [float(x) for x in wanted]).max() <= found.error
+
+
+@pytest.mark.parametrize(
+    ("frequency", "time"), [(0.1, 1e41), (1e-20, 1e62), (3e10, -1e300), (1e-300, 1e100)]
+)
+def test_a_sphere_after_any_time(frequency: float, time: float) -> None:
+    waves = (((1.0, 0.0, 0.0), frequency),), (((0.0, 1.0, 0.0), frequency),)
+    law = TorqueLaw((0.0, 0.0, 2.0), (0.0, 0.0, -4.0 / time), *waves)
+    scene = Scene("", (0.3, -1.1, 2.2), moments=(2.0, 2.0, 2.0), torque=law)
+    found = reference(scene, [time])
+    with mpmath.workdps(700):
+        t, f, slope = mpmath.mpf(time), mpmath.mpf(frequency), mpmath.mpf(law.rate[2])
+        pushes = [(1 - mpmath.cos(f * t)) / f, mpmath.sin(f * t) / f, 2 * t + slope * t * t / 2]
+        wanted = [float(w + push / 2) for w, push in zip(scene.omega, pushes, strict=True)]
+    # The terms of axis 3 cancel but for what rounding left of the rate.
+    np.testing.assert_allclose(found.omega[0], wanted, rtol=2e-16)
+
+
 def test_sphere_under_every_kind_of_torque(monkeypatch: pytest.MonkeyPatch) -> None:
     law = TorqueLaw(
         (1.0, -2.0, 3.0), (0.5, 0.0, -1.0), (((1.0, 2.0, 3.0), 3.0), ((1.0, 0.0, 0.0), 0.0)),

@@ -20,6 +20,7 @@ from pyharness.listing import PROGRAMS, corrected
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
 from pyharness.plan import closed_form
 from pyharness.scene import Scene, TorqueLaw, Triple
+from pyharness.scipy_methods import RADIANS
 from pyharness.solver import prepare
 from pyharness.trajectory import Array
 
@@ -31,6 +32,7 @@ _SOLVED = (
     "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
     "quick", "dop853", "lsoda", "radau", "rk45",
 )  # fmt: skip
+_FINEST_UNTIL = {name.lower(): radians for name, radians in RADIANS.items()}
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
 # A number is rounded when it is read, and once more in what a method makes of it.
@@ -177,9 +179,13 @@ def _solved(
         rows = np.array(found)
     else:
         rows = solve(scene, times, method, tolerance).omega
-    for omega, moved in zip(rows, rounding, strict=False):
+    rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
+    for time, omega, moved in zip(times, rows, rounding, strict=False):
         size = np.full(3, _scale(scene, omega))
         if method in SCIPY_METHODS:
+            # The finest tolerance is claimed for so many radians, and grows with them.
+            share = rate * abs(time) / _FINEST_UNTIL[method]
+            size *= max(1.0, METHODS[method].finest * share / tolerance)
             # SciPy controls the error of a step; by the end the motion has made of it what it
             # makes of a change of that size in the numbers of the problem.
             size = np.maximum(size, moved / _ROUNDING)

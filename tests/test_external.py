@@ -336,6 +336,21 @@ def test_what_gives_up_later_is_judged_earlier(
     assert list(external_checks([problem], [early.id])) == [early]
 
 
+@pytest.mark.parametrize("time", ["-5", "20"])
+def test_a_long_motion_gets_the_tolerance_that_is_claimed_for_it(time: str, tmp_path: Path) -> None:
+    """LSODA claims its finest for 8 radians; a symmetric top turns by 5 a second."""
+    text = _GOOD.replace("[0.0, 1.0, 1.0]", "[0.0, 1.0, 10.0]").replace("-0.51", "0.0")
+    text = text.replace("[1.0, -1.0,", "[0.5, -0.5,").replace('"20"', f'"{time}"')
+    phase = 5 * float(time)
+    prints = f'"{np.sin(phase):.15f}", "{np.cos(phase):.15f}", "10.0"'
+    text = text.replace('"-0.93966", "", "7.4141e-01"', prints)
+    only = [f"external/mine/{time}/{name}" for name in ("lsoda", "dop853")]
+    for check in external_checks([_read(tmp_path, text)], only):
+        assert check.passed
+        assert check.limit is not None
+        assert check.limit < 2e-10
+
+
 def test_a_far_time_leaves_the_excuse_of_a_near_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

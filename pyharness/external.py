@@ -261,7 +261,12 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
-        return [*_moves(scene, [float(value.time) for value in values])]
+        times = [float(value.time) for value in values]
+        try:
+            return [*_moves(scene, times, "taylor")]
+        except InputError:
+            # A closed form goes further than a series.
+            return [*_moves(scene, times, "auto")]
 
     rows, _ = _as_far_as_solved(solve, values)
     nothing = np.zeros(3)
@@ -270,16 +275,16 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     }
 
 
-def _moves(scene: Scene, times: Sequence[float]) -> Array:
+def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     """Return by how much rounding the numbers of a scene and its times moves omega (rad/s).
 
     The sum over all numbers of what each moves alone, to first order; nothing in the rows that
     the motion does not have.
     """
     moved = np.zeros((len(times), 3))
-    here = solve(scene, times, "taylor", METHODS["taylor"].finest).omega
+    here = solve(scene, times, method, METHODS[method].finest).omega
     for other in _moved(scene):
-        there = solve(other, times, "taylor", METHODS["taylor"].finest).omega
+        there = solve(other, times, method, METHODS[method].finest).omega
         rows = min(len(here), len(there))
         moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
     slope = scene.right_hand_side()

@@ -6,6 +6,7 @@ from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -358,8 +359,23 @@ def test_a_far_time_leaves_the_excuse_of_a_near_one(
     only = ["external/mine/20/reference"]
     (alone,) = external_checks([_read(tmp_path, _GOOD)], only)
     _impatient("taylor", monkeypatch)
+    _impatient("auto", monkeypatch)
     (beside,) = external_checks([_read(tmp_path, _LATER)], only)
     assert beside.limit == alone.limit
+
+
+def test_beyond_the_series_a_closed_form_tells_what_rounding_does(tmp_path: Path) -> None:
+    """10.1 rad/s is no binary number: after 1e9 s that is 2e-7 radians."""
+    text = _GOOD.replace("[0.0, 1.0, 1.0]", "[0.0, 1.0, 10.1]").replace("-0.51", "0.0")
+    text = text.replace("[1.0, -1.0,", "[0.5, -0.5,").replace('"20"', '"1e9"')
+    with mpmath.workdps(40):
+        phase = mpmath.mpf("5.05e9")
+        prints = f'"{mpmath.nstr(mpmath.sin(phase), 12)}", "", "10.1"'
+    text = text.replace('"-0.93966", "", "7.4141e-01"', prints)
+    only = [f"external/mine/1e9/{name}" for name in ("closed-form", "reference", "auto")]
+    checks = list(external_checks([_read(tmp_path, text)], only))
+    assert [check.passed for check in checks] == [True] * 3
+    assert all((check.value or 0.0) > 1e-8 and (check.limit or 1.0) < 1e-5 for check in checks)
 
 
 def test_programs_in_steps_far_too_long_are_no_fault_of_a_file(

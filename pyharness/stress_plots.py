@@ -21,6 +21,7 @@ _TOP = 3.0
 _COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
 _MARKERS = {"error": "o", "drift": "v"}
 _COLUMNS = 2
+_PLACES_PER_LETTER = 0.6
 _COARSE = 1e-6
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
@@ -38,7 +39,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str
     methods = list(dict.fromkeys(check.id.split("/")[1] for check in drawn))
     columns = min(_COLUMNS, len(methods))
     rows = -(-len(methods) // columns)
-    width = max(5.0, 2.0 + 0.11 * len(places))
+    width = max(5.0, 2.0 + 0.11 * max(places.values(), default=0.0))
     figure = Figure(figsize=(width * columns, 2.6 * rows + 1.6), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, name in zip(grid.flat, methods, strict=False):
@@ -73,17 +74,19 @@ def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str
 
 
 def _places(names: Sequence[str]) -> dict[str, float]:
-    """Return where each circumstance stands: kinds side by side, with a gap between."""
+    """Return where each circumstance stands: kinds side by side, with room for their names."""
     kinds: dict[str, list[str]] = {}
     for name in dict.fromkeys(names):
         kinds.setdefault(_kind(name), []).append(name)
     places: dict[str, float] = {}
     place = 0.0
-    for members in kinds.values():
+    for kind, members in kinds.items():
+        spare = max(0.0, _PLACES_PER_LETTER * len(kind) - len(members))
+        place += 0.5 * spare
         for name in members:
             places[name] = place
             place += 1.0
-        place += 1.0
+        place += 1.0 + 0.5 * spare
     return places
 
 

@@ -1,5 +1,6 @@
 """The trials: their bounds hold, planted faults are caught, and what failed can be run again."""
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -376,7 +377,27 @@ def test_every_mark_has_a_key_and_no_title_meets_another(
         kinds = [each.get_window_extent() for each in axes.texts]
         assert kinds
         assert all(not name.get_window_extent().overlaps(box) for box in kinds), title
+        assert not any(x.overlaps(y) for x, y in itertools.combinations(kinds, 2)), title
         assert not key.get_window_extent().overlaps(name.get_window_extent())
+
+
+def test_names_of_kinds_stand_apart(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four bodies each, and names as long as impossible-three."""
+    figure_module = pytest.importorskip("matplotlib.figure")
+    boxes: list[Any] = []
+    real = figure_module.Figure.savefig
+
+    def keep(figure: Any, *arguments: Any, **options: Any) -> None:
+        real(figure, *arguments, **options)
+        boxes.extend(each.get_window_extent() for each in figure.axes[0].texts)
+
+    monkeypatch.setattr(figure_module.Figure, "savefig", keep)
+    picture = str(tmp_path / "x.png")
+    assert _run(capsys, "--only", "shapes/closed-form", "--plot", picture)[0] == 0
+    assert len(boxes) > 10
+    assert not any(x.overlaps(y) for x, y in itertools.combinations(boxes, 2))
 
 
 def _says(artist: Any, text: str) -> bool:

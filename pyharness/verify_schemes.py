@@ -10,19 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.checks import Check, bounded
-from pyharness.conditioning import magnitudes
+from pyharness.conditioning import ROUNDING, magnitudes
 from pyharness.listing import PROGRAMS, corrected
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.scene import Scene
 from pyharness.scene_file import case_numbers, case_scene
 from pyharness.selection import Selection, replay
+from pyharness.stability.collocation_matrices import PARTS
 from pyharness.trajectory import Array, Trajectory
 
-# Where the residual is zero, in parts of the step (IV.2).
-_PARTS = {"two-term": (1 / 3, 2 / 3), "four-term": (0.2, 0.4, 0.6, 0.8)}
-_EPS = float(np.finfo(float).eps)
 # Of a rate, with the stages that lead to it, and of the sum that it goes into.
-_ROUNDINGS = 16.0
+_ROUNDINGS = 32.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +87,11 @@ def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
 
 def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
     """Return U and V after every step, and the rounding that is granted to them."""
-    if name not in _PARTS:
+    if name not in PARTS:
         kutta = stages(scene, run)
         return _put_together(scene, kutta[0], kutta, (1 / 6, 1 / 3, 1 / 3, 1 / 6), 1.0)
     first = _beginning(scene, run)
-    parts = np.array(_PARTS[name])
+    parts = np.array([float(part) for part in PARTS[name]])
     powers = np.arange(1, len(parts) + 1)
     matrix = np.power.outer(parts, powers - 1)
     # The integral over the step of the polynomial through the rates at the points.
@@ -117,7 +115,7 @@ def _put_together(
     rates = sum(weight * point.rate for weight, point in zip(weights, points, strict=True))
     after = first.state + h * rates
     sizes = np.max([point.rounding for point in points], axis=0)
-    return after, 2.0 * _EPS * (np.abs(first.state) + np.abs(after)) + h * condition * sizes
+    return after, 4.0 * ROUNDING * (np.abs(first.state) + np.abs(after)) + h * condition * sizes
 
 
 def _beginning(scene: Scene, run: Trajectory) -> Stage:
@@ -137,4 +135,4 @@ def _stage(scene: Scene, part: float, state: Array) -> Stage:
     crossed = np.roll(v, -1, axis=1) * np.roll(u, -2, axis=1)
     crossed += np.roll(v, -2, axis=1) * np.roll(u, -1, axis=1)
     size = np.hstack([magnitudes(scene, times, omega), np.abs(pull) + crossed])
-    return Stage(state, rate, _ROUNDINGS * _EPS * size)
+    return Stage(state, rate, _ROUNDINGS * ROUNDING * size)

@@ -11,6 +11,7 @@ import numpy as np
 
 from pyharness.cells import listing_name, subsets
 from pyharness.checks import Check, bounded
+from pyharness.conditioning import ROUNDING
 from pyharness.listing import Listing, corrected, names_of
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.scene import Scene
@@ -20,8 +21,6 @@ from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.verify_schemes import Stage, is_whole, rows, stages
 
 _PROGRAM = "runge-kutta"
-_WAYS = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
-_EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +48,14 @@ def stops(chosen: Selection) -> Iterator[Check]:
     With every way of testing that a listing can have. The value is the largest share of what
     rounding may do to a quotient.
     """
+    ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in (3,) if chosen.thin else case_numbers():
         if not chosen.may_ask(f"stops/case-{case}"):
             continue
         scene = case_scene(case)
         run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
         kutta = stages(scene, run) if is_whole(scene, run) else None
-        for defects in subsets(_WAYS):
+        for defects in subsets(ways):
             listing = Listing(_PROGRAM, defects)
             id = f"stops/case-{case}/{listing_name(listing)}"
             if not chosen.asks(id):
@@ -92,8 +92,8 @@ def _quotients(
     k, u = np.abs(fourth.rate - first.rate)[:, columns], np.abs(after - first.state)[:, columns]
     k_rounding = (first.rounding + fourth.rounding)[:, columns]
     # U4 and the result are the state before and an increment, each rounded.
-    sizes = _EPS * (np.abs(first.state) + np.abs(after)) + scene.step_size * first.rounding
-    u_rounding = (sizes + scene.step_size * fourth.rounding)[:, columns]
+    stored = 2.0 * ROUNDING * (np.abs(first.state) + np.abs(after))
+    u_rounding = (stored + scene.step_size * (first.rounding + fourth.rounding))[:, columns]
     names = [STOP_VARIABLES[column] for column in columns]
     if not listing.has("lipschitz-per-component"):
         names = ["UV" if velocity else "U"]

@@ -349,19 +349,25 @@ def test_method_that_refuses_what_it_has_to_take_fails() -> None:
             assert not any(check.passed for check in checks), each
 
 
-def test_every_mark_has_a_key_and_no_title_meets_another(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Programs have marks of their own, and a long name stands above the kinds of disturbance."""
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Return the figures that are saved from now on."""
     figure_module = pytest.importorskip("matplotlib.figure")
-    figures: list[Any] = []
+    saved: list[Any] = []
     real = figure_module.Figure.savefig
 
     def keep(figure: Any, *arguments: Any, **options: Any) -> None:
-        figures.append(figure)
         real(figure, *arguments, **options)
+        saved.append(figure)
 
     monkeypatch.setattr(figure_module.Figure, "savefig", keep)
+    return saved
+
+
+def test_every_mark_has_a_key_and_no_title_meets_another(
+    figures: list[Any], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Programs have marks of their own, and a long name stands above the kinds of disturbance."""
     only = "separatrix/improved-euler,separatrix/gauss-1,separatrix/two-term"
     assert _run(capsys, "--only", only, "--plot", str(tmp_path / "x.png"))[0] == 0
     (figure,) = figures
@@ -382,20 +388,13 @@ def test_every_mark_has_a_key_and_no_title_meets_another(
 
 
 def test_names_of_kinds_stand_apart(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    figures: list[Any], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     """Four bodies each, and names as long as impossible-three."""
-    figure_module = pytest.importorskip("matplotlib.figure")
-    boxes: list[Any] = []
-    real = figure_module.Figure.savefig
-
-    def keep(figure: Any, *arguments: Any, **options: Any) -> None:
-        real(figure, *arguments, **options)
-        boxes.extend(each.get_window_extent() for each in figure.axes[0].texts)
-
-    monkeypatch.setattr(figure_module.Figure, "savefig", keep)
     picture = str(tmp_path / "x.png")
     assert _run(capsys, "--only", "shapes/closed-form", "--plot", picture)[0] == 0
+    (figure,) = figures
+    boxes = [each.get_window_extent() for each in figure.axes[0].texts]
     assert len(boxes) > 10
     assert not any(x.overlaps(y) for x, y in itertools.combinations(boxes, 2))
 

@@ -4,22 +4,25 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any, Never
 
 import numpy as np
 import pytest
 
+from pyharness import orders
 from pyharness.build import build
 from pyharness.compare import compare
 from pyharness.comparison_tables import comparison_table
+from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, Listing, corrected
-from pyharness.methods import PROGRAM_REGISTRY
+from pyharness.methods import PROGRAM_REGISTRY, Program
 from pyharness.orders import Order, measured_order, order_of
 from pyharness.planted_twins import plant_in_twin
 from pyharness.records import comparison_record
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
-from pyharness.trajectory import Array
+from pyharness.trajectory import Array, Trajectory
 
 
 def _steps(case: int, step_size: float, steps: int) -> Scene:
@@ -178,6 +181,42 @@ def test_one_halving_is_no_proof() -> None:
     truth = reference(scene, scene.times())
     assert order_of(scene, once, 2, truth, pairs=1).state == "as due"
     assert order_of(scene, once, 2, truth).state == "misses"
+
+
+def test_larger_errors_than_those_of_a_textbook_are_no_miss(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A right program may need some more halvings than there is room for."""
+    known = PROGRAM_REGISTRY["two-term"]
+
+    def coarse(self: Program, finer: Scene, *rest: Any, **named: Any) -> Trajectory:
+        run = whole(self, finer, *rest, **named)
+        return replace(run, omega=_exact(finer) + 1e5 * finer.step_size**2)
+
+    whole = Program.run
+    scene = _steps(5, 0.01, 20)
+    truth = reference(scene, scene.times())
+    monkeypatch.setattr(Program, "run", coarse)
+    monkeypatch.setattr(orders, "_HALVINGS", 0)
+    monkeypatch.setattr(orders, "_MOST_STEPS", 80)
+    assert measured_order(scene, known, corrected("two-term"), truth).state == "unsettled"
+    monkeypatch.setattr(orders, "_MOST_STEPS", 160)
+    assert measured_order(scene, known, corrected("two-term"), truth).state == "misses"
+
+
+def test_a_motion_whose_conditioning_is_unknown_is_not_judged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> Never:
+        raise InputError("too many nodes")
+
+    scene = case_scene(5)
+    listing = Listing("runge-kutta", frozenset({"stage-base"}))
+    truth = reference(scene, scene.times())
+    program = PROGRAM_REGISTRY["runge-kutta"]
+    assert measured_order(scene, program, listing, truth).state == "misses"
+    monkeypatch.setattr(orders, "conditioning", refuse)
+    assert measured_order(scene, program, listing, truth).state == "sensitive"
 
 
 def test_compare_tells_what_it_does_not_judge() -> None:

@@ -9,6 +9,7 @@ module scaled_motion
   integer, parameter, public :: MOST_WAVES = 8
   real(dp), parameter :: FAST = 8.0_dp       ! frequency of a wave over the rate of the motion
   real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that counts
+  real(dp), parameter :: SLOW = 1e-8_dp      ! rad; a wave that turns less is a line to rounding
   real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! of Simpson's rule, times radians**4
 
   type, public :: motion_t
@@ -26,12 +27,12 @@ module scaled_motion
     integer :: axes(3)       ! of the body
   end type motion_t
 
-  public :: average, integral, scaled, size_of, steps_for_waves, turned
+  public :: average, integral, reach_of, scaled, steps_for_waves, turned, versine
 
 contains
 
   pure subroutine scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         motion, status)
+                         t_end, motion, status)
     !! Unknowns in which every product has the coefficient 1 or -1, and -1 only the second.
     real(dp), intent(in) :: coefficients(3)
     real(dp), intent(in) :: m_constant(3)
@@ -40,6 +41,7 @@ contains
     real(dp), intent(in) :: sines(4, n_sines)
     integer, intent(in) :: n_cosines
     real(dp), intent(in) :: cosines(4, n_cosines)
+    real(dp), intent(in) :: t_end    !! s
     type(motion_t), intent(out) :: motion
     integer, intent(out) :: status
     real(dp) :: c(3)
@@ -67,26 +69,31 @@ contains
     motion%waves = 0
     motion%resolved = 0
     do i = 1, n_sines
-      call add_wave(sines(1:3, i), sines(4, i), .false., motion)
+      call add_wave(sines(1:3, i), sines(4, i), .false., t_end, motion)
     end do
     do i = 1, n_cosines
-      call add_wave(cosines(1:3, i), cosines(4, i), .true., motion)
+      call add_wave(cosines(1:3, i), cosines(4, i), .true., t_end, motion)
     end do
     status = COMPLETE
   end subroutine scaled
 
-  pure subroutine add_wave(amplitude, frequency, is_cosine, motion)
-    !! The integral of one more wave; waves of one frequency share their sine and cosine.
+  pure subroutine add_wave(amplitude, frequency, is_cosine, t_end, motion)
+    !! The integral of one more wave; waves of one frequency share their sine and versine.
     real(dp), intent(in) :: amplitude(3)  !! 1/s2
     real(dp), intent(in) :: frequency     !! rad/s
     logical, intent(in) :: is_cosine
+    real(dp), intent(in) :: t_end         !! s
     type(motion_t), intent(inout) :: motion
     real(dp) :: part(3)
     integer :: n
 
     part = amplitude(motion%axes)/motion%scale
-    if (abs(frequency) < 1e-100_dp) then
-      if (is_cosine) motion%slope = motion%slope + part
+    if (abs(frequency*t_end) < SLOW) then
+      if (is_cosine) then
+        motion%slope = motion%slope + part
+      else
+        motion%climb = motion%climb + part*frequency
+      end if
       return
     end if
     do n = 1, motion%waves
@@ -203,6 +210,27 @@ contains
     size_of = maxval(abs(motion%on_sine(:, n))) + maxval(abs(motion%on_versine(:, n)))
   end function size_of
 
+  pure real(dp) function reach_of(motion, n, t_end)
+    !! The most that the integral of wave n can be until t_end, 1/s.
+    type(motion_t), intent(in) :: motion
+    integer, intent(in) :: n
+    real(dp), intent(in) :: t_end        !! s
+    real(dp) :: angle                    ! rad
+
+    angle = abs(motion%frequency(n)*t_end)
+    reach_of = maxval(abs(motion%on_sine(:, n)))*min(2.0_dp, angle) &
+               + maxval(abs(motion%on_versine(:, n)))*min(2.0_dp, 0.5_dp*angle*angle)
+  end function reach_of
+
+  pure elemental real(dp) function versine(angle)
+    !! 1 - cosine, which would have no digit of it where the angle is small.
+    real(dp), intent(in) :: angle        !! rad
+    real(dp) :: sine                     ! of half the angle
+
+    sine = sin(0.5_dp*angle)
+    versine = 2.0_dp*sine*sine
+  end function versine
+
   pure function integral(motion, t) result(s)
     !! The whole torque's integral from 0 to t, in the unknowns.
     type(motion_t), intent(in) :: motion
@@ -213,7 +241,7 @@ contains
     s = t*(motion%slope + (0.5_dp*t)*motion%climb)
     do n = 1, motion%waves
       s = s + motion%on_sine(:, n)*sin(motion%frequency(n)*t) &
-          + motion%on_versine(:, n)*(1.0_dp - cos(motion%frequency(n)*t))
+          + motion%on_versine(:, n)*versine(motion%frequency(n)*t)
     end do
   end function integral
 

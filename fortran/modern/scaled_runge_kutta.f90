@@ -4,8 +4,8 @@ module scaled_runge_kutta
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use scaled_motion, only: average, integral, MOST_WAVES, motion_t, scaled, size_of, &
-                           steps_for_waves, turned
+  use scaled_motion, only: average, integral, MOST_WAVES, motion_t, reach_of, scaled, &
+                           steps_for_waves, turned, versine
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
   implicit none(type, external)
   private
@@ -86,7 +86,7 @@ contains
     result = omega
     if (n_sines + n_cosines > MOST_WAVES) return
     call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                motion, status)
+                t_end, motion, status)
     if (status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale
     rate_0 = max(abs(start(1)), abs(start(2)), abs(start(3)))
@@ -94,7 +94,7 @@ contains
     rate = rate + 0.5_dp*t_end*t_end*max(abs(motion%climb(1)), abs(motion%climb(2)), &
                                          abs(motion%climb(3)))
     do n = 1, motion%waves
-      rate = rate + size_of(motion, n)*min(2.0_dp, abs(motion%frequency(n)*t_end))
+      rate = rate + reach_of(motion, n, t_end)
     end do
     ! In radians, whose powers are numbers whatever the unit of time.
     turn_0 = rate_0*abs(t_end)
@@ -280,10 +280,10 @@ contains
     real(dp) :: whole_2, half_2, third_2, sixth_2  ! of the second unknown, with its sign
     real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, of longer steps
     real(dp) :: s(3, 0:8)    ! integral of the torque at halves of the steps
-    real(dp) :: sine(MOST_WAVES)
-    real(dp) :: cosine(MOST_WAVES)
-    real(dp) :: turn_sine(MOST_WAVES)
-    real(dp) :: turn_cosine(MOST_WAVES)
+    real(dp) :: sines(MOST_WAVES)        ! where the waves are
+    real(dp) :: versines(MOST_WAVES)
+    real(dp) :: turn_sines(MOST_WAVES)   ! of half a step
+    real(dp) :: turn_versines(MOST_WAVES)
     real(dp) :: h
     logical :: afresh
     integer :: begin
@@ -308,10 +308,10 @@ contains
     thirds = THIRD_PART*wholes
     sixths = 0.5_dp*thirds
     do n = 1, motion%resolved
-      turn_sine(n) = sin(0.5_dp*h*motion%frequency(n))
-      turn_cosine(n) = cos(0.5_dp*h*motion%frequency(n))
-      sine(n) = 0.0_dp
-      cosine(n) = 1.0_dp
+      turn_sines(n) = sin(0.5_dp*h*motion%frequency(n))
+      turn_versines(n) = versine(0.5_dp*h*motion%frequency(n))
+      sines(n) = 0.0_dp
+      versines(n) = 0.0_dp
     end do
     m1 = motion%push(1)
     m2 = motion%sign_2*motion%push(2)
@@ -330,8 +330,8 @@ contains
         afresh = mod(i, 2*EXACT_AGAIN) == 1
         s(:, 0) = s(:, 8)
         do n = 1, 8
-          call turn(motion, (2*(i - 1) + 0.5_dp*n)*h, afresh, turn_sine, turn_cosine, sine, &
-                    cosine, s(:, n))
+          call turn(motion, (2*(i - 1) + 0.5_dp*n)*h, afresh, turn_sines, turn_versines, sines, &
+                    versines, s(:, n))
         end do
       end if
       do k = 1, 1 + mod(i, 2)
@@ -408,30 +408,32 @@ contains
     if (motion%resolved < motion%waves) x = x + turned(motion, x + s(:, 8), t_end)
   end subroutine march_varying
 
-  pure subroutine turn(motion, t, afresh, turn_sine, turn_cosine, sine, cosine, s)
+  pure subroutine turn(motion, t, afresh, turn_sines, turn_versines, sines, versines, s)
     !! Waves half a step on, and the integral of the torque there.
     type(motion_t), intent(in) :: motion
-    real(dp), intent(in) :: t                        !! s
-    logical, intent(in) :: afresh                    !! from t, not from half a step before
-    real(dp), intent(in) :: turn_sine(MOST_WAVES)    !! of half a step
-    real(dp), intent(in) :: turn_cosine(MOST_WAVES)
-    real(dp), intent(inout) :: sine(MOST_WAVES)
-    real(dp), intent(inout) :: cosine(MOST_WAVES)
+    real(dp), intent(in) :: t                          !! s
+    logical, intent(in) :: afresh                      !! from t, not from half a step before
+    real(dp), intent(in) :: turn_sines(MOST_WAVES)     !! of half a step
+    real(dp), intent(in) :: turn_versines(MOST_WAVES)
+    real(dp), intent(inout) :: sines(MOST_WAVES)
+    real(dp), intent(inout) :: versines(MOST_WAVES)
     real(dp), intent(out) :: s(3)
+    real(dp) :: turn_cosine
     real(dp) :: held
     integer :: n
 
     s = motion%mean + t*(motion%slope + (0.5_dp*t)*motion%climb)
     do n = 1, motion%resolved
       if (afresh) then
-        sine(n) = sin(motion%frequency(n)*t)
-        cosine(n) = cos(motion%frequency(n)*t)
+        sines(n) = sin(motion%frequency(n)*t)
+        versines(n) = versine(motion%frequency(n)*t)
       else
-        held = sine(n)*turn_cosine(n) + cosine(n)*turn_sine(n)
-        cosine(n) = cosine(n)*turn_cosine(n) - sine(n)*turn_sine(n)
-        sine(n) = held
+        turn_cosine = 1.0_dp - turn_versines(n)
+        held = sines(n)*turn_cosine + (turn_sines(n) - versines(n)*turn_sines(n))
+        versines(n) = versines(n)*turn_cosine + (sines(n)*turn_sines(n) + turn_versines(n))
+        sines(n) = held
       end if
-      s = s + (motion%on_sine(:, n)*sine(n) + motion%on_versine(:, n)*(1.0_dp - cosine(n)))
+      s = s + (motion%on_sine(:, n)*sines(n) + motion%on_versine(:, n)*versines(n))
     end do
   end subroutine turn
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.errors import InputError
+from pyharness.linearised import growth, jacobians, propagators
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
 
 ROUNDING = 2.0**-53
 # Roundings in a right-hand side: two in each of A, B, C, two products, the sums.
 _ROUNDINGS = 8.0
-_HUGE = 1e100  # a factor beyond which none says more
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 50
 _MOST_NODES = 400_000
@@ -82,6 +82,26 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     omega, complete = _path(scene, times)
     if not complete:
         raise InputError(f"conditioning: the solution leaves every bound before t = {time:g} s")
+    return along(scene, times, omega)
+
+
+def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
+    """Follow the linearised flow along a solution that is known.
+
+    Parameters
+    ----------
+    scene : Scene
+        What it solves.
+    times : ndarray, shape (n,)
+        From 0 (s); omega turns by a small angle from each to the next.
+    omega : ndarray, shape (n, 3)
+        The solution there, rad/s.
+
+    Raises
+    ------
+    InputError
+        Where the flow amplifies beyond binary64.
+    """
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
     if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
@@ -121,15 +141,9 @@ def _nodes(scene: Scene, time: float) -> Array:
 
 def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     steps = np.diff(times)
-    middle = 0.5 * (omega[1:] + omega[:-1])
     largest = float(np.abs(omega).max()) or 1.0
-    # Between nodes the Jacobian hardly changes: its exponential is the propagator.
-    pieces = exponentials(steps[:, None, None] * jacobians(scene, middle))
-    propagators = np.empty((len(times), 3, 3))
-    propagators[-1] = np.eye(3)
-    for k in range(len(steps) - 1, -1, -1):
-        propagators[k] = np.clip(propagators[k + 1] @ pieces[k], -_HUGE, _HUGE)
-    sizes = np.abs(propagators)
+    flow = propagators(scene, times, omega)
+    sizes = np.abs(flow)
     source = magnitudes(scene, times, omega)
 
     def gathered(made: Array) -> Array:
@@ -141,29 +155,12 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
     return Conditioning(
-        amplification=float(max(1.0, sizes.sum(axis=2).max())),
+        amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
         storing=ROUNDING * float(gathered(np.abs(omega)).max()) / (span * largest),
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
     )
-
-
-def exponentials(small: Array) -> Array:
-    """Return the exponentials of matrices below 1 in norm, to seven digits."""
-    total = np.broadcast_to(np.eye(3), small.shape)
-    for k in range(8, 0, -1):
-        total = np.eye(3) + small @ total / k
-    return total
-
-
-def jacobians(scene: Scene, omega: Array) -> Array:
-    """Return the derivatives of equations 13-15 at each omega, shape (n, 3, 3)."""
-    a, b, c = scene.euler_coefficients
-    x, y, z = omega.T
-    zero = np.zeros(len(omega))
-    rows = [[zero, a * z, a * y], [b * z, zero, b * x], [c * y, c * x, zero]]
-    return np.array(rows).transpose(2, 0, 1)
 
 
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:

@@ -132,14 +132,15 @@ def _march(scene: Scene, times: Sequence[float], power: int, most_steps: int) ->
                 break
             length = max(1, int(length * 2.0 ** (-excess - 0.05)))
         if length == 1 < whole - begin:
-            break
+            raise InputError("integer series: omega leaves every bound")
         while len(rows) < len(times) and wanted[len(rows)] * whole <= begin + length:
             part = (wanted[len(rows)] * whole - begin) / length
             rows.append([_at(each, part) for each in terms[:3]])
         state = [sum(each) for each in terms]
         dense = powers @ (np.array([list(map(float, each)) for each in terms[:3]]) * 2.0**-BITS).T
         largest = max(largest, *map(abs, state[:3]), int(np.abs(dense).max() * 2.0**BITS))
-        way.append(np.ldexp(dense, power))
+        with np.errstate(over="ignore"):
+            way.append(np.ldexp(dense, power))
         nodes.append((begin + inside * length) / whole * times[-1])
         begin += length
         beside = largest.bit_length() - BITS
@@ -149,7 +150,10 @@ def _march(scene: Scene, times: Sequence[float], power: int, most_steps: int) ->
             if beside < -_BELOW and (largest or equations.acts) and power > _LEAST_POWER:
                 raise _OtherUnitError(beside)
             unit = Fraction(2) ** power
-            omega = np.array([[float(x * unit) for x in row] for row in rows])
+            try:
+                omega = np.array([[float(x * unit) for x in row] for row in rows])
+            except OverflowError:
+                raise InputError("integer series: omega is beyond binary64") from None
             return Path(np.array(times, dtype=float), omega, np.hstack(nodes), np.vstack(way))
         length = int(length * 2.0 ** min(1.0, -excess - 0.02)) or 1
     raise InputError(f"integer series: more than {most_steps} steps would be needed")

@@ -1,25 +1,41 @@
-"""`scipy.integrate.solve_ivp` as methods; SciPy is imported when one is used."""
+"""`scipy.integrate.solve_ivp` as methods; SciPy is imported when one is used.
+
+SciPy controls the error of a step, a tolerance here is on the error at the times asked for. A coarse
+run ahead (`look_ahead`) tells what lies between the two: the largest omega, to which both are
+relative; how far the motion goes, over which errors of steps add up; and how it multiplies them.
+"""
 
 import math
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from pyharness.errors import InputError, TimedError
+from pyharness.linearised import growth, propagators
 from pyharness.scene import Scene
-from pyharness.trajectory import Trajectory
+from pyharness.trajectory import Array, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
-# SciPy controls the error of a step, a tolerance here is on the error at the times asked for:
-# a thirtieth kept every method within it in all seven cases (tests/test_methods.py), which are
-# motions of a few radians. Errors of steps add up, so that longer motions get less a step; LSODA,
+# A thirtieth of the tolerance for a step kept every method within it in all seven cases
+# (tests/test_methods.py), which are motions of a few radians. Longer ones get less a step; LSODA,
 # which takes the most steps and whose errors are the nearest to what it is allowed, sooner.
 _STEP_SHARE = 1.0 / 30.0
-RADIANS = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 8.0}
+_RADIANS = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 8.0}
+# What a motion may make of a small difference before a step gets less.
+_GROWTH = 3.0
 # solve_ivp takes no smaller one.
 _FINEST_STEP = 7e-13 * _STEP_SHARE
+
+_COARSE = 1e-3
+# A scale that is so many times too large is no scale for a coarse run.
+_FAR = 4.0
+_MOST_GUESSES = 200
+_NODES_PER_RADIAN = 4.0
+_FEWEST_NODES, _MOST_NODES = 30, 20_000
 
 # A phase of so many radians has hardly a digit left in binary64. What still grows there is on
 # its way to infinity in finite time, and LSODA would never come back from it.
@@ -32,71 +48,63 @@ _RADAU_SHARE = 2
 _SHORTEST_SPAN = 2.0**-300
 
 
-def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
-    """Return the solver by a method of `solve_ivp`, with the scene's own right-hand side.
+@dataclass(frozen=True)
+class Ahead:
+    """What a scene makes of the errors of steps, as a coarse run sees it.
 
-    Its finest tolerance is for as many radians as `RADIANS` says; for more it grows with them.
+    Attributes
+    ----------
+    largest : float
+        Largest abs(omega) of any component from 0 to the end, rad/s.
+    radians : float
+        How far the motion goes: the largest coefficient times omega, summed over the time.
+    growth : float
+        Largest factor by which a small difference on the way reaches the end, at least 1.
     """
 
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        from scipy.integrate import solve_ivp
+    largest: float
+    radians: float
+    growth: float
 
+    def step_share(self, name: str) -> float:
+        """Return what of a tolerance a step may err, for a method of `solve_ivp`."""
+        share = _STEP_SHARE / max(1.0, self.radians / _RADIANS[name])
+        return share / max(1.0, self.growth / _GROWTH)
+
+    def finest(self, name: str) -> float:
+        """Return the smallest tolerance that a method of `solve_ivp` can meet."""
+        return _FINEST_STEP / self.step_share(name)
+
+
+def finest_tolerance(name: str, scene: Scene, time: float) -> float:
+    """Return the smallest tolerance that a method can meet from 0 to `time` (s).
+
+    `name` is one of the registry, as in ``"dop853"``; InputError where the motion is too long.
+    """
+    known = {each.lower(): each for each in _RADIANS}
+    return _Run(scene, time, known[name]).ahead().finest(known[name])
+
+
+def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
+    """Return the solver by a method of `solve_ivp`, with the scene's own right-hand side."""
+
+    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
         if times[-1] == 0.0:
             return rows_trajectory(times, np.array([scene.omega]), 0, 0, "complete")
-        largest = max(map(abs, scene.omega))
-        rate = max(map(abs, scene.euler_coefficients))
-        radians = rate * largest * abs(times[-1])
-        step_tolerance = tolerance * _STEP_SHARE
-        if radians > RADIANS[name]:
-            share = _STEP_SHARE * RADIANS[name] / radians
-            step_tolerance = max(_FINEST_STEP, tolerance * share)
-        unit = _unit(times[-1])
-        right_hand_side = _in_units(scene.right_hand_side(), unit)
-        evaluations = 0
-        waves = len(scene.torque.sines) + len(scene.torque.cosines)
-        most = _MOST_EVALUATIONS * 8 // (8 + waves)
-        if name == "Radau":
-            most //= _RADAU_SHARE
-
-        def counted(time: float, omega: Sequence[float]) -> list[float]:
-            nonlocal evaluations
-            evaluations += 1
-            if evaluations > most:
-                raise TimedError(
-                    f"{name} gave up at t = {{time}} s after {most} right-hand sides; take a "
-                    "shorter time or a larger tolerance",
-                    time * unit,
-                )
-            return right_hand_side(time, omega)
-
-        def phase_left(time: float, omega: Sequence[float]) -> float:
-            return _LARGEST_PHASE - rate * abs(time * unit) * max(map(abs, omega))
-
-        phase_left.terminal = True  # type: ignore[attr-defined]
-        # LSODA warns of what the rows that are missing say already.
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
-            try:
-                result = solve_ivp(
-                    counted,
-                    (0.0, times[-1] / unit),
-                    scene.omega,
-                    method=name,
-                    t_eval=[time / unit for time in times],
-                    events=phase_left,
-                    rtol=step_tolerance,
-                    atol=step_tolerance * (largest or 1.0),
-                )
-            except InputError:
-                raise
-            except (ValueError, ArithmeticError) as error:
-                # Radau's linear algebra refuses what has left the range of numbers.
-                if "infs or NaNs" in str(error):
-                    rows = np.empty((0, 3))
-                    return rows_trajectory([], rows, evaluations, len(times), "overflow")
+        run = _Run(scene, times[-1], name)
+        try:
+            ahead = run.ahead()
+            finest = ahead.finest(name)
+            if tolerance < finest * (1.0 - 1e-9):
                 raise InputError(
-                    f"{name} gave up: {error}; take a shorter time, slower motion or smaller "
-                    "torques"
-                ) from None
+                    f"tolerance is {tolerance:g}; {name} can't meet it over {ahead.radians:.3g} "
+                    f"radians in which small differences grow {ahead.growth:.3g} times; allowed "
+                    f"for this motion: {finest * 1.01:.2g} to 1, or a shorter time"
+                )
+            step = max(_FINEST_STEP, tolerance * ahead.step_share(name))
+            result = run.solved(name, step, step * ahead.largest, times)
+        except _NoNumberError:
+            return rows_trajectory([], np.empty((0, 3)), run.evaluations, len(times), "overflow")
         rows = result.y.T if len(result.t) else np.empty((0, 3))
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
@@ -105,6 +113,120 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
         return rows_trajectory(times[:count], rows[:count], int(result.nfev), len(times), ended)
 
     return solve
+
+
+class _NoNumberError(Exception):
+    """Linear algebra met what has left the range of numbers."""
+
+
+@dataclass
+class _Run:
+    """Calls of `solve_ivp` for one scene and time; all their right-hand sides are counted."""
+
+    scene: Scene
+    end: float
+    name: str
+    evaluations: int = 0
+    unit: float = field(init=False)
+    rate: float = field(init=False)
+    most: int = field(init=False)
+    slopes: RightHandSide = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.unit = _unit(self.end)
+        self.rate = max(map(abs, self.scene.euler_coefficients))
+        self.slopes = _in_units(self.scene.right_hand_side(), self.unit)
+        waves = len(self.scene.torque.sines) + len(self.scene.torque.cosines)
+        self.most = _MOST_EVALUATIONS * 8 // (8 + waves)
+        if self.name == "Radau":
+            self.most //= _RADAU_SHARE
+
+    def solved(
+        self, name: str, relative: float, absolute: float, times: Sequence[float] | None = None
+    ) -> Any:
+        """Return what `solve_ivp` finds at `times`; with its dense output where none are given."""
+        from scipy.integrate import solve_ivp
+
+        def phase_left(time: float, omega: Sequence[float]) -> float:
+            return _LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, omega))
+
+        phase_left.terminal = True  # type: ignore[attr-defined]
+        # LSODA warns of what the rows that are missing say already.
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            try:
+                return solve_ivp(
+                    self._counted,
+                    (0.0, self.end / self.unit),
+                    self.scene.omega,
+                    method=name,
+                    t_eval=None if times is None else [time / self.unit for time in times],
+                    dense_output=times is None,
+                    events=phase_left,
+                    rtol=relative,
+                    atol=absolute,
+                )
+            except InputError:
+                raise
+            except (ValueError, ArithmeticError) as error:
+                # Radau's linear algebra refuses what has left the range of numbers.
+                if "infs or NaNs" in str(error):
+                    raise _NoNumberError from None
+                raise InputError(
+                    f"{self.name} gave up: {error}; take a shorter time, slower motion or smaller "
+                    "torques"
+                ) from None
+
+    def _counted(self, time: float, omega: Sequence[float]) -> list[float]:
+        self.evaluations += 1
+        if self.evaluations > self.most:
+            raise TimedError(
+                f"{self.name} gave up at t = {{time}} s after {self.most} right-hand sides; take a "
+                "shorter time or a larger tolerance",
+                time * self.unit,
+            )
+        return self.slopes(time, omega)
+
+    def ahead(self) -> Ahead:
+        """Look ahead in a coarse run, whose own scale is found on the way."""
+        scale = _first_scale(self.scene, self.end)
+        if scale == 0.0:
+            return Ahead(0.0, 0.0, 1.0)
+        for _ in range(_MOST_GUESSES):
+            coarse = self.solved("RK45", _COARSE, _COARSE * scale)
+            largest = _largest(coarse.y)
+            if not 0.0 < largest < scale / _FAR:
+                break
+            scale = largest
+        length = abs(float(coarse.t[-1]) * self.unit)
+        count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
+        times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))
+        omega = np.nan_to_num(coarse.sol(times).T)
+        sizes = np.abs(omega).max(axis=1)
+        radians = self.rate * length * float(np.mean(sizes))
+        with np.errstate(all="ignore"):
+            flow = propagators(self.scene, times * self.unit, omega)
+        return Ahead(max(largest, float(sizes.max())), radians, growth(np.nan_to_num(flow)))
+
+
+def _largest(omega: Array) -> float:
+    return float(np.nan_to_num(np.abs(omega), nan=0.0, posinf=0.0).max(initial=0.0))
+
+
+def _first_scale(scene: Scene, time: float) -> float:
+    """Return the largest omega at the start, or where that is 0 what torque alone may give it."""
+    if any(scene.omega):
+        return max(map(abs, scene.omega))
+    law, span = scene.torque, abs(time)
+    found = 0.0
+    for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
+        total = abs(law.constant[axis]) * span + 0.5 * abs(law.rate[axis]) * span * span
+        for amplitude, frequency in law.sines:
+            f = abs(frequency)
+            total += abs(amplitude[axis]) * span * min(0.5 * f * span, 2.0 / max(f * span, 1.0))
+        for amplitude, frequency in law.cosines:
+            total += abs(amplitude[axis]) * span * min(1.0, 1.0 / max(abs(frequency) * span, 1.0))
+        found = max(found, total / moment)
+    return found if math.isfinite(found) else 1.0
 
 
 def _unit(span: float) -> float:

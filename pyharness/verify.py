@@ -29,8 +29,9 @@ from pyharness.errors import InputError
 from pyharness.external import external_checks, problems
 from pyharness.golden import golden
 from pyharness.selection import Selection, replay
-from pyharness.verify_methods import methods, orders, prepared, random_methods
+from pyharness.verify_methods import methods, orders, prepared
 from pyharness.verify_programs import cells, random_programs
+from pyharness.verify_random import random_methods
 from pyharness.verify_schemes import schemes
 from pyharness.verify_stops import stops
 

@@ -16,7 +16,6 @@ from pyharness.listing import PROGRAMS, corrected
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
 from pyharness.orders import ORDER_SLACK, Order, measured_order, order_of
 from pyharness.plan import closed_form
-from pyharness.random_scenes import Draw, draw
 from pyharness.reference import Reference, reference
 from pyharness.scene import Scene
 from pyharness.scene_file import case_numbers, case_scene
@@ -34,12 +33,8 @@ _FINEST_QUICK = 1e-7
 # The truth that solve_ivp gives is asked for as finely as it goes.
 _GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
 _IVP, _IVP_TOLERANCE = "dop853", 7e-13
-# A method is tried in every so many of the random draws: the truth costs a tenth of a second.
-_EVERY = 3
 # Halvings in which an order has to show, one after another.
 _PAIRS = 4
-# Random scenes that may run away, or be too fast for any truth and any series.
-_MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,57 +141,6 @@ def orders(chosen: Selection) -> Iterator[Check]:
 
 
 _ORDERED = (*PROGRAMS, *FIXED_STEP)
-
-
-def random_methods(chosen: Selection) -> Iterator[Check]:
-    """Hold methods against the reference in scenes drawn from the seed.
-
-    Half of them are nasty: the limit grants what the flow amplifies.
-    """
-    for number in range(0, chosen.draws, _EVERY):
-        if not chosen.may_ask(f"random/{number}"):
-            continue
-        drawn = draw(chosen.seed, number)
-        names = [name for name in _random_names(drawn) if chosen.asks(f"random/{number}/{name}")]
-        if names:
-            yield from _random(chosen, drawn, number, names)
-
-
-def _random_names(drawn: Draw) -> list[str]:
-    names = ["auto", "taylor", f"gauss-{drawn.stages}", "prepared", "quick"]
-    return [*names, "closed-form"] if closed_form(drawn.scene) else names
-
-
-def _random(chosen: Selection, drawn: Draw, number: int, names: Sequence[str]) -> Iterator[Check]:
-    scene = drawn.scene
-    time = scene.step_size * scene.steps * (-1.0 if drawn.backward else 1.0)
-    try:
-        standard = _standard(scene, (time,), amplified=True)
-    except InputError as refusal:
-        # Nothing to hold it against: a run-away, or too fast a motion for any truth. The path that
-        # limits follow is a method's own: in an ordinary scene it is the method that failed.
-        id = f"random/{number}/no-truth"
-        again = chosen.replay_of_draw(f"random/{number}")
-        yield Check(id, scene.name in _MAY_REFUSE, None, None, again, f"{scene.name}: {refusal}")
-        return
-    for name in names:
-        id = f"random/{number}/{name}"
-        again = chosen.replay_of_draw(id)
-        if name == "prepared":
-            tolerance = drawn.tolerance
-            yield _held_prepared(id, again, scene, "auto", tolerance, standard)
-        elif name == "quick":
-            tolerance = max(drawn.tolerance, _FINEST_QUICK)
-            yield _held_prepared(id, again, scene, name, tolerance, standard, is_hard=True)
-        else:
-            tolerance = max(drawn.tolerance, METHODS[name].finest)
-            found = _held(id, again, scene, name, tolerance, standard)
-            # A series or a collocation may say that it would take too long for such a scene; the
-            # choice of a method for a scene, and a closed form, may not.
-            is_free = name not in ("auto", "closed-form") and scene.name in _MAY_REFUSE
-            if found.note.startswith(REFUSED) and is_free:
-                found = described(id, None, again, found.note)
-            yield found
 
 
 def _standard(scene: Scene, times: Sequence[float], amplified: bool = False) -> Standard:

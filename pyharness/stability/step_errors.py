@@ -10,13 +10,8 @@ from functools import cache
 
 import numpy as np
 
-from pyharness.conditioning import (
-    ROUNDING,
-    Conditioning,
-    conditioning,
-    exponentials,
-    jacobians,
-)
+from pyharness.conditioning import ROUNDING, Conditioning, conditioning
+from pyharness.linearised import jacobians, propagators
 from pyharness.scene import Scene
 from pyharness.stability.collocation_matrices import PARTS, singular_below, solver_roundings
 from pyharness.stability.schemes import FIXED_STEP, TERMS, collocation_singular, local_error
@@ -113,14 +108,8 @@ def path(scene: Scene, time: float) -> Path:
         if count >= min(wanted, _MOST_NODES):
             break
         count = min(wanted, _MOST_NODES)
-    middle = 0.5 * (omega[1:] + omega[:-1])
-    pieces = exponentials(np.diff(times)[:, None, None] * jacobians(scene, middle))
-    propagators = np.empty((len(times), 3, 3))
-    propagators[-1] = np.eye(3)
-    for k in range(len(pieces) - 1, -1, -1):
-        propagators[k] = propagators[k + 1] @ pieces[k]
     turned = float(np.trapezoid(speeds, times))
-    return Path(scene, times, omega, propagators, flow, turned, float(speeds.max()))
+    return Path(scene, times, omega, propagators(scene, times, omega), flow, turned, float(speeds.max()))
 
 
 class Forecaster:

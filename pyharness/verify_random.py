@@ -1,0 +1,170 @@
+"""Methods in scenes drawn from a seed, by every entrance, against the second reference.
+
+A tolerance is on the error at the times asked for, relative to the largest omega from 0 to the last of
+them. Where small differences grow K times on the way, rounding alone makes 1e-15 K of it.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pyharness.checks import REFUSED, Check, bounded, described
+from pyharness.conditioning import along
+from pyharness.errors import InputError
+from pyharness.integer_series import integer_series
+from pyharness.methods import METHODS, SCIPY_METHODS, solve
+from pyharness.plan import closed_form
+from pyharness.random_scenes import Draw, draw
+from pyharness.selection import Selection
+from pyharness.solver import prepare
+from pyharness.trajectory import Array
+
+# Methods of Python and decimals are tried in every so many draws, compiled ones in all.
+_EVERY_SLOW = 20
+_FINEST_QUICK = 1e-7
+_ROUNDING = 2e-15
+# Up to such a growth of small differences a tolerance is kept as it stands; up to the second one by
+# all but the series, which finds out how they grow while it is on its way.
+_CALM, _LIVELY = 10.0, 1e3
+_SERIES = ("auto", "taylor")
+# Random scenes that may run away, or be too fast for any truth and any series.
+_MAY_REFUSE = ("extreme", "coefficients", "violent torque")
+_EARLIER = 0.4  # of the last time: rows on the way are held to it too
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The second reference in one draw.
+
+    Attributes
+    ----------
+    times : list of float
+        s.
+    omega : ndarray, shape (n, 3)
+        rad/s.
+    largest : float
+        Largest abs(omega) of any component from 0 to the last time, rad/s.
+    growth : float
+        Largest factor by which a small difference on the way reaches the end.
+    """
+
+    times: list[float]
+    omega: Array
+    largest: float
+    growth: float
+
+    def error(self, omega: Array) -> float:
+        """Return the largest error of rows, relative to the largest omega; NaN where one is."""
+        difference = float(np.abs(omega - self.omega[-len(omega) :]).max())
+        if self.largest == 0.0:
+            return 0.0 if difference == 0.0 else math.inf
+        return difference / self.largest
+
+    def limit(self, method: str, tolerance: float) -> float:
+        """Return the largest error that a method may have."""
+        bent = self.growth >= (_CALM if method in _SERIES else _LIVELY)
+        return tolerance * (self.growth if bent else 1.0) + _ROUNDING * self.growth
+
+
+def truth_of(drawn: Draw) -> Truth:
+    """Return the truth of a draw; InputError where there is none."""
+    times = [_EARLIER * drawn.time, drawn.time]
+    path = integer_series(drawn.scene, times)
+    largest = float(max(np.abs(path.way).max(), np.abs(path.omega).max()))
+    growth = along(drawn.scene, path.nodes, path.way).amplification
+    return Truth(times, path.omega, largest, growth)
+
+
+def entrances(drawn: Draw, number: int) -> dict[str, Callable[[Draw, Truth], "Answer"]]:
+    """Return the entrances that are tried in a draw, by the name that their check has."""
+    has_form = closed_form(drawn.scene) is not None
+    forms = ["closed-form"] if has_form else []
+    names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
+    if number % _EVERY_SLOW < 2:
+        names += [*SCIPY_METHODS, "reference"]
+    found = {f"solve-{name}": _solved(name) for name in names}
+    return found | {f"prepare-{name}": _prepared(name) for name in ["auto", "taylor", "quick", *forms]}
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What an entrance gave: rows for the last of the times, or the reason why there are none."""
+
+    method: str
+    tolerance: float
+    omega: Array | None
+    why: str = ""
+
+
+def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
+    def answer(drawn: Draw, truth: Truth) -> Answer:
+        tolerance = drawn.tolerance(METHODS[name].finest)
+        try:
+            run = solve(drawn.scene, truth.times, name, tolerance)
+        except InputError as refusal:
+            return Answer(name, tolerance, None, f"{REFUSED}{refusal}")
+        if run.ended != "complete" or run.time.tolist() != truth.times:
+            return Answer(name, tolerance, None, f"{run.ended}, other times than asked for")
+        return Answer(name, tolerance, run.omega)
+
+    return answer
+
+
+def _prepared(name: str) -> Callable[[Draw, Truth], Answer]:
+    def answer(drawn: Draw, truth: Truth) -> Answer:
+        finest = _FINEST_QUICK if name == "quick" else METHODS[name].finest
+        tolerance = drawn.tolerance(finest)
+        solver = prepare(drawn.scene, name, tolerance)
+        start, t_end = np.array(drawn.scene.omega), truth.times[-1]
+        # Another start before it: nothing of that may be left.
+        solver(start[::-1].copy(), 0.5 * t_end)
+        found = solver(start, t_end)
+        if solver.status != "complete":
+            return Answer(name, tolerance, None, f"{REFUSED}{solver.status}")
+        return Answer(name, tolerance, found[None, :].copy())
+
+    return answer
+
+
+def random_methods(chosen: Selection) -> Iterator[Check]:
+    """Hold every entrance to the second reference in scenes drawn from the seed."""
+    for number in range(chosen.draws):
+        if not chosen.may_ask(f"random/{number}"):
+            continue
+        drawn = draw(chosen.seed, number)
+        asked = {
+            f"random/{number}/{name}": entrance
+            for name, entrance in entrances(drawn, number).items()
+            if chosen.asks(f"random/{number}/{name}")
+        }
+        if not asked:
+            continue
+        try:
+            truth = truth_of(drawn)
+        except InputError as refusal:
+            # Nothing to hold it against: a run-away, or too fast a motion for any truth.
+            id = f"random/{number}/no-truth"
+            again = chosen.replay_of_draw(f"random/{number}")
+            may = drawn.scene.name in _MAY_REFUSE
+            yield Check(id, may, None, None, again, f"{drawn.scene.name}: {refusal}")
+            continue
+        for id, entrance in asked.items():
+            yield _held(id, chosen.replay_of_draw(id), drawn, truth, entrance(drawn, truth))
+
+
+def _held(id: str, again: str, drawn: Draw, truth: Truth, answer: Answer) -> Check:
+    """Return the check that an answer is as near to the truth as it has to be."""
+    if answer.omega is not None:
+        limit = truth.limit(answer.method, answer.tolerance)
+        return bounded(id, truth.error(answer.omega), limit, again, drawn.scene.name)
+    if not answer.why.startswith(REFUSED):
+        return Check(id, False, None, None, again, answer.why)
+    # The choice of a method for a scene may not refuse, a closed form neither. The others may say
+    # that such a scene would take too long, or that rounding leaves too few digits.
+    free = drawn.scene.name in _MAY_REFUSE or truth.growth > _CALM
+    may = answer.method not in ("auto", "closed-form") and (free or answer.method == "quick" or answer.method in SCIPY_METHODS)
+    if may:
+        return described(id, None, again, answer.why)
+    return Check(id, False, None, None, again, answer.why)

@@ -10,7 +10,7 @@ from pyharness.errors import InputError, TimedError, unknown
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scaling import factor_near_one, scaled, unscaled
 from pyharness.scene import Scene
-from pyharness.scipy_methods import rows_trajectory, scipy_method
+from pyharness.scipy_methods import FINEST, rows_trajectory, scipy_method
 from pyharness.trajectory import Trajectory
 
 IMPLEMENTATIONS = ("fortran", "python")
@@ -249,28 +249,28 @@ METHODS = {
             "dop853",
             "Runge-Kutta 8(5,3)",
             "scipy.integrate.solve_ivp; Hairer, Norsett and Wanner 1993, II.5",
-            7e-13,
+            FINEST["DOP853"],
             scipy_method("DOP853"),
         ),
         Method(
             "rk45",
             "Runge-Kutta 5(4)",
             "scipy.integrate.solve_ivp; Dormand and Prince 1980",
-            7e-13,
+            FINEST["RK45"],
             scipy_method("RK45"),
         ),
         Method(
             "lsoda",
             "Adams and BDF with switching",
             "scipy.integrate.solve_ivp; Petzold 1983",
-            7e-13,
+            FINEST["LSODA"],
             scipy_method("LSODA"),
         ),
         Method(
             "radau",
             "implicit Runge-Kutta of order 5",
             "scipy.integrate.solve_ivp; Hairer and Wanner 1996, IV.8",
-            7e-13,
+            FINEST["Radau"],
             scipy_method("Radau"),
         ),
         Method(

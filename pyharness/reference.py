@@ -180,8 +180,9 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
         total = Decimal(torque.constant[axis]) * t + Decimal(torque.rate[axis]) * t * t / 2
         for amplitude, frequency in torque.sines:
             if frequency:
-                _, cosine = sine_cosine(Decimal(frequency) * t)
-                total += Decimal(amplitude[axis]) * (1 - cosine) / Decimal(frequency)
+                # 1 - cosine would have few digits where the angle is small.
+                sine, _ = sine_cosine(Decimal(frequency) * t / 2)
+                total += Decimal(amplitude[axis]) * 2 * sine * sine / Decimal(frequency)
         for amplitude, frequency in torque.cosines:
             sine, _ = sine_cosine(Decimal(frequency) * t)
             rate = Decimal(frequency)
@@ -205,9 +206,8 @@ def _series(
     rows: list[Row] = []
     for step in range(most_steps):
         coefficients = equations.expand(begin, state, order)
-        scale = max(map(abs, state[:3])) or Decimal(1)
         rest = abs(times[-1] - begin)
-        length = _step(coefficients, scale * tolerance, rest).copy_sign(times[-1])
+        length = _step(coefficients, tolerance, rest).copy_sign(times[-1])
         if begin + length == begin and rest:
             return rows
         if step == 0 and rest > 10 * most_steps * abs(length):
@@ -224,17 +224,30 @@ def _series(
     )
 
 
-def _step(coefficients: list[Row], allowed: Decimal, rest: Decimal) -> Decimal:
-    """Return the step for which the last two terms of every series stay below `allowed`."""
+def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal) -> Decimal:
+    """Return the step for which the last two terms of every series are small beside omega.
+
+    Of a body at rest, beside what the first terms make of it until then.
+    """
     order = len(coefficients[0]) - 1
+    begun = next((j for j in range(order - 1) if _size(coefficients, j, 3)), None)
     length = rest
     for k in (order - 1, order):
-        size = max(abs(series[k]) for series in coefficients)
-        if size:
-            # The root needs few digits; the exponent range is Decimal's.
-            step = ((allowed / size).ln() / k).exp()
-            length = min(length, step)
+        size = _size(coefficients, k)
+        if size and begun is not None:
+            lengths = [
+                # The root needs few digits; the exponent range is Decimal's.
+                ((tolerance * before / size).ln() / (k - j)).exp()
+                for j in range(begun, 1 if begun == 0 else begun + 4)
+                if (before := _size(coefficients, j, 3))
+            ]
+            length = min(length, max(lengths))
     return length
+
+
+def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
+    """Return the largest coefficient k of the first so many unknowns, of all by default."""
+    return max(abs(series[k]) for series in coefficients[:unknowns])
 
 
 def _evaluate(coefficients: list[Row], t: Decimal) -> Row:

@@ -21,14 +21,18 @@ from pyharness.trajectory import Array, Trajectory
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 # A thirtieth of the tolerance for a step kept every method within it in all seven cases
-# (tests/test_methods.py), which are motions of a few radians. Longer ones get less a step; LSODA,
-# which takes the most steps and whose errors are the nearest to what it is allowed, sooner.
-_STEP_SHARE = 1.0 / 30.0
+# (tests/test_methods.py), which are motions of a few radians. Longer ones get less a step. LSODA,
+# which takes the most steps and whose errors are the nearest to what it is allowed, gets a third.
+_STEP_SHARE = {"DOP853": 1.0 / 30.0, "RK45": 1.0 / 30.0, "Radau": 1.0 / 30.0, "LSODA": 1.0 / 90.0}
 _RADIANS = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 8.0}
 # What a motion may make of a small difference before a step gets less.
-_GROWTH = 3.0
+_GROWTH = 2.0
+# Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
+# place takes it for a constant torque, however small the differences that it sees.
+_WAVE_STEP = 2.0
 # solve_ivp takes no smaller one.
-_FINEST_STEP = 7e-13 * _STEP_SHARE
+_FINEST_STEP = 7e-13 / 30.0
+FINEST = {name: _FINEST_STEP / share for name, share in _STEP_SHARE.items()}
 
 _COARSE = 1e-3
 # A scale that is so many times too large is no scale for a coarse run.
@@ -57,7 +61,8 @@ class Ahead:
     largest : float
         Largest abs(omega) of any component from 0 to the end, rad/s.
     radians : float
-        How far the motion goes: the largest coefficient times omega, summed over the time.
+        How far the motion goes: the largest coefficient times omega, summed over the time; and the
+        waves of the torque, as far as they move it.
     growth : float
         Largest factor by which a small difference on the way reaches the end, at least 1.
     """
@@ -68,7 +73,7 @@ class Ahead:
 
     def step_share(self, name: str) -> float:
         """Return what of a tolerance a step may err, for a method of `solve_ivp`."""
-        share = _STEP_SHARE / max(1.0, self.radians / _RADIANS[name])
+        share = _STEP_SHARE[name] / max(1.0, self.radians / _RADIANS[name])
         return share / max(1.0, self.growth / _GROWTH)
 
     def finest(self, name: str) -> float:
@@ -102,7 +107,8 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
                     f"for this motion: {finest * 1.01:.2g} to 1, or a shorter time"
                 )
             step = max(_FINEST_STEP, tolerance * ahead.step_share(name))
-            result = run.solved(name, step, step * ahead.largest, times)
+            longest = _longest_step(scene, times[-1], step * ahead.largest)
+            result = run.solved(name, step, step * ahead.largest, times, longest)
         except _NoNumberError:
             return rows_trajectory([], np.empty((0, 3)), run.evaluations, len(times), "overflow")
         rows = result.y.T if len(result.t) else np.empty((0, 3))
@@ -142,7 +148,12 @@ class _Run:
             self.most //= _RADAU_SHARE
 
     def solved(
-        self, name: str, relative: float, absolute: float, times: Sequence[float] | None = None
+        self,
+        name: str,
+        relative: float,
+        absolute: float,
+        times: Sequence[float] | None = None,
+        longest: float = math.inf,
     ) -> Any:
         """Return what `solve_ivp` finds at `times`; with its dense output where none are given."""
         from scipy.integrate import solve_ivp
@@ -164,6 +175,7 @@ class _Run:
                     events=phase_left,
                     rtol=relative,
                     atol=absolute,
+                    max_step=longest / self.unit,
                 )
             except InputError:
                 raise
@@ -202,10 +214,11 @@ class _Run:
         times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))
         omega = np.nan_to_num(coarse.sol(times).T)
         sizes = np.abs(omega).max(axis=1)
-        radians = self.rate * length * float(np.mean(sizes))
+        largest = max(largest, float(sizes.max()))
+        radians = self.rate * length * float(np.mean(sizes)) + _turned(self.scene, length, largest)
         with np.errstate(all="ignore"):
             flow = propagators(self.scene, times * self.unit, omega)
-        return Ahead(max(largest, float(sizes.max())), radians, growth(np.nan_to_num(flow)))
+        return Ahead(largest, radians, growth(np.nan_to_num(flow)))
 
 
 def _largest(omega: Array) -> float:
@@ -227,6 +240,28 @@ def _first_scale(scene: Scene, time: float) -> float:
             total += abs(amplitude[axis]) * span * min(1.0, 1.0 / max(abs(frequency) * span, 1.0))
         found = max(found, total / moment)
     return found if math.isfinite(found) else 1.0
+
+
+def _longest_step(scene: Scene, time: float, allowed: float) -> float:
+    """Return the step (s) that no wave outruns which over the whole time would count."""
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    frequencies = [
+        abs(frequency)
+        for amplitude, frequency in scene.torque.sines + scene.torque.cosines
+        if any(abs(a) / i * abs(time) > allowed for a, i in zip(amplitude, moments, strict=True))
+    ]
+    fastest = max(frequencies, default=0.0)
+    return _WAVE_STEP / fastest if fastest > 0.0 else math.inf
+
+
+def _turned(scene: Scene, span: float, largest: float) -> float:
+    """Return the radians by which waves turn, each as far as it moves a body of so large an omega."""
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    found = 0.0
+    for amplitude, frequency in scene.torque.sines + scene.torque.cosines:
+        push = max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True))
+        found += min(abs(frequency) * span, push * span / largest if largest > 0.0 else 0.0)
+    return found
 
 
 def _unit(span: float) -> float:

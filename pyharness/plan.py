@@ -6,6 +6,7 @@ from pyharness.errors import InputError
 from pyharness.scene import Scene
 
 FINEST = 1e-15  # relative; below it a tolerance asks for more digits than binary64 has
+FINEST_QUICK = 1e-12  # below it the rounding of its many steps would count, which it does not see
 # For few digits Runge-Kutta takes fewer operations than a series; which, the kernel decides.
 EITHER = "quick or taylor"
 _FEW_DIGITS = 1e-7  # below it never, so that it is not asked
@@ -83,8 +84,10 @@ def plan(
     InputError
         Where the method can't take the scene, or the tolerance is out of range.
     """
-    if not FINEST <= tolerance <= 1.0:
-        raise InputError(f"tolerance is {tolerance:g}; allowed: {FINEST:g} to 1")
+    finest = FINEST_QUICK if method == "quick" else FINEST
+    if not finest <= tolerance <= 1.0:
+        place = " for quick" if method == "quick" else ""
+        raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
     form = closed_form(scene)
     if method == "auto":
         few_digits = tolerance >= (_WAVES_DIGITS if scene.torque.varies else _FEW_DIGITS)

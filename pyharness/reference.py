@@ -107,7 +107,9 @@ def reference(
         exact = [Decimal(t) for t in times]
         known = known_solution(scene, exact)
         if known is not None and not velocity:
-            return _rounded(times, known, None, "known solution", Decimal(1).scaleb(3 - DIGITS))
+            largest = max(abs(x) for row in known for x in (*row, *map(Decimal, scene.omega)))
+            estimate = min(Decimal(1), largest).scaleb(3 - DIGITS)
+            return _rounded(times, known, None, "known solution", estimate)
         coarse, fine = _PRECISE if precise else _QUICK
         first = _series(scene, exact, False, *coarse, most_steps)
         second = _series(scene, exact, velocity, *fine, most_steps)

@@ -55,7 +55,9 @@ def factor_near_one(scene: Scene, time: float) -> float:
     law = scene.torque
     moments = scene.moments or (1.0, 1.0, 1.0)
     for axis, moment in enumerate(moments):
-        waves = sum(abs(a[axis]) for a, _ in law.sines + law.cosines)
+        # A slow sine never comes to its amplitude.
+        waves = sum(abs(a[axis]) * min(1.0, abs(f * time)) for a, f in law.sines)
+        waves += sum(abs(a[axis]) for a, _ in law.cosines)
         push = abs(law.constant[axis]) + abs(law.rate[axis] * time) + waves
         # What the torque gives it counts like what it has.
         largest = max(largest, push / moment * abs(time))

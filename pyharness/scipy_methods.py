@@ -20,19 +20,17 @@ from pyharness.trajectory import Array, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
-# A thirtieth of the tolerance for a step kept every method within it in all seven cases
-# (tests/test_methods.py), which are motions of a few radians. Longer ones get less a step. LSODA,
-# which takes the most steps and whose errors are the nearest to what it is allowed, gets a third.
-_STEP_SHARE = {"DOP853": 1.0 / 30.0, "RK45": 1.0 / 30.0, "Radau": 1.0 / 30.0, "LSODA": 1.0 / 90.0}
-_RADIANS = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 8.0}
-# What a motion may make of a small difference before a step gets less.
-_GROWTH = 2.0
+# What errors of steps add up to until the end, in those of one step, at the most: so much in a motion
+# of a few radians, and so much more for each radian and for each factor by which a difference grows.
+# Measured on random scenes (docs/stability.md has the table), with half as much again.
+_SUM = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 90.0}
+_SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 0.6}
 # Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
 # place takes it for a constant torque, however small the differences that it sees.
 _WAVE_STEP = 2.0
 # solve_ivp takes no smaller one.
 _FINEST_STEP = 7e-13 / 30.0
-FINEST = {name: _FINEST_STEP / share for name, share in _STEP_SHARE.items()}
+FINEST = {name: _FINEST_STEP * total for name, total in _SUM.items()}
 
 _COARSE = 1e-3
 # A scale that is so many times too large is no scale for a coarse run.
@@ -71,14 +69,13 @@ class Ahead:
     radians: float
     growth: float
 
-    def step_share(self, name: str) -> float:
-        """Return what of a tolerance a step may err, for a method of `solve_ivp`."""
-        share = _STEP_SHARE[name] / max(1.0, self.radians / _RADIANS[name])
-        return share / max(1.0, self.growth / _GROWTH)
+    def steps_sum(self, name: str) -> float:
+        """Return what errors of steps add up to, in those of one step, for a method of SciPy."""
+        return _SUM[name] + _SUM_A_RADIAN[name] * self.radians * self.growth
 
     def finest(self, name: str) -> float:
-        """Return the smallest tolerance that a method of `solve_ivp` can meet."""
-        return _FINEST_STEP / self.step_share(name)
+        """Return the smallest tolerance that a method of SciPy can meet."""
+        return _FINEST_STEP * self.steps_sum(name)
 
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
@@ -106,7 +103,7 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
                     f"radians in which small differences grow {ahead.growth:.3g} times; allowed "
                     f"for this motion: {finest * 1.01:.2g} to 1, or a shorter time"
                 )
-            step = max(_FINEST_STEP, tolerance * ahead.step_share(name))
+            step = max(_FINEST_STEP, tolerance / ahead.steps_sum(name))
             longest = _longest_step(scene, times[-1], step * ahead.largest)
             result = run.solved(name, step, step * ahead.largest, times, longest)
         except _NoNumberError:
@@ -199,7 +196,10 @@ class _Run:
         return self.slopes(time, omega)
 
     def ahead(self) -> Ahead:
-        """Look ahead in a coarse run, whose own scale is found on the way."""
+        """Look ahead in a coarse run, whose own scale is found on the way.
+
+        Where omega leaves every bound the start is the scale, and nothing is known of the rest.
+        """
         scale = _first_scale(self.scene, self.end)
         if scale == 0.0:
             return Ahead(0.0, 0.0, 1.0)
@@ -209,6 +209,9 @@ class _Run:
             if not 0.0 < largest < scale / _FAR:
                 break
             scale = largest
+        if coarse.status != 0 or not math.isfinite(largest):
+            # It leaves every bound, or loses its phase: no tolerance is met to the end.
+            return Ahead(_first_scale(self.scene, self.end), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
         times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))

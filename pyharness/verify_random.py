@@ -15,7 +15,7 @@ from pyharness.conditioning import along
 from pyharness.errors import InputError
 from pyharness.integer_series import integer_series
 from pyharness.methods import METHODS, SCIPY_METHODS, solve
-from pyharness.plan import closed_form
+from pyharness.plan import FINEST_QUICK, closed_form
 from pyharness.random_scenes import Draw, draw
 from pyharness.selection import Selection
 from pyharness.solver import prepare
@@ -23,7 +23,6 @@ from pyharness.trajectory import Array
 
 # Methods of Python and decimals are tried in every so many draws, compiled ones in all.
 _EVERY_SLOW = 20
-_FINEST_QUICK = 1e-7
 _ROUNDING = 2e-15
 # Up to such a growth of small differences a tolerance is kept as it stands; up to the second one by
 # all but the series, which finds out how they grow while it is on its way.
@@ -74,6 +73,8 @@ def truth_of(drawn: Draw) -> Truth:
     path = integer_series(drawn.scene, times)
     largest = float(max(np.abs(path.way).max(), np.abs(path.omega).max()))
     growth = along(drawn.scene, path.nodes, path.way).amplification
+    if not _ROUNDING * growth < 1.0:
+        raise InputError("rounding leaves no digit of it")
     return Truth(times, path.omega, largest, growth)
 
 
@@ -114,7 +115,7 @@ def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
 
 def _prepared(name: str) -> Callable[[Draw, Truth], Answer]:
     def answer(drawn: Draw, truth: Truth) -> Answer:
-        finest = _FINEST_QUICK if name == "quick" else METHODS[name].finest
+        finest = FINEST_QUICK if name == "quick" else METHODS[name].finest
         tolerance = drawn.tolerance(finest)
         solver = prepare(drawn.scene, name, tolerance)
         start, t_end = np.array(drawn.scene.omega), truth.times[-1]

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from pyharness import conditioning as room
+from pyharness import linearised
 from pyharness.conditioning import ROUNDING, conditioning
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw
@@ -105,7 +106,7 @@ def test_torque_that_varies_counts_with_its_angle() -> None:
 
 
 def test_a_wrong_sign_in_the_linearised_equations_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = room.jacobians
+    right = linearised.jacobians
     scene, time = _SCENES["any body"]
     rest = _sampled("any body")[2]
 
@@ -114,7 +115,7 @@ def test_a_wrong_sign_in_the_linearised_equations_is_seen(monkeypatch: pytest.Mo
         found[:, 0, 1] *= -1.0
         return found
 
-    monkeypatch.setattr(room, "jacobians", wrong)
+    monkeypatch.setattr(linearised, "jacobians", wrong)
     sampled = float(np.abs(rest).sum(axis=2).max())
     assert not 0.999 * sampled <= conditioning(scene, time).amplification <= 1.1 * sampled
 

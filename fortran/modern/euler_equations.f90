@@ -10,6 +10,8 @@ module euler_equations
   real(dp), parameter, public :: INVERSE(MOST_ORDER) = &
                                  [(1.0_dp/real(order_, dp), order_=1, MOST_ORDER)]
 
+  real(dp), parameter :: SMALL_TURN = 1e-8_dp ! rad; its square no longer counts
+
   type, public :: torque_t
     real(dp) :: constant(3)            !! 1/s2
     real(dp) :: rate(3)                !! 1/s3
@@ -19,7 +21,7 @@ module euler_equations
     real(dp), pointer, contiguous :: cosines(:, :) !! the same
   end type torque_t
 
-  public :: torque_terms
+  public :: sine_cosine, torque_terms
 
 contains
 
@@ -75,7 +77,7 @@ contains
     end if
     do k = 1, 3
       m(k, 1) = m(k, 1) + h*(torque%constant(k) + torque%rate(k)*t + torque%rate(k)*t_low)
-      m(k, 2) = m(k, 2) + (0.5_dp*h*h)*torque%rate(k)
+      m(k, 2) = m(k, 2) + (0.5_dp*h)*(h*torque%rate(k))
     end do
   end subroutine torque_terms
 
@@ -100,8 +102,13 @@ contains
                               + (frequency - f)*(t - s))
     unturned = sin(angle)
     cosine = cos(angle)
-    sine = unturned + turn*cosine
-    cosine = cosine - turn*unturned
+    if (abs(turn) <= SMALL_TURN) then
+      sine = unturned + turn*cosine
+      cosine = cosine - turn*unturned
+    else
+      sine = unturned*cos(turn) + cosine*sin(turn)
+      cosine = cosine*cos(turn) - unturned*sin(turn)
+    end if
   end subroutine sine_cosine
 
   pure real(dp) function upper_half(x)

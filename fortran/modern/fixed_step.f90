@@ -118,16 +118,18 @@ contains
     m_end = m_constant
     m_slope = 0.0_dp
     if (varies) then
-      call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, begin, m_end)
+      call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, begin, 0.0_dp, &
+                     m_end)
     end if
     do n = 1, n_steps
       if (varies) then
         t = begin + real(n - 1, dp)*h
         m = m_end
-        call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t + h, m_end)
+        call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t + h, &
+                       0.0_dp, m_end)
         if (method == RUNGE_KUTTA_4) then
           call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         t + 0.5_dp*h, m_middle)
+                         t + 0.5_dp*h, 0.0_dp, m_middle)
         else if (method == TAYLOR_3) then
           call torque_rate_at(m_rate, n_sines, sines, n_cosines, cosines, t, m_slope)
         end if

@@ -7,6 +7,7 @@ module gauss_collocation
                           MATRIX_LOW, ONWARD
   use torque_law, only: torque_at
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
+  use two_words, only: two_product, two_sum
   implicit none(type, external)
   private
 
@@ -47,9 +48,14 @@ contains
     real(dp) :: at_node(3)
     real(dp) :: begin
     real(dp) :: h
+    real(dp) :: h_low                ! what the rounding of the step left out, s
     real(dp) :: n_steps
     real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
+    real(dp) :: walked               ! since `begin`, s
+    real(dp) :: walked_low
+    real(dp) :: time                 ! of a node, s
+    real(dp) :: time_low
     logical :: varies
     integer :: i
     integer :: k
@@ -75,14 +81,19 @@ contains
         return
       end if
       h = (times(i) - begin)/n_steps
+      call two_product(n_steps, h, walked, walked_low)
+      h_low = (((times(i) - begin) - walked) - walked_low)/n_steps
       ! The step is new: what the rates of the last one say about it is of no use.
       f = 0.0_dp
       done = 0.0_dp
       do while (done < n_steps)
         if (varies) then
           do k = 1, stages
-            call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                           begin + (done + NODES(k, stages))*h, at_node)
+            call two_product(done, h, walked, walked_low)
+            call two_sum(begin, walked, time, time_low)
+            call two_sum(time, NODES(k, stages)*h, time, walked)
+            call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, time, &
+                           time_low + (walked_low + walked + done*h_low), at_node)
             m(k, :) = at_node
           end do
         end if

@@ -78,6 +78,7 @@ contains
     real(dp) :: copy(n_packed)
     real(dp) :: start(3)
     real(dp) :: reach      ! omega0 and what the torque gives, rad/s
+    real(dp) :: share      ! of its amplitude that a wave comes to
     real(dp) :: time       ! in the new units
     integer :: power       ! omega is 2**power times what it is in the new units
     integer :: i
@@ -86,8 +87,11 @@ contains
     do i = 0, 2
       reach = max(reach, abs(packed(M_CONSTANT + i)*t_end), abs(packed(M_RATE + i)*t_end*t_end))
     end do
-    do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 1
-      if (mod(i - WAVES, 4) /= 3) reach = max(reach, abs(packed(i)*t_end))
+    do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 4, 4
+      share = 1.0_dp
+      ! A slow sine never comes to its amplitude.
+      if (i < WAVES + 4*int(packed(N_SINES))) share = min(1.0_dp, abs(packed(i + 3)*t_end))
+      reach = max(reach, maxval(abs(packed(i:i + 2)*t_end*share)))
     end do
     power = 0
     if (reach > 0.0_dp .and. reach <= huge(reach)) then

@@ -1,6 +1,7 @@
 module scaled_motion
   !! Unknowns scaled so that every product has the coefficient 1 or -1, and the integral of the
   !! torque in them; waves that are fast and weak are averaged, to second order.
+  use euler_equations, only: sine_cosine
   use kinds, only: dp
   use statuses, only: COMPLETE, REFUSED
   implicit none(type, external)
@@ -174,12 +175,15 @@ contains
     real(dp), intent(in) :: t            !! s
     real(dp) :: change(3)
     real(dp) :: o(3)
+    real(dp) :: sine
+    real(dp) :: vers
     integer :: n
 
     o = 0.0_dp
     do n = motion%resolved + 1, motion%waves
-      o = o - (cos(motion%frequency(n)*t)*motion%on_sine(:, n) &
-               + sin(motion%frequency(n)*t)*motion%on_versine(:, n))/motion%frequency(n)
+      call wave_at(motion%frequency(n), t, sine, vers)
+      o = o - ((1.0_dp - vers)*motion%on_sine(:, n) + sine*motion%on_versine(:, n)) &
+          /motion%frequency(n)
     end do
     change(1) = y(2)*o(3) + y(3)*o(2)
     change(2) = motion%sign_2*(y(1)*o(3) + y(3)*o(1))
@@ -231,17 +235,34 @@ contains
     versine = 2.0_dp*sine*sine
   end function versine
 
+  pure subroutine wave_at(frequency, t, sine, vers)
+    !! Sine and versine of frequency t, with what the rounding of the product left out: a fast wave
+    !! that is averaged may have turned by any number of radians.
+    real(dp), intent(in) :: frequency    !! rad/s
+    real(dp), intent(in) :: t            !! s
+    real(dp), intent(out) :: sine
+    real(dp), intent(out) :: vers
+    real(dp) :: s                        ! of half the angle
+    real(dp) :: c
+
+    call sine_cosine(frequency, 0.5_dp*t, 0.0_dp, s, c)
+    sine = 2.0_dp*s*c
+    vers = 2.0_dp*s*s
+  end subroutine wave_at
+
   pure function integral(motion, t) result(s)
     !! The whole torque's integral from 0 to t, in the unknowns.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t
     real(dp) :: s(3)
+    real(dp) :: sine
+    real(dp) :: vers
     integer :: n
 
     s = t*(motion%slope + (0.5_dp*t)*motion%climb)
     do n = 1, motion%waves
-      s = s + motion%on_sine(:, n)*sin(motion%frequency(n)*t) &
-          + motion%on_versine(:, n)*versine(motion%frequency(n)*t)
+      call wave_at(motion%frequency(n), t, sine, vers)
+      s = s + motion%on_sine(:, n)*sine + motion%on_versine(:, n)*vers
     end do
   end function integral
 

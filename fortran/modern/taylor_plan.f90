@@ -37,17 +37,17 @@ contains
     coupling = max(abs(coefficients(1)), abs(coefficients(2)), abs(coefficients(3)))
     push = max(abs(torque%constant(1)), abs(torque%constant(2)), abs(torque%constant(3)))
     gain = 0.5_dp*push*abs(time)
-    rate = coupling*scale + sqrt(coupling*push)
+    rate = coupling*scale + sqrt(coupling)*sqrt(push)
     push = max(abs(torque%rate(1)), abs(torque%rate(2)), abs(torque%rate(3)))
     if (push > 0.0_dp) then
       gain = gain + push*time*time/6.0_dp
-      rate = rate + sqrt(coupling*push*abs(time))
+      rate = rate + sqrt(coupling)*sqrt(push*abs(time))
     end if
     do n = 1, torque%n_sines
-      call add_wave_rates(torque%sines(:, n), coupling, time, gain, rate, turned)
+      call add_wave_rates(torque%sines(:, n), .true., coupling, time, gain, rate, turned)
     end do
     do n = 1, torque%n_cosines
-      call add_wave_rates(torque%cosines(:, n), coupling, time, gain, rate, turned)
+      call add_wave_rates(torque%cosines(:, n), .false., coupling, time, gain, rate, turned)
     end do
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
@@ -60,9 +60,10 @@ contains
     most = min(best + 4, MOST_ORDER)
   end subroutine plan
 
-  pure subroutine add_wave_rates(wave, coupling, time, gain, rate, turned)
+  pure subroutine add_wave_rates(wave, is_sine, coupling, time, gain, rate, turned)
     !! What a wave of torque adds to the speed that may be gained, and to the rate of change.
     real(dp), intent(in) :: wave(4)         !! amplitude (3) in 1/s2, frequency in rad/s
+    logical, intent(in) :: is_sine
     real(dp), intent(in) :: coupling
     real(dp), intent(in) :: time            !! to go, s
     real(dp), intent(inout) :: gain         !! rad/s
@@ -71,9 +72,11 @@ contains
     real(dp) :: push                        ! 1/s2
 
     push = max(abs(wave(1)), abs(wave(2)), abs(wave(3)))
+    ! A slow sine never comes to its amplitude.
+    if (is_sine) push = push*min(1.0_dp, abs(wave(4)*time))
     if (push > 0.0_dp) then
       gain = gain + push*abs(time)/(1.0_dp + abs(wave(4)*time))
-      rate = rate + sqrt(coupling*push) + abs(wave(4))
+      rate = rate + sqrt(coupling)*sqrt(push) + abs(wave(4))
       turned = turned + abs(wave(4)*time)
     end if
   end subroutine add_wave_rates

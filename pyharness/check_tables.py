@@ -1,11 +1,12 @@
 """Views of checks: a line for each failure and a summary by kind, JSON, JUnit's XML."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from pyharness.build import Build
-from pyharness.checks import Check
+from pyharness.checks import Check, Sample
 from pyharness.tables import aligned, counted, short, wrapped
 
 if TYPE_CHECKING:
@@ -45,8 +46,13 @@ def few_lines(checks: Sequence[Check]) -> list[str]:
     return lines
 
 
-def checks_table(title: Sequence[str], checks: Sequence[Check], depth: int = 1) -> str:
-    """Return the failures, then a row for each group of checks that share `depth` parts."""
+def checks_table(
+    title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Sequence[str] = ()
+) -> str:
+    """Return the failures, then a row for each group of checks that share `depth` parts.
+
+    `more` are lines between these rows and the verdict.
+    """
     groups: dict[str, list[Check]] = {}
     for check in checks:
         groups.setdefault("/".join(check.id.split("/")[:depth]), []).append(check)
@@ -62,8 +68,40 @@ def checks_table(title: Sequence[str], checks: Sequence[Check], depth: int = 1) 
     lines += [""] if title else []
     lines += [*failures, ""] if failures else []
     lines += aligned(["checks", "made", "failed", "worst/limit"], rows, left=1)
+    lines += ["", *more] if more else []
     lines += ["", verdict(checks)]
     return "\n".join(lines) + "\n"
+
+
+_BANDS = ((1e-6, "1e-3 to 1e-6"), (1e-9, "1e-6 to 1e-9"), (0.0, "finer"))
+_GROWTHS = ((0.0, 10.0), (10.0, 1e3), (1e3, math.inf))
+
+
+def samples_lines(checks: Sequence[Check], rounding: float) -> list[str]:
+    """Return a row for each entrance and band of tolerances: the worst error over the tolerance.
+
+    What rounding makes, `rounding` for each factor of growth, is taken off the error. Columns are
+    the growth of small differences: checks with a result, and the worst of them.
+    """
+    cells: dict[tuple[str, str], list[list[float]]] = {}
+    for check in checks:
+        if isinstance(check, Sample) and check.value is not None:
+            band = next(name for least, name in _BANDS if check.tolerance >= least)
+            column = next(k for k, (_, most) in enumerate(_GROWTHS) if check.growth < most)
+            over = (check.value - rounding * check.growth) / check.tolerance
+            cells.setdefault((check.entrance, band), [[], [], []])[column].append(max(0.0, over))
+    if not cells:
+        return []
+    bands = [name for _, name in _BANDS]
+    rows = []
+    for entrance, band in sorted(cells, key=lambda each: (each[0], bands.index(each[1]))):
+        row = [entrance, band]
+        for values in cells[entrance, band]:
+            row += [str(len(values)), short(max(values)) if values else "-"]
+        rows.append(row)
+    head = ["entrance", "tolerance", "K<10", "worst", "K<1e3", "worst", "K>1e3", "worst"]
+    text = "worst: error less rounding (2e-15 K) over the tolerance; K: growth of a difference"
+    return [*aligned(head, rows, left=2), *wrapped(text)]
 
 
 def self_test_table(title: Sequence[str], found: Sequence["Caught"]) -> str:

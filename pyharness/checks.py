@@ -42,6 +42,25 @@ class Check:
         return self.id.partition("/")[0]
 
 
+@dataclass(frozen=True)
+class Sample(Check):
+    """A check in a scene drawn at random, with what its limit is made of.
+
+    Attributes
+    ----------
+    entrance : str
+        How the scene was solved.
+    tolerance : float
+        What was asked for.
+    growth : float
+        Largest factor by which a small difference on the way reaches the end.
+    """
+
+    entrance: str = ""
+    tolerance: float = math.nan
+    growth: float = math.nan
+
+
 def bounded(id: str, value: float, limit: float, replay: str, note: str = "") -> Check:
     """Return the check that `value` does not exceed `limit`; NaN does."""
     # NumPy's numbers come here too, and are no JSON.

@@ -17,10 +17,9 @@ from pyharness.checks import REFUSED, Check, bounded, may_hold, selected
 from pyharness.errors import InputError
 from pyharness.external_file import UNITS, Problem, Value, problems, read_problem
 from pyharness.listing import PROGRAMS, corrected
-from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, finest, solve
 from pyharness.plan import closed_form
 from pyharness.scene import Scene, TorqueLaw, Triple
-from pyharness.scipy_methods import RADIANS
 from pyharness.solver import prepare
 from pyharness.trajectory import Array
 
@@ -32,7 +31,6 @@ _SOLVED = (
     "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
     "quick", "dop853", "lsoda", "radau", "rk45",
 )  # fmt: skip
-_FINEST_UNTIL = {name.lower(): radians for name, radians in RADIANS.items()}
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
 # A number is rounded when it is read, and once more in what a method makes of it.
@@ -168,7 +166,9 @@ def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
 def _solved(
     scene: Scene, times: Sequence[float], method: str, rounding: Sequence[Array]
 ) -> Iterator[_Result]:
-    tolerance = _TOLERANCES.get(method) or METHODS[method].finest
+    tolerance = _TOLERANCES.get(method, 0.0)
+    if method != "quick":
+        tolerance = max(tolerance, finest(method, scene, times[-1]))
     if method == "quick":
         solver, start = prepare(scene, method, tolerance), np.array(scene.omega)
         found = []
@@ -179,13 +179,9 @@ def _solved(
         rows = np.array(found)
     else:
         rows = solve(scene, times, method, tolerance).omega
-    rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
-    for time, omega, moved in zip(times, rows, rounding, strict=False):
+    for omega, moved in zip(rows, rounding, strict=False):
         size = np.full(3, _scale(scene, omega))
         if method in SCIPY_METHODS:
-            # The finest tolerance is claimed for so many radians, and grows with them.
-            share = rate * abs(time) / _FINEST_UNTIL[method]
-            size *= max(1.0, METHODS[method].finest * share / tolerance)
             # SciPy controls the error of a step; by the end the motion has made of it what it
             # makes of a change of that size in the numbers of the problem.
             size = np.maximum(size, moved / _ROUNDING)

@@ -16,9 +16,9 @@ from pyharness.errors import InputError
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
 
-BITS = 192
+BITS = 160
 _ORDER = 36
-_LAST = 60  # bits of the last terms of a step: 2**-132 of the unit
+_LAST = 60  # bits of the last terms of a step: 2**-100 of the unit
 _CLOCK = 64  # steps are multiples of 2**-64 of the time asked for
 _MOST_STEPS = 20_000
 # The unit of omega is guessed; so many powers of two beside the largest omega it will do.
@@ -60,9 +60,7 @@ class _OtherUnitError(Exception):
         self.power = power
 
 
-def integer_series(
-    scene: Scene, times: Sequence[float], most_steps: int = _MOST_STEPS
-) -> Path:
+def integer_series(scene: Scene, times: Sequence[float], most_steps: int = _MOST_STEPS) -> Path:
     """Return the true solution of a scene.
 
     Parameters
@@ -77,7 +75,7 @@ def integer_series(
     Returns
     -------
     Path
-        Before rounding good to some 1e-38 of the largest omega, times the growth of a small
+        Before rounding good to some 1e-29 of the largest omega, times the growth of a small
         difference.
 
     Raises
@@ -181,8 +179,8 @@ class _Wave:
 
     to_sine: int  # derivative of the unknown `sine` is `to_sine` times the cosine
     to_cosine: int  # and that of the cosine this times the unknown
-    on_sine: tuple[int, int, int]
-    on_cosine: tuple[int, int, int]
+    on_sine: Series
+    on_cosine: Series
 
 
 class _Equations:
@@ -217,8 +215,8 @@ class _Equations:
                 _Wave(
                     _fixed(Fraction(1) if slow else angle),
                     _fixed(-angle * angle if slow else -angle),
-                    tuple(map(_fixed, on_sine)),
-                    tuple(map(_fixed, on_cosine)),
+                    [_fixed(x) for x in on_sine],
+                    [_fixed(x) for x in on_cosine],
                 )
             )
         self.acts = not law.is_zero
@@ -233,8 +231,10 @@ class _Equations:
 
         a, b, c = map(stepped, self._products)
         series = [[x] for x in state]
-        torques = [[stepped(m + (r * begin >> _CLOCK)), stepped(stepped(r))]
-                   for m, r in zip(self._constant, self._rate, strict=True)]
+        torques = [
+            [stepped(m + (r * begin >> _CLOCK)), stepped(stepped(r))]
+            for m, r in zip(self._constant, self._rate, strict=True)
+        ]
         torques = [each + [0] * (_ORDER - 2) for each in torques]
         for n, wave in enumerate(self._waves):
             sine, cosine = series[3 + 2 * n], series[4 + 2 * n]
@@ -250,9 +250,15 @@ class _Equations:
         x, y, z = series[:3]
         for k in range(_ORDER):
             backward = z[::-1]
-            yz, xz, xy = (sum(map(mul, y, backward)), sum(map(mul, x, backward)),
-                          sum(map(mul, x, y[::-1])))
-            for each, factor, total, m in ((x, a, yz, torques[0]), (y, b, xz, torques[1]),
-                                           (z, c, xy, torques[2])):
+            yz, xz, xy = (
+                sum(map(mul, y, backward)),
+                sum(map(mul, x, backward)),
+                sum(map(mul, x, y[::-1])),
+            )
+            for each, factor, total, m in (
+                (x, a, yz, torques[0]),
+                (y, b, xz, torques[1]),
+                (z, c, xy, torques[2]),
+            ):
                 each.append(((factor * total >> 2 * BITS) + m[k]) // (k + 1))
         return series

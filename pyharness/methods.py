@@ -10,7 +10,7 @@ from pyharness.errors import InputError, TimedError, unknown
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scaling import factor_near_one, scaled, unscaled
 from pyharness.scene import Scene
-from pyharness.scipy_methods import FINEST, rows_trajectory, scipy_method
+from pyharness.scipy_methods import FINEST, finest_tolerance, rows_trajectory, scipy_method
 from pyharness.trajectory import Trajectory
 
 IMPLEMENTATIONS = ("fortran", "python")
@@ -163,6 +163,23 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
         evaluations=trajectory.evaluations,
         ended=trajectory.ended,
     )
+
+
+def finest(method: str, scene: Scene, time: float) -> float:
+    """Return the smallest tolerance that a method of the registry can meet in a scene.
+
+    The one that it claims; more for `solve_ivp`, whose steps can't be told to err less than by
+    some 2e-14, where many add up or the motion multiplies them.
+
+    Raises
+    ------
+    InputError
+        Where `solve_ivp` would need too many steps even to see that.
+    """
+    if method not in SCIPY_METHODS or time == 0.0:
+        return METHODS[method].finest
+    factor = factor_near_one(scene, time)
+    return finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
 
 
 def _outward(times: Sequence[float]) -> tuple[list[float], bool]:
@@ -331,4 +348,5 @@ METHODS = {
         ),
     )
 }
-SCIPY_METHODS = ("dop853", "rk45", "lsoda", "radau")
+# With the names that SciPy has for them.
+SCIPY_METHODS = {"dop853": "DOP853", "rk45": "RK45", "lsoda": "LSODA", "radau": "Radau"}

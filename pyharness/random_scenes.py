@@ -147,13 +147,13 @@ def _slow_waves(source: random.Random) -> Scene:
 
 
 def _many_speeds(source: random.Random) -> Scene:
-    """Return up to six waves from 1e-6 to 2e3 rad/s beside each other."""
+    """Return up to six waves from 1e-6 to 600 rad/s beside each other."""
     scene = _plain(source)
     size = max(scene.moments or (1.0,))
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):
         amplitude = size * 10.0 ** source.uniform(-3.0, 1.5)
-        frequency = 10.0 ** source.uniform(-6.0, 3.3)
+        frequency = 10.0 ** source.uniform(-6.0, 2.8)
         some[source.randrange(2)].append(_wave(source, amplitude, frequency))
     law = TorqueLaw(sines=tuple(some[0]), cosines=tuple(some[1]))
     if source.random() < 0.2:
@@ -191,7 +191,7 @@ def _far_scale(source: random.Random) -> Scene:
 
 
 def _sensitive(source: random.Random) -> Scene:
-    """Return a spin beside the middle axis, long enough to multiply a difference up to 1e6 times."""
+    """Return a spin beside the middle axis that multiplies a difference up to 1e6 times."""
     low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
     high = source.uniform(middle, low + middle)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
@@ -265,7 +265,7 @@ _NASTY: dict[str, Callable[[random.Random], Scene]] = {
 def _law(
     source: random.Random, size: float, kinds: int, frequencies: tuple[float, float]
 ) -> TorqueLaw:
-    """Return a torque of about `size`: 1 constant, 2 rate, 4 a sine, 8 a cosine, or a sum of them."""
+    """Return a torque of about `size`: 1 constant, 2 rate, 4 a sine, 8 a cosine, or a sum."""
     low, high = map(math.log10, frequencies)
     nothing = (0.0, 0.0, 0.0)
     parts = [_triple(_vector(source, size)) for _ in range(2)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pyharness.agreement import ulps
-from pyharness.checks import REFUSED, Check, bounded, described
+from pyharness.checks import REFUSED, Check, bounded
 from pyharness.conditioning import Conditioning, conditioning
 from pyharness.contenders import FIXED_STEP
 from pyharness.errors import InputError

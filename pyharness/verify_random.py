@@ -1,16 +1,16 @@
 """Methods in scenes drawn from a seed, by every entrance, against the second reference.
 
-A tolerance is on the error at the times asked for, relative to the largest omega from 0 to the last of
-them. Where small differences grow K times on the way, rounding alone makes 1e-15 K of it.
+A tolerance is on the error at the times asked for, relative to the largest omega from 0 to the last
+of them. Where small differences grow K times on the way, rounding alone makes 1e-15 K of it.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.checks import REFUSED, Check, bounded, described
+from pyharness.checks import REFUSED, Check, Sample
 from pyharness.conditioning import along
 from pyharness.errors import InputError
 from pyharness.integer_series import integer_series
@@ -21,9 +21,10 @@ from pyharness.selection import Selection
 from pyharness.solver import prepare
 from pyharness.trajectory import Array
 
-# Methods of Python and decimals are tried in every so many draws, compiled ones in all.
-_EVERY_SLOW = 20
-_ROUNDING = 2e-15
+# Of so many pairs of draws, a plain and a nasty one, methods are tried in one: the truth costs more
+# than they do. Those of Python and decimals, which cost more than the truth, in fewer.
+_EVERY, _EVERY_SLOW = 4, 60
+ROUNDING = 2e-15  # relative, for each factor of growth
 # Up to such a growth of small differences a tolerance is kept as it stands; up to the second one by
 # all but the series, which finds out how they grow while it is on its way.
 _CALM, _LIVELY = 10.0, 1e3
@@ -64,7 +65,7 @@ class Truth:
     def limit(self, method: str, tolerance: float) -> float:
         """Return the largest error that a method may have."""
         bent = self.growth >= (_CALM if method in _SERIES else _LIVELY)
-        return tolerance * (self.growth if bent else 1.0) + _ROUNDING * self.growth
+        return tolerance * (self.growth if bent else 1.0) + ROUNDING * self.growth
 
 
 def truth_of(drawn: Draw) -> Truth:
@@ -73,7 +74,7 @@ def truth_of(drawn: Draw) -> Truth:
     path = integer_series(drawn.scene, times)
     largest = float(max(np.abs(path.way).max(), np.abs(path.omega).max()))
     growth = along(drawn.scene, path.nodes, path.way).amplification
-    if not _ROUNDING * growth < 1.0:
+    if not ROUNDING * growth < 1.0:
         raise InputError("rounding leaves no digit of it")
     return Truth(times, path.omega, largest, growth)
 
@@ -83,10 +84,12 @@ def entrances(drawn: Draw, number: int) -> dict[str, Callable[[Draw, Truth], "An
     has_form = closed_form(drawn.scene) is not None
     forms = ["closed-form"] if has_form else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
-    if number % _EVERY_SLOW < 2:
+    if number // 2 % _EVERY_SLOW == 0:
         names += [*SCIPY_METHODS, "reference"]
     found = {f"solve-{name}": _solved(name) for name in names}
-    return found | {f"prepare-{name}": _prepared(name) for name in ["auto", "taylor", "quick", *forms]}
+    return found | {
+        f"prepare-{name}": _prepared(name) for name in ["auto", "taylor", "quick", *forms]
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +135,7 @@ def _prepared(name: str) -> Callable[[Draw, Truth], Answer]:
 def random_methods(chosen: Selection) -> Iterator[Check]:
     """Hold every entrance to the second reference in scenes drawn from the seed."""
     for number in range(chosen.draws):
-        if not chosen.may_ask(f"random/{number}"):
+        if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
         drawn = draw(chosen.seed, number)
         asked = {
@@ -155,17 +158,27 @@ def random_methods(chosen: Selection) -> Iterator[Check]:
             yield _held(id, chosen.replay_of_draw(id), drawn, truth, entrance(drawn, truth))
 
 
-def _held(id: str, again: str, drawn: Draw, truth: Truth, answer: Answer) -> Check:
+def _held(id: str, again: str, drawn: Draw, truth: Truth, answer: Answer) -> Sample:
     """Return the check that an answer is as near to the truth as it has to be."""
+    error = limit = None
+    passed = False
     if answer.omega is not None:
-        limit = truth.limit(answer.method, answer.tolerance)
-        return bounded(id, truth.error(answer.omega), limit, again, drawn.scene.name)
-    if not answer.why.startswith(REFUSED):
-        return Check(id, False, None, None, again, answer.why)
-    # The choice of a method for a scene may not refuse, a closed form neither. The others may say
-    # that such a scene would take too long, or that rounding leaves too few digits.
-    free = drawn.scene.name in _MAY_REFUSE or truth.growth > _CALM
-    may = answer.method not in ("auto", "closed-form") and (free or answer.method == "quick" or answer.method in SCIPY_METHODS)
-    if may:
-        return described(id, None, again, answer.why)
-    return Check(id, False, None, None, again, answer.why)
+        error, limit = truth.error(answer.omega), truth.limit(answer.method, answer.tolerance)
+        passed = error <= limit
+    elif answer.why.startswith(REFUSED):
+        passed = _may_refuse(answer.method, drawn, truth)
+    entrance = id.rpartition("/")[2]
+    note = f"{drawn.scene.name}, tolerance {answer.tolerance:.2g}, growth {truth.growth:.3g}"
+    note = f"{note}: {answer.why}" if answer.why else note
+    return Sample(id, passed, error, limit, again, note, entrance, answer.tolerance, truth.growth)
+
+
+def _may_refuse(method: str, drawn: Draw, truth: Truth) -> bool:
+    """Whether a method may say that such a scene would take too long or leave too few digits.
+
+    The choice of a method for a scene, and a closed form, may not.
+    """
+    if method in ("auto", "closed-form"):
+        return False
+    hard = drawn.scene.name in _MAY_REFUSE or truth.growth > _CALM
+    return hard or method == "quick" or method in SCIPY_METHODS

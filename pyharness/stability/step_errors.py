@@ -109,7 +109,9 @@ def path(scene: Scene, time: float) -> Path:
             break
         count = min(wanted, _MOST_NODES)
     turned = float(np.trapezoid(speeds, times))
-    return Path(scene, times, omega, propagators(scene, times, omega), flow, turned, float(speeds.max()))
+    return Path(
+        scene, times, omega, propagators(scene, times, omega), flow, turned, float(speeds.max())
+    )
 
 
 class Forecaster:

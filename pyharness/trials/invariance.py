@@ -23,6 +23,7 @@ from pyharness.solver import prepare
 from pyharness.stability.turned_scenes import shifted, turned
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
+from pyharness.trials import promises
 from pyharness.trials.truth import OURS
 
 _FIXED_STEP = ("improved-euler", "taylor-3", "rk4")
@@ -144,7 +145,7 @@ def run(only: Sequence[str]) -> Iterator[Outcome]:
                 continue
             if name == "closed-form" and circumstance != "free":
                 continue
-            for tolerance in tolerances(name):
+            for tolerance in tolerances(name, circumstance):
                 for check in _checks(name, circumstance, tolerance, only):
                     yield Outcome(check, scene)
         for program in PROGRAMS:
@@ -154,11 +155,11 @@ def run(only: Sequence[str]) -> Iterator[Outcome]:
                         yield Outcome(check, scene)
 
 
-def tolerances(name: str) -> list[float]:
-    """Return the tolerances at which a method is tried."""
+def tolerances(name: str, circumstance: str) -> list[float]:
+    """Return the tolerances at which a method is tried in a scene."""
     if name in _FIXED_STEP:
         return [1.0]
-    finest = METHODS[name].finest if name in METHODS else _MIDDLING
+    finest = promises.finest(name, *SCENES[circumstance]) if name in METHODS else _MIDDLING
     if name == "closed-form":
         return [finest]
     return [_MIDDLING] if name in _ONLY_MIDDLING else sorted({finest, max(finest, _MIDDLING)})

@@ -19,6 +19,7 @@ from pyharness.stability.brouwer import LAWS, Noise, Orbit
 from pyharness.stability.elliptic import torque_free
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
+from pyharness.trials import promises
 
 # A revolution is 2 pi over the largest component of omega: the body's own turn.
 REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
@@ -260,7 +261,7 @@ def _closed_form(motion: str) -> Iterator[Outcome]:
 def _scipy(name: str, motion: str) -> Iterator[Outcome]:
     scene, body = MOTIONS[motion], orbit_of(motion)
     time = 1e2 * 2.0 * math.pi / body.largest
-    found = solve(scene, [time], name, METHODS[name].finest)
+    found = solve(scene, [time], name, promises.finest(name, scene, time))
     yield from _described(name, motion, "100", scene, body, time, found.omega[-1])
 
 

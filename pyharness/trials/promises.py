@@ -13,13 +13,14 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import polynomial
 
+from pyharness import methods
+from pyharness.methods import SCIPY_METHODS
 from pyharness.plan import closed_form
 from pyharness.scene import Scene
-from pyharness.scipy_methods import RADIANS
+from pyharness.scipy_methods import steps_sum
 
 GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
-_SCIPY_NAMES = {"dop853": "DOP853", "lsoda": "LSODA", "radau": "Radau", "rk45": "RK45"}
-SCIPY = tuple(_SCIPY_NAMES)
+SCIPY = tuple(SCIPY_METHODS)
 FIXED = {"improved-euler": 2, "taylor-3": 2, "rk4": 4}
 METHODS = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY, *FIXED)
 
@@ -83,6 +84,16 @@ def _series(name: str) -> tuple[float, ...]:
     return tuple(float(c) for c in total)
 
 
+def finest(name: str, scene: Scene, time: float) -> float:
+    """Return the finest tolerance at which a method is tried until `time` (s).
+
+    The one that it claims; where `solve_ivp` can't meet that in the scene, the next of the ladder.
+    """
+    met = methods.finest(name, scene, time)
+    claimed = methods.METHODS[name].finest
+    return claimed if met <= claimed else min((t for t in LADDER if t >= 1.1 * met), default=1.0)
+
+
 def tolerances(name: str, least: float, radians: float, amplification: float) -> list[float]:
     """Return the tolerances from `least` at which a method is tried on so many radians.
 
@@ -103,14 +114,6 @@ def tolerances(name: str, least: float, radians: float, amplification: float) ->
     return sorted(chosen)
 
 
-def scipy_sum(name: str, tolerance: float, finest: float, radians: float) -> float:
-    """Return what the errors of the steps of a method of `solve_ivp` add up to.
-
-    Its steps can't be told to be finer than the finest tolerance asks for over a few radians.
-    """
-    return max(tolerance, finest * radians / RADIANS[_SCIPY_NAMES[name]])
-
-
 def _most(name: str) -> float:
     return 1_000_000.0 if name in GAUSS else 4_000.0 if name in SCIPY else math.inf
 
@@ -123,7 +126,7 @@ def _cost(name: str, tolerance: float, radians: float, amplification: float) -> 
         z = math.pow(tolerance / (max(radians, 1.0) * amplification), 0.5 / stages)
         return 12.0 * stages * radians / min(z, 1.0)
     if name in SCIPY:
-        a_step = tolerance / (30.0 * max(1.0, radians / RADIANS[_SCIPY_NAMES[name]]))
+        a_step = tolerance / steps_sum(SCIPY_METHODS[name], radians, amplification)
         return _STAGES[name] * radians / math.pow(a_step, 1.0 / (_ORDERS[name] + 1))
     return 0.0
 

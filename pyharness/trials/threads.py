@@ -22,6 +22,7 @@ from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
 from pyharness.solver import PREPARED, prepare
 from pyharness.stress import Outcome, Trial, replay
+from pyharness.trials import promises
 
 THREADS = 8
 _REPEATS = 30
@@ -130,7 +131,7 @@ def jobs() -> list[Job]:
 
 
 def _rows(scene: Scene, name: str) -> bytes:
-    tolerance = max(_TOLERANCE, METHODS[name].finest)
+    tolerance = max(_TOLERANCE, promises.finest(name, scene, _TIMES[-1]))
     found = solve(scene, _TIMES, name, tolerance)
     return found.omega.tobytes() + f"{found.steps} {found.evaluations} {found.ended}".encode()
 

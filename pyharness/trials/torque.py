@@ -10,13 +10,14 @@ from pyharness.checks import Check, bounded, described, may_hold, selected
 from pyharness.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, corrected, original
-from pyharness.methods import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods import PROGRAM_REGISTRY, solve
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw, Triple
 from pyharness.solver import prepare
 from pyharness.stability.axial_top import axial_top
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trajectory import Array
+from pyharness.trials import promises
 from pyharness.trials.promises import may_refuse
 from pyharness.trials.truth import Truth, describe_programs, truth_of
 
@@ -181,15 +182,16 @@ def hold(circumstance: str, each: Circumstance, only: Sequence[str]) -> Iterator
         return
     truth = each.truth(each.scene, each.time)
     for name in names:
-        for tolerance in tolerances(name):
+        for tolerance in tolerances(name, each.scene, each.time):
             id = f"torque/{name}/{circumstance}/{tolerance:.0e}"
             if selected(id, only):
                 yield Outcome(held(id, each.scene, truth, name, tolerance), each.scene)
 
 
-def tolerances(name: str) -> list[float]:
+def tolerances(name: str, scene: Scene, time: float) -> list[float]:
     """Return the tolerances at which a method is tried: its finest, and one in the middle."""
-    finest = METHODS[_PREPARED.get(name, name)].finest if name != "quick" else _MIDDLING
+    known = _PREPARED.get(name, name)
+    finest = _MIDDLING if name == "quick" else promises.finest(known, scene, time)
     return [_MIDDLING] if name in _ONLY_MIDDLING else sorted({finest, max(finest, _MIDDLING)})
 
 

@@ -119,12 +119,12 @@ def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float | None]:
     if name == "closed-form" or (name == "auto" and closed_form(scene)):
         return [METHODS["closed-form"].finest]
     flow = truth.flow
-    finest = promises.QUICK_FINEST if name == "quick" else METHODS[name].finest
+    least = promises.QUICK_FINEST if name == "quick" else promises.finest(name, scene, truth.time)
     if name in GAUSS:
         # Two solutions that are to agree can't where rounding parts them.
-        finest = max(finest, _ceiling(4.0 * flow.rounding))
+        least = max(least, _ceiling(4.0 * flow.rounding))
     radians = promises.speed(scene, flow.largest) * abs(truth.time)
-    found = promises.tolerances(name, finest, radians, flow.amplification)
+    found = promises.tolerances(name, least, radians, flow.amplification)
     return [*found, None] if name in GAUSS else [*found]
 
 
@@ -207,8 +207,6 @@ def made_on_the_way(name: str, scene: Scene, truth: Truth, tolerance: float | No
     if name in FIXED and truth.exact:
         steps = _steps(scene, truth.time)
         return promises.fixed_step_sum(name, radians / steps, steps)
-    if tolerance is not None and name in promises.SCIPY:
-        return promises.scipy_sum(name, tolerance, METHODS[name].finest, radians)
     return tolerance
 
 

@@ -4,11 +4,12 @@ import argparse
 from pathlib import Path
 
 from pyharness import options as shared
-from pyharness.check_tables import checks_record, checks_table, junit_text
+from pyharness.check_tables import checks_record, checks_table, junit_text, samples_lines
 from pyharness.checks import Check
 from pyharness.errors import InputError, unknown
 from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.verify import KINDS, verify
+from pyharness.verify_random import ROUNDING
 
 FORMATS = ("table", "json", "junit")
 # Options that no other kind looks at.
@@ -64,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
     if form != "table":
         text = _machine_text(checks, form, chosen.seed)
     else:
-        text = checks_table([*_title(chosen), *_unjudged(chosen, checks)], checks)
+        more = samples_lines(checks, ROUNDING) if options.draws is not None else []
+        text = checks_table([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
     shared.emit(text, options.out)
     return 0 if all(check.passed for check in checks) else 1
 

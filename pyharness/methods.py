@@ -176,10 +176,12 @@ def finest(method: str, scene: Scene, time: float) -> float:
     InputError
         Where `solve_ivp` would need too many steps even to see that.
     """
+    claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
-        return METHODS[method].finest
+        return claimed
     factor = factor_near_one(scene, time)
-    return finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
+    met = finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
+    return max(claimed, met)
 
 
 def _outward(times: Sequence[float]) -> tuple[list[float], bool]:

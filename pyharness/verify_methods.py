@@ -13,7 +13,7 @@ from pyharness.contenders import FIXED_STEP
 from pyharness.errors import InputError
 from pyharness.kernels import extension, normalized
 from pyharness.listing import PROGRAMS, corrected
-from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, finest, solve
 from pyharness.orders import ORDER_SLACK, Order, measured_order, order_of
 from pyharness.plan import closed_form
 from pyharness.reference import Reference, reference
@@ -32,7 +32,7 @@ _PREPARED = ("auto", "taylor", "quick", "closed-form")
 _FINEST_QUICK = 1e-7
 # The truth that solve_ivp gives is asked for as finely as it goes.
 _GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
-_IVP, _IVP_TOLERANCE = "dop853", 7e-13
+_IVP = "dop853"
 # Halvings in which an order has to show, one after another.
 _PAIRS = 4
 
@@ -238,6 +238,8 @@ def _velocity_of(program: str) -> Callable[[Scene], Array]:
 
 def _by_ivp(scene: Scene) -> Reference:
     """Return what `solve_ivp` takes for the truth, good to its tolerance."""
-    run = solve(scene, scene.times(), _IVP, _IVP_TOLERANCE)
+    times = scene.times()
+    tolerance = 1.01 * finest(_IVP, scene, times[-1])
+    run = solve(scene, times, _IVP, tolerance)
     largest = float(np.abs(run.omega).max())
-    return Reference(run.time, run.omega, None, "solve_ivp", _IVP_TOLERANCE * largest)
+    return Reference(run.time, run.omega, None, "solve_ivp", tolerance * largest)

@@ -1,0 +1,116 @@
+"""Small waves, starts at rest and waves of any speed: the tolerance is of what omega gets to be."""
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, prepare, solve
+from pyharness.integer_series import integer_series
+from pyharness.methods import METHODS, SCIPY_METHODS, finest
+from pyharness.reference import reference
+from pyharness.scene import Triple
+
+BODY = (40.0, 30.0, 20.0)
+REST = (0.0, 0.0, 0.0)
+
+
+def _driven(omega: Triple = REST, **law: object) -> Scene:
+    return Scene("driven", omega, BODY, torque=TorqueLaw(**law))  # type: ignore[arg-type]
+
+
+def _errs(found: np.ndarray, scene: Scene, time: float) -> float:
+    path = integer_series(scene, [time])
+    return float(np.abs(found - path.omega[-1]).max() / np.abs(path.way).max())
+
+
+@pytest.mark.parametrize("frequency", [1e-108, 1e-12, 1e-8, 1e-7, 1e-5, 1e-3, 0.1])
+@pytest.mark.parametrize("t_end", [1.0, -2.5])
+def test_slow_sine_from_rest(frequency: float, t_end: float) -> None:
+    """1 - cos(f t) has no digit where f t is small; a prepared `auto` answered 0."""
+    amplitude = max(20.0, 1e-9 / frequency)
+    scene = _driven(sines=(((0.0, 0.0, amplitude), frequency),))
+    for tolerance in (1e-6, 1e-8):
+        solver = prepare(scene, "auto", tolerance)
+        assert _errs(solver(np.zeros(3), t_end), scene, t_end) <= tolerance
+        assert solver.status == "complete"
+
+
+def test_slow_waves_beside_faster_ones() -> None:
+    """Steps that follow the fast wave carry the slow ones along by rotations of a tiny angle."""
+    for slow in (1e-9, 1e-6, 1e-4):
+        waves = (((40.0, -30.0, 20.0), slow), ((0.2 * slow, slow, -slow), 30.0))
+        scene = _driven(sines=waves, cosines=(((0.0, slow, 0.0), slow),))
+        found = prepare(scene, "quick", 1e-7)(np.zeros(3), 2.0)
+        assert _errs(found, scene, 2.0) <= 1e-7
+
+
+def test_fast_waves_keep_their_phase() -> None:
+    """A wave that is averaged may turn 1e12 times: the product f t is kept in two words."""
+    for frequency, time, tolerance in ((1e9, 7.3, 1e-9), (1e12, 0.7, 1e-9), (1e20, 0.7, 1e-9)):
+        scene = _driven((0.0, 0.0, 1.0), cosines=(((0.0, 0.0, 2.0 * frequency), frequency),))
+        found = prepare(scene, "auto", tolerance)(np.array(scene.omega), time)
+        exact = reference(Scene("", scene.omega, (20.0,) * 3, torque=scene.torque), [time]).omega[0]
+        assert np.abs(found - exact).max() <= tolerance
+
+
+def test_collocation_keeps_the_phase_of_a_wave_over_many_turns() -> None:
+    scene = _driven(cosines=(((0.0, 0.0, 20.0), 1.0),))
+    found = solve(scene, [20000.3], "gauss-8", 1e-12).omega[0, 2]
+    exact = reference(Scene("", REST, (20.0,) * 3, torque=scene.torque), [20000.3]).omega[0, 2]
+    assert abs(found - exact) < 1e-13
+
+
+def test_series_takes_a_slow_sine_for_what_it_comes_to() -> None:
+    """It began with a step for the amplitude, 1e-20 s, and gave up."""
+    scene = _driven(sines=(((0.0, 0.0, 20e40), 1e-40),))
+    assert solve(scene, [3.0], "taylor", 1e-12).omega[0, 2] == pytest.approx(4.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", [*SCIPY_METHODS, "reference", "taylor", "gauss-4"])
+@pytest.mark.parametrize("size", [1.0, 1e-9, 1e-40])
+def test_start_at_rest_is_held_to_what_omega_becomes(method: str, size: float) -> None:
+    """`solve_ivp` took 1 rad/s for the scale of a body at rest, the reference likewise."""
+    scene = _driven(constant=(2.0 * size, -3.0 * size, 1.0 * size), rate=(0.0, size, 0.0))
+    tolerance = 1e-6
+    found = solve(scene, [1.0, 2.0], method, tolerance)
+    assert _errs(found.omega[-1], scene, 2.0) <= tolerance
+
+
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_scipy_shares_the_tolerance_over_the_motion_that_a_wave_drives(method: str) -> None:
+    """All of the motion comes from the wave: the start says nothing of how far it goes."""
+    scene = _driven((1e-6, 1e-6, 0.0), cosines=(((90.0, 80.0, -30.0), 0.2),))
+    tolerance = 1e-7
+    assert _errs(solve(scene, [6.0], method, tolerance).omega[-1], scene, 6.0) <= tolerance
+
+
+@pytest.mark.parametrize("method", ["rk45", "dop853"])
+def test_no_step_passes_over_a_fast_wave(method: str) -> None:
+    """Steps in time with a wave see a constant torque, and no error."""
+    scene = _driven((0.0, 0.0, 3.0), sines=(((0.1, -0.2, 0.1), 1000.0),))
+    assert _errs(solve(scene, [1.5], method, 1e-6).omega[-1], scene, 1.5) <= 1e-6
+
+
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_scipy_refuses_what_it_can_not_meet(method: str) -> None:
+    """Beside the middle axis a step of 2e-14 is multiplied by more than a tolerance allows."""
+    scene = Scene("middle", (1e-6, 3.0, 1e-6), BODY)
+    least = finest(method, scene, 8.0)
+    assert least > 20.0 * METHODS[method].finest
+    with pytest.raises(InputError, match=r"can't meet it .* grow .* times; allowed for this motion"):
+        solve(scene, [8.0], method, METHODS[method].finest)
+    assert _errs(solve(scene, [8.0], method, 2.0 * least).omega[-1], scene, 8.0) <= 2.0 * least
+
+
+def test_quick_claims_no_more_than_its_many_steps_allow() -> None:
+    with pytest.raises(InputError, match="tolerance is 1e-13; allowed for quick: 1e-12 to 1"):
+        prepare(_driven(constant=(1.0, 2.0, 3.0)), "quick", 1e-13)
+
+
+@pytest.mark.parametrize("method", ["auto", "gauss-6", "dop853"])
+def test_rest_far_below_the_root_of_the_smallest_number(method: str) -> None:
+    """A slow sine of a large amplitude: products of omega underflow unless the unit is right."""
+    w = 1e-162
+    time, push = 1.0 / w, 1e-90 * w
+    sine = ((120.0 * push, -60.0 * push, 80.0 * push), 2.0 * w / (push * time * time))
+    scene = _driven(sines=(sine,))
+    assert _errs(solve(scene, [time], method, 1e-9).omega[0], scene, time) <= 1e-9

@@ -1,10 +1,10 @@
-from collections.abc import Callable, Sequence
-from typing import Any, Self
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable, Iterable
+from typing import Self, SupportsFloat, SupportsIndex
 
 from pyharness.trajectory import Array
+
+Number = SupportsFloat | SupportsIndex
+Numbers = Iterable[Number]
 
 class BoundKernel:
     def __new__(
@@ -13,8 +13,6 @@ class BoundKernel:
         packed: Array,
         check: Callable[[object, object, object], tuple[Array, float]],
     ) -> Self: ...
-    def __call__(
-        self, omega0: Any, t_end: Any, *, out: Any = None
-    ) -> Array: ...
+    def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array: ...
     @property
     def _ending(self) -> tuple[int, int]: ...

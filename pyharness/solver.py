@@ -4,8 +4,11 @@
 three arguments and enters the kernel. `solve` is the same for one use, with rows at many times.
 """
 
+import math
 import reprlib
 from collections.abc import Sequence
+from contextlib import suppress
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -17,7 +20,7 @@ from pyharness.scene import Scene, Triple
 from pyharness.trajectory import Array, Trajectory
 
 if TYPE_CHECKING:
-    from pyharness._solver import BoundKernel
+    from pyharness._solver import BoundKernel, Numbers
 else:
     try:
         from pyharness._solver import BoundKernel
@@ -108,7 +111,7 @@ class Solver(BoundKernel):
         """
         return self._ending[1]
 
-    def trajectory(self, omega0: Sequence[float], times: Sequence[float]) -> Trajectory:
+    def trajectory(self, omega0: "Numbers", times: Sequence[float]) -> Trajectory:
         """Return rows at `times` from another start.
 
         Parameters
@@ -228,14 +231,15 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Array, float]:
 
 
 def _three(where: str, values: Any) -> Triple:
-    try:
-        first, second, third = () if isinstance(values, str | bytes | dict | set) else values
-    except Exception:  # whatever an object of the user's raises, it is no three numbers
-        raise _refused(where, values, "three real numbers, in rad/s") from None
-    found = _number(first), _number(second), _number(third)
-    if None in found:
-        raise _refused(where, values, "three real numbers, in rad/s")
-    return found  # type: ignore[return-value]
+    found: list[float | None] = []
+    # An object of the user's may raise anything: then it is no three numbers.
+    with suppress(Exception):
+        if not isinstance(values, str | bytes | dict | set):
+            found = [_number(each) for each in islice(values, 4)]
+    match found:
+        case [float(first), float(second), float(third)]:
+            return first, second, third
+    raise _refused(where, values, "three real numbers, in rad/s")
 
 
 def _number(value: Any) -> float | None:
@@ -245,10 +249,11 @@ def _number(value: Any) -> float | None:
         return None
     if isinstance(value, bool | str | bytes | bytearray | complex):
         return None
-    try:
-        return float(value)
-    except Exception:
-        return None
+    with suppress(Exception):
+        found = float(value)
+        # What has more range than binary64 may become infinite.
+        return found if math.isfinite(found) or found == value or math.isnan(found) else None
+    return None
 
 
 def _check_buffer(out: Any) -> None:
@@ -256,7 +261,7 @@ def _check_buffer(out: Any) -> None:
     if not isinstance(out, np.ndarray):
         raise _refused("out", out, allowed)
     flags = out.flags
-    if out.dtype != np.float64 or out.shape != (3,) or not out.dtype.isnative:
+    if out.dtype != np.float64 or out.shape != (3,):
         raise InputError(f"out: {out.dtype} of shape {out.shape}; allowed: {allowed}")
     if not flags.writeable:
         raise InputError(f"out: an array that is read-only; allowed: {allowed}")
@@ -268,7 +273,7 @@ def _refused(where: str, value: object, allowed: str) -> InputError:
     try:
         shown = reprlib.repr(value)
     except ValueError:  # Python writes no whole number of many digits
-        shown = f"a {type(value).__name__} with a number of too many digits"
+        shown = "a number of too many digits to be shown"
     return InputError(f"{where}: {shown}; allowed: {allowed}")
 
 

@@ -214,7 +214,10 @@ static int call_object(bound_kernel *self, const double start[3], double time, d
   if (omega0 == NULL) return 0;
   memcpy(PyArray_DATA((PyArrayObject *)omega0), start, 3 * sizeof(double));
   result = PyObject_CallFunction(self->callable, "OOd", self->packed, omega0, time);
-  if (result != NULL && PyArg_ParseTuple(result, "Oii", &values, &found->status, &found->steps)) {
+  if (result != NULL && !PyTuple_Check(result)) {
+    PyErr_SetString(PyExc_TypeError, "the kernel returned no tuple");
+  } else if (result != NULL &&
+             PyArg_ParseTuple(result, "Oii", &values, &found->status, &found->steps)) {
     array = (PyArrayObject *)PyArray_FROM_OTF(values, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
   }
   if (array != NULL) {

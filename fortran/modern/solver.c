@@ -75,7 +75,7 @@ static ending *add_ending(bound_kernel *self, uint64_t thread)
     self->n_endings = kept;
     if (2 * kept >= self->room) {
       const Py_ssize_t room = self->room ? 2 * self->room : 2;
-      ending *grown = PyMem_Resize(self->endings, ending, room);
+      ending *grown = PyMem_Realloc(self->endings, (size_t)room * sizeof(ending));
       if (grown == NULL) {
         PyErr_NoMemory();
         return NULL;

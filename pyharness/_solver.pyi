@@ -1,6 +1,7 @@
 from collections.abc import Callable, Iterable
 from typing import Self, SupportsFloat, SupportsIndex
 
+from pyharness.scene import Triple
 from pyharness.trajectory import Array
 
 Number = SupportsFloat | SupportsIndex
@@ -11,7 +12,7 @@ class BoundKernel:
         cls,
         kernel: Callable[..., tuple[Array, int, int]],
         packed: Array,
-        check: Callable[[object, object, object], tuple[Array, float]],
+        check: Callable[[object, object, object], tuple[Triple, float]],
     ) -> Self: ...
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array: ...
     @property

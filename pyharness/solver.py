@@ -6,7 +6,7 @@ three arguments and enters the kernel. `solve` is the same for one use, with row
 
 import math
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Self
@@ -213,7 +213,7 @@ def solve(
     return solve_by_name(scene, times, method, tolerance)
 
 
-def _check(omega0: object, t_end: object, out: object) -> tuple[Array, float]:
+def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
     """Convert what a call was given and can't read at once.
 
     Raises
@@ -221,7 +221,7 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Array, float]:
     InputError
         For what is no start, no time or no buffer.
     """
-    start = np.array(_three("omega0", omega0))
+    start = _three("omega0", omega0)
     time = _number(t_end)
     if time is None:
         raise _refused("t_end", t_end, "one real number, in seconds")
@@ -234,7 +234,7 @@ def _three(where: str, values: Any) -> Triple:
     found: list[float | None] = []
     # An object of the user's may raise anything: then it is no three numbers.
     with suppress(Exception):
-        if not isinstance(values, str | bytes | dict | set):
+        if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
             found = [_number(each) for each in islice(values, 4)]
     match found:
         case [float(first), float(second), float(third)]:
@@ -244,10 +244,12 @@ def _three(where: str, values: Any) -> Triple:
 
 def _number(value: Any) -> float | None:
     """Return a real number as a float, None for anything else or beyond binary64."""
+    if type(value) is float:
+        return value
     kind = getattr(getattr(value, "dtype", None), "kind", "f")
     if kind not in "iuf" or getattr(value, "shape", ()) != ():
         return None
-    if isinstance(value, bool | str | bytes | bytearray | complex):
+    if isinstance(value, (bool, str, bytes, bytearray, complex)):
         return None
     with suppress(Exception):
         found = float(value)
@@ -261,7 +263,7 @@ def _check_buffer(out: Any) -> None:
     if not isinstance(out, np.ndarray):
         raise _refused("out", out, allowed)
     flags = out.flags
-    if out.dtype != np.float64 or out.shape != (3,):
+    if out.dtype.char != "d" or not out.dtype.isnative or out.shape != (3,):
         raise InputError(f"out: {out.dtype} of shape {out.shape}; allowed: {allowed}")
     if not flags.writeable:
         raise InputError(f"out: an array that is read-only; allowed: {allowed}")

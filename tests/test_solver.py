@@ -133,6 +133,7 @@ _NO_STARTS = (
     np.array([1.0, 2.0, 3.0j]), [1.0, 2.0, 3j], [1.0, 2.0], [1.0, 2.0, 3.0, 4.0], np.ones(4), 5.0,
     "123", b"123", ["1", "2", "3"], np.array(["1", "2", "3"]), None, [1.0, None, 3.0],
     [[1.0, 2.0, 3.0]], np.ones((1, 3)), np.ones((3, 1)), np.array(1.0), {1.0, 2.0, 3.0},
+    bytearray(b"123"), frozenset((1.0, 2.0, 3.0)), {1: 1, 2: 2, 3: 3},
     np.array([1.0, None, 3.0], dtype=object), [10**400, 1, 2], [10**5000, 1, 2], 10**5000,
     [True, False, True], np.array([True, False, True]), ["\n", "\x1b[31m", 1.0],
     np.array([1, 2, 3], dtype="m8[s]"),

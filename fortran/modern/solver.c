@@ -28,7 +28,7 @@ typedef struct {
   PyObject *callable;    /* the kernel as Python has it */
   kernel *address;       /* NULL where it is not f2py's: then it is called as Python would */
   PyArrayObject *packed; /* read-only */
-  PyObject *check;       /* (omega0, t_end, out) -> (ndarray, float), or its InputError */
+  PyObject *check;       /* (omega0, t_end, out) -> (three floats, float), or its InputError */
   ending *endings;
   Py_ssize_t n_endings;
   Py_ssize_t room;
@@ -154,30 +154,41 @@ static inline int is_three_floats(PyArrayObject *array)
          PyArray_TYPE(array) == NPY_DOUBLE;
 }
 
-/* Read a start that needs no conversion; its stride may be any. */
-static inline int read_start(PyObject *object, double start[3])
-{
-  PyArrayObject *array = (PyArrayObject *)object;
-  if (!PyArray_CheckExact(object) || !is_three_floats(array) || !PyArray_ISBEHAVED_RO(array)) {
-    return 0;
-  }
-  const char *data = PyArray_BYTES(array);
-  const npy_intp stride = PyArray_STRIDE(array, 0);
-  for (int i = 0; i < 3; i++) start[i] = *(const double *)(data + i * stride);
-  return 1;
-}
-
-static inline int read_time(PyObject *object, double *time)
+static inline int read_number(PyObject *object, double *number)
 {
   if (PyFloat_Check(object)) {
-    *time = PyFloat_AS_DOUBLE(object);
+    *number = PyFloat_AS_DOUBLE(object);
     return 1;
   }
   if (!PyLong_CheckExact(object)) return 0;
-  int beyond;
-  const long whole = PyLong_AsLongAndOverflow(object, &beyond);
-  *time = (double)whole;
-  return !beyond;
+  int is_beyond;
+  const long whole = PyLong_AsLongAndOverflow(object, &is_beyond);
+  *number = (double)whole;
+  return !is_beyond;
+}
+
+/* Read a start that needs no conversion; an array's stride may be any. */
+static inline int read_start(PyObject *object, double start[3])
+{
+  if (PyArray_CheckExact(object)) {
+    PyArrayObject *array = (PyArrayObject *)object;
+    if (!is_three_floats(array) || !PyArray_ISBEHAVED_RO(array)) return 0;
+    const char *data = PyArray_BYTES(array);
+    const npy_intp stride = PyArray_STRIDE(array, 0);
+    for (int i = 0; i < 3; i++) start[i] = *(const double *)(data + i * stride);
+    return 1;
+  }
+  if (PyTuple_CheckExact(object) && PyTuple_GET_SIZE(object) == 3) {
+    return read_number(PyTuple_GET_ITEM(object, 0), start) &&
+           read_number(PyTuple_GET_ITEM(object, 1), start + 1) &&
+           read_number(PyTuple_GET_ITEM(object, 2), start + 2);
+  }
+  if (PyList_CheckExact(object) && PyList_GET_SIZE(object) == 3) {
+    return read_number(PyList_GET_ITEM(object, 0), start) &&
+           read_number(PyList_GET_ITEM(object, 1), start + 1) &&
+           read_number(PyList_GET_ITEM(object, 2), start + 2);
+  }
+  return 0;
 }
 
 static inline int is_buffer(PyObject *object)
@@ -194,7 +205,7 @@ static int read_slowly(bound_kernel *self, const arguments *given, double start[
   if (found == NULL) return 0;
   const int is_right = PyTuple_Check(found) && PyTuple_GET_SIZE(found) == 2 &&
                        read_start(PyTuple_GET_ITEM(found, 0), start) &&
-                       read_time(PyTuple_GET_ITEM(found, 1), time) &&
+                       read_number(PyTuple_GET_ITEM(found, 1), time) &&
                        (given->out == Py_None || is_buffer(given->out));
   Py_DECREF(found);
   if (!is_right) PyErr_SetString(PyExc_SystemError, "the check let through what can't be read");
@@ -247,7 +258,7 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   } else if (!sort_arguments(&found, given, count, names)) {
     return NULL;
   }
-  if (!(read_start(found.omega0, start) && read_time(found.t_end, &time) &&
+  if (!(read_start(found.omega0, start) && read_number(found.t_end, &time) &&
         (found.out == Py_None || is_buffer(found.out)))) {
     if (!read_slowly(self, &found, start, &time)) return NULL;
   }

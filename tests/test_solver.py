@@ -189,10 +189,11 @@ def test_starts_and_times_of_other_kinds_are_converted() -> None:
     wanted = solver(np.array([1.0, 2.0, 3.0]), 2.0).tolist()
     starts: tuple[Any, ...] = (
         [1, 2, 3], (1.0, 2.0, 3.0), range(1, 4), np.array([1, 2, 3], "f4"),
-        np.array([1, 2, 3], "i1"), np.array([1, 2, 3], ">f8"), np.array([1, 2, 3], "g"),
+        np.array([1, 2, 3], "f2"), np.array([1, 2, 3], "u8"), np.array([1, 2, 3], "i1"),
+        np.array([1, 2, 3], ">f8"), np.array([1, 2, 3], "g"),
         np.array([3.0, 2.0, 1.0])[::-1],
         np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]).T[:, 0], (1, 2, Fraction(3)),
-        [np.float32(1), np.array(2), 3],
+        [np.float32(1), np.array(2), 3], [np.int8(1), np.float64(2), np.longdouble(3)],
         np.frombuffer(bytes(1) + np.array([1.0, 2.0, 3.0]).tobytes(), "u1")[1:].view("f8"),
     )  # fmt: skip
     for start in starts:

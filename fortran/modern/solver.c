@@ -148,10 +148,17 @@ static int sort_arguments(arguments *found, PyObject *const *given, Py_ssize_t c
   return 1;
 }
 
-static inline int is_three_floats(PyArrayObject *array)
+static inline int is_three(PyArrayObject *array)
 {
-  return PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == 3 &&
-         PyArray_TYPE(array) == NPY_DOUBLE;
+  return PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == 3;
+}
+
+/* NumPy's numbers that are all in the range of a double: no longdouble, no time span. */
+static int is_narrow(PyObject *object)
+{
+  return PyArray_IsScalar(object, Floating)  ? !PyArray_IsScalar(object, LongDouble)
+         : PyArray_IsScalar(object, Integer) ? !PyArray_IsScalar(object, Timedelta)
+                                             : 0;
 }
 
 static inline int read_number(PyObject *object, double *number)
@@ -160,19 +167,46 @@ static inline int read_number(PyObject *object, double *number)
     *number = PyFloat_AS_DOUBLE(object);
     return 1;
   }
-  if (!PyLong_CheckExact(object)) return 0;
-  int is_beyond;
-  const long whole = PyLong_AsLongAndOverflow(object, &is_beyond);
-  *number = (double)whole;
-  return !is_beyond;
+  if (PyLong_CheckExact(object)) {
+    int is_beyond;
+    const long whole = PyLong_AsLongAndOverflow(object, &is_beyond);
+    *number = (double)whole;
+    return !is_beyond;
+  }
+  if (!is_narrow(object)) return 0;
+  *number = PyFloat_AsDouble(object);
+  if (!PyErr_Occurred()) return 1;
+  PyErr_Clear();
+  return 0;
 }
 
-/* Read a start that needs no conversion; an array's stride may be any. */
+/* Read an array of another kind of numbers, or of bytes that lie otherwise. */
+static int read_converted(PyArrayObject *array, double start[3])
+{
+  const int type = PyArray_TYPE(array);
+  if (!PyTypeNum_ISINTEGER(type) && type != NPY_HALF && type != NPY_FLOAT && type != NPY_DOUBLE) {
+    return 0;
+  }
+  PyArrayObject *same =
+    (PyArrayObject *)PyArray_FROM_OTF((PyObject *)array, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
+  if (same == NULL) {
+    PyErr_Clear();
+    return 0;
+  }
+  memcpy(start, PyArray_DATA(same), 3 * sizeof(double));
+  Py_DECREF(same);
+  return 1;
+}
+
+/* Read a start, if it is plainly one; an array's stride may be any. */
 static inline int read_start(PyObject *object, double start[3])
 {
   if (PyArray_CheckExact(object)) {
     PyArrayObject *array = (PyArrayObject *)object;
-    if (!is_three_floats(array) || !PyArray_ISBEHAVED_RO(array)) return 0;
+    if (!is_three(array)) return 0;
+    if (PyArray_TYPE(array) != NPY_DOUBLE || !PyArray_ISBEHAVED_RO(array)) {
+      return read_converted(array, start);
+    }
     const char *data = PyArray_BYTES(array);
     const npy_intp stride = PyArray_STRIDE(array, 0);
     for (int i = 0; i < 3; i++) start[i] = *(const double *)(data + i * stride);
@@ -194,7 +228,8 @@ static inline int read_start(PyObject *object, double start[3])
 static inline int is_buffer(PyObject *object)
 {
   PyArrayObject *array = (PyArrayObject *)object;
-  return PyArray_Check(object) && is_three_floats(array) && PyArray_ISCARRAY(array);
+  return PyArray_Check(object) && is_three(array) && PyArray_TYPE(array) == NPY_DOUBLE &&
+         PyArray_ISCARRAY(array);
 }
 
 /* Let Python say what is wrong, or convert what is not. */
@@ -232,7 +267,7 @@ static int call_object(bound_kernel *self, const double start[3], double time, d
     array = (PyArrayObject *)PyArray_FROM_OTF(values, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
   }
   if (array != NULL) {
-    is_right = is_three_floats(array);
+    is_right = is_three(array);
     if (is_right) memcpy(omega, PyArray_DATA(array), 3 * sizeof(double));
     else PyErr_SetString(PyExc_ValueError, "the kernel returned no three numbers");
   }

@@ -139,7 +139,7 @@ def _stepped(bias: float) -> length.Runner:
         for each in times:
             number = max(1, round((each - begin) / step))
             for _ in range(number):
-                omega = solver(omega, (each - begin) / number) * 1.0
+                omega = solver(omega, (each - begin) / number)
                 omega += bias * brouwer.ROUNDING * omega
             begin, count = each, count + number
             rows.append(omega)

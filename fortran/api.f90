@@ -200,18 +200,19 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
                        evaluations)
 end subroutine fixed_step_solution
 
-subroutine solve_packed(packed, n_packed, omega, omega0, t_end)
-  ! A prepared solver's call: see fortran/modern/prepared.f90 for what is packed. What never changes
-  ! comes first, and omega is returned, the very array that was given.
+subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps)
+  ! A prepared solver's call: see fortran/modern/prepared.f90 for what is packed. solver.c calls it
+  ! by its address, and has its arguments written down once more.
   !f2py threadsafe
-  !f2py intent(out) omega
   use prepared, only: solve_prepared
   implicit none
   integer(4), intent(in) :: n_packed
-  real(8), intent(inout) :: packed(n_packed)
-  real(8), intent(inout) :: omega(3) ! rad/s; NaN unless the status in packed is 0
+  real(8), intent(in) :: packed(n_packed)
   real(8), intent(in) :: omega0(3)   ! rad/s
   real(8), intent(in) :: t_end       ! s
+  real(8), intent(out) :: omega(3)   ! rad/s; NaN unless the status is 0
+  integer(4), intent(out) :: status
+  integer(4), intent(out) :: steps   ! or right-hand sides, of Gauss collocation
 
-  call solve_prepared(packed, n_packed, omega0, t_end, omega)
+  call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps)
 end subroutine solve_packed

@@ -173,7 +173,7 @@ def _solved(
         solver, start = prepare(scene, method, tolerance), np.array(scene.omega)
         found = []
         for time in times:
-            found.append(solver(start, time).copy())
+            found.append(solver(start, time))
             if solver.status in ("refused", "gave up"):
                 raise InputError(f"{method} {solver.status}")
         rows = np.array(found)

@@ -141,37 +141,43 @@ def _stale_method(name: str) -> AbstractContextManager[Any]:
     return _method(name, lambda scene, times, solve: change(solve(scene, times)))
 
 
-def _stale_solver() -> AbstractContextManager[Any]:
-    """Every second call of a prepared solver does nothing, so that its buffers are left."""
-    entry = kernels.extension().solve_packed
-    calls = itertools.count()
+# What the kernel of a prepared solver returns: omega, status, steps.
+_Answer = tuple[Array, int, int]
 
-    def faulty(packed: Array, omega: Array, *rest: Any) -> Array:
-        if next(calls) % 2 == 0:
-            result: Array = entry(packed, omega, *rest)
-            return result
-        return omega
 
+def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextManager[Any]:
+    """Change what the kernel of a prepared solver returns, given what was packed for it."""
     import pyharness.solver as room
 
+    entry = kernels.extension().solve_packed
+
+    def faulty(packed: Array, *rest: Any) -> _Answer:
+        return change(packed, entry(packed, *rest))
+
     return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
+
+
+def _stale_solver() -> AbstractContextManager[Any]:
+    """Every second call of a prepared solver returns what the call before did."""
+    calls = itertools.count()
+    before: list[_Answer] = []
+
+    def change(packed: Array, answer: _Answer) -> _Answer:
+        if next(calls) % 2 == 0:
+            before[:] = [answer]
+        return before[0]
+
+    return _prepared(change)
 
 
 def _refusing_solver(code: int) -> AbstractContextManager[Any]:
     """Let a prepared solver refuse everything; `code` names its method in `prepared.f90`."""
-    entry = kernels.extension().solve_packed
-    refused = kernels.REFUSED
 
-    def faulty(packed: Array, omega: Array, *rest: Any) -> Array:
-        result: Array = entry(packed, omega, *rest)
-        if packed[0] == code:
-            packed[14] = refused
-            result[:] = np.nan
-        return result
+    def change(packed: Array, answer: _Answer) -> _Answer:
+        omega, _, steps = answer
+        return (omega * np.nan, kernels.REFUSED, steps) if packed[0] == code else answer
 
-    import pyharness.solver as room
-
-    return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
+    return _prepared(change)
 
 
 def _half_step(scene: Scene) -> Scene:
@@ -198,18 +204,15 @@ def _count_both(program: Program, scene: Scene, runs: tuple[Any, ...]) -> Trajec
 
 def _wrong_steps() -> AbstractContextManager[Any]:
     """Let the results of the fixed-step methods and of Gauss collocation be too large."""
-    import pyharness.solver as room
+    from pyharness.solver import _CODES
 
-    entry = kernels.extension().solve_packed
-    steps = [code for name, code in room._CODES.items() if name.startswith(("gauss", "rk", "impr"))]
+    steps = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk", "impr"))]
 
-    def faulty(packed: Array, omega: Array, *rest: Any) -> Array:
-        result: Array = entry(packed, omega, *rest)
-        if packed[0] in steps:
-            result *= 1.01
-        return result
+    def change(packed: Array, answer: _Answer) -> _Answer:
+        omega, *rest = answer
+        return (omega * 1.01, *rest) if packed[0] in steps else answer  # type: ignore[return-value]
 
-    return patch.object(room, "extension", lambda: SimpleNamespace(solve_packed=faulty))
+    return _prepared(change)
 
 
 def _shifted(scene: Scene, times: Sequence[float], solve: Callable[..., Trajectory]) -> Trajectory:
@@ -310,7 +313,7 @@ PLANTS = (
     Plant("stale-fortran", "the result of the run before", lambda: _compiled(_stale())),
     Plant("stale-method", "the Taylor method answers with the result before",
           lambda: _stale_method("taylor")),
-    Plant("stale-solver", "a prepared solver leaves in its buffer what was there", _stale_solver),
+    Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver),
     Plant("quick-refuses", "the solver for few digits refuses every scene",
           lambda: _refusing_solver(7)),
     Plant("label-in-fortran", "TIME shifted by half a step",

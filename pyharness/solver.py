@@ -1,23 +1,34 @@
 """Solvers: prepared once, called in a loop at little more than the cost of the kernel itself.
 
-`prepare` validates the scene, decides what it needs (`plan`) and packs it; a call then converts
+`prepare` validates the scene, decides what it needs (`plan`) and packs it; a call then looks at
 three arguments and enters the kernel. `solve` is the same for one use, with rows at many times.
 """
 
-from collections.abc import Sequence
-from functools import partial
-from typing import Self
+import math
+import reprlib
+from collections.abc import Mapping, Sequence, Set
+from contextlib import suppress
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from pyharness.errors import InputError, unknown
 from pyharness.kernels import ENDS, extension, normalized
 from pyharness.plan import EITHER, Plan, plan
-from pyharness.scene import Scene
+from pyharness.scene import Scene, Triple
 from pyharness.trajectory import Array, Trajectory
 
-# Places in the packed array: see fortran/modern/prepared.f90.
-_STATUS_AT, _STEPS_AT, _WAVES_AT = 14, 15, 16
+if TYPE_CHECKING:
+    from pyharness._solver import BoundKernel, Numbers
+else:
+    try:
+        from pyharness._solver import BoundKernel
+    except ImportError:  # not built, as `extension` says when a solver is made
+        BoundKernel = object
+
+# The first of the waves in the packed array: see fortran/modern/prepared.f90.
+_WAVES_AT = 14
 _CODES = {
     "closed-form": 1,
     "sphere": 2,
@@ -37,13 +48,20 @@ PREPARED = (
 )
 
 
-class Solver(partial[Array]):
-    """A scene prepared for one method; a solver belongs to one thread, its buffers are its own.
+class Solver(BoundKernel):
+    """A scene prepared for one method.
 
-    Call it as ``solver(omega0, t_end)``: `omega0` an array of three floats (rad/s), `t_end` in
-    seconds on either side of 0. It returns the angular velocity at `t_end`, an array of shape
-    (3,) that the next call overwrites: copy what you keep. Nothing is checked in a call; where
-    the kernel could not finish the result is NaN and `status` says why.
+    Call it as ``solver(omega0, t_end)``: `omega0` three real numbers (rad/s), `t_end` one, in
+    seconds on either side of 0. It returns the angular velocity at `t_end`, a new array of shape
+    (3,); or ``solver(omega0, t_end, out=array)`` writes it into an array of three floats that lie
+    side by side, which may be `omega0` itself, and returns that. What is none of these is refused
+    with an InputError, and `out` stays as it was. Fastest is an array of floats for `omega0`.
+
+    Where the kernel could not finish the result is NaN and `status` says why; so it is from a
+    start, or to a time, that is not finite.
+
+    Threads may share a solver and call it at once: the kernel releases the GIL. Solvers can be
+    copied and pickled; a copy has made no call yet.
 
     Attributes
     ----------
@@ -51,8 +69,8 @@ class Solver(partial[Array]):
         What was decided, and why.
     """
 
-    # A partial of the kernel: a call goes from the interpreter into the kernel with no Python
-    # between, which would cost as much as an easy solve.
+    # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
+    # Python between, which would cost as much as an easy solve.
     plan: Plan
     _scene: Scene
     _tolerance: float
@@ -60,13 +78,17 @@ class Solver(partial[Array]):
 
     def __new__(cls, scene: Scene, chosen: Plan, tolerance: float, asked: str) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
-        packed = _pack(scene, _code(chosen, asked), tolerance)
-        solver = super().__new__(cls, extension().solve_packed, packed, np.empty(3))
+        kernel = extension().solve_packed
+        solver = super().__new__(cls, kernel, _pack(scene, _code(chosen, asked), tolerance), _check)
         solver.plan = chosen
         solver._scene = scene
         solver._tolerance = tolerance
         solver._asked = asked
         return solver
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a copy, in this process or another, be prepared as this one was."""
+        return type(self), (self._scene, self.plan, self._tolerance, self._asked)
 
     def __repr__(self) -> str:
         """Say the scene and the method."""
@@ -74,15 +96,22 @@ class Solver(partial[Array]):
 
     @property
     def status(self) -> str:
-        """How the last call ended: complete, overflow, refused or gave up."""
-        return ENDS[int(self.args[0][_STATUS_AT])]
+        """How this thread's last call ended: complete, overflow, refused or gave up.
+
+        ``complete``, in 0 steps, where this thread has made none. A call that was refused at the
+        door, or interrupted, is not counted.
+        """
+        return ENDS[self._ending[0]]
 
     @property
     def steps(self) -> int:
-        """Steps of the last call (right-hand sides of Gauss collocation), 0 of a closed form."""
-        return int(self.args[0][_STEPS_AT])
+        """Steps of this thread's last call (right-hand sides of Gauss collocation).
 
-    def trajectory(self, omega0: Sequence[float], times: Sequence[float]) -> Trajectory:
+        0 of a closed form.
+        """
+        return self._ending[1]
+
+    def trajectory(self, omega0: "Numbers", times: Sequence[float]) -> Trajectory:
         """Return rows at `times` from another start.
 
         Parameters
@@ -101,10 +130,7 @@ class Solver(partial[Array]):
 
         from pyharness.methods import solve as solve_by_name
 
-        if len(omega0) != 3:
-            raise InputError(f"omega0: {len(omega0)} numbers; allowed: three")
-        first, second, third = (float(each) for each in omega0)
-        scene = replace(self._scene, omega=(first, second, third))
+        scene = replace(self._scene, omega=_three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
         return solve_by_name(scene, times, method, self._tolerance)
 
@@ -185,6 +211,72 @@ def solve(
     from pyharness.methods import solve as solve_by_name
 
     return solve_by_name(scene, times, method, tolerance)
+
+
+def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
+    """Convert what a call was given and can't read at once.
+
+    Raises
+    ------
+    InputError
+        For what is no start, no time or no buffer.
+    """
+    start = _three("omega0", omega0)
+    time = _number(t_end)
+    if time is None:
+        raise _refused("t_end", t_end, "one real number, in seconds")
+    if out is not None:
+        _check_buffer(out)
+    return start, time
+
+
+def _three(where: str, values: Any) -> Triple:
+    found: list[float | None] = []
+    # An object of the user's may raise anything: then it is no three numbers.
+    with suppress(Exception):
+        if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
+            found = [_number(each) for each in islice(values, 4)]
+    match found:
+        case [float(first), float(second), float(third)]:
+            return first, second, third
+    raise _refused(where, values, "three real numbers, in rad/s")
+
+
+def _number(value: Any) -> float | None:
+    """Return a real number as a float, None for anything else or beyond binary64."""
+    if type(value) is float:
+        return value
+    kind = getattr(getattr(value, "dtype", None), "kind", "f")
+    if kind not in "iuf" or getattr(value, "shape", ()) != ():
+        return None
+    if isinstance(value, (bool, str, bytes, bytearray, complex)):
+        return None
+    with suppress(Exception):
+        found = float(value)
+        # What has more range than binary64 may become infinite.
+        return found if math.isfinite(found) or found == value or math.isnan(found) else None
+    return None
+
+
+def _check_buffer(out: Any) -> None:
+    allowed = "a writable array of three float64 side by side"
+    if not isinstance(out, np.ndarray):
+        raise _refused("out", out, allowed)
+    flags = out.flags
+    if out.dtype.char != "d" or not out.dtype.isnative or out.shape != (3,):
+        raise InputError(f"out: {out.dtype} of shape {out.shape}; allowed: {allowed}")
+    if not flags.writeable:
+        raise InputError(f"out: an array that is read-only; allowed: {allowed}")
+    if not (flags.c_contiguous and flags.aligned):
+        raise InputError(f"out: an array with strides {out.strides}; allowed: {allowed}")
+
+
+def _refused(where: str, value: object, allowed: str) -> InputError:
+    try:
+        shown = reprlib.repr(value)
+    except ValueError:  # Python writes no whole number of many digits
+        shown = "a number of too many digits to be shown"
+    return InputError(f"{where}: {shown}; allowed: {allowed}")
 
 
 def _code(chosen: Plan, asked: str) -> int:

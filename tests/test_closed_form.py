@@ -240,8 +240,8 @@ def _packed_end(coefficients: Triple, omega: Triple, time: float) -> tuple[Array
     packed = np.zeros(20)
     packed[0] = 1.0
     packed[5:8] = coefficients
-    found: Array = extension().solve_packed(packed, np.empty(3), np.array(omega), time)
-    return found, int(packed[14])
+    found, status, _ = extension().solve_packed(packed, np.array(omega), time)
+    return found, status
 
 
 def test_refusals_name_the_reason() -> None:

@@ -158,9 +158,9 @@ def test_guard_knows_an_attempt_that_is_refused(
     monkeypatch.setattr(traps, "_mathematics", lambda: _Flags(TOO_LARGE))
     packed = np.zeros(20)
     packed[0] = code
-    call = guarded("solve_packed", lambda _: packed)
+    call = guarded("solve_packed", _entry(COMPLETE, 0.0))
     if is_told:
-        assert call(packed) is packed
+        assert call(packed) == (COMPLETE, 0.0)
     else:
         with pytest.raises(UntoldException, match="overflow"):
             call(packed)

@@ -4,12 +4,15 @@ import random
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, prepare, solve
+import pyharness.solver as room
+from pyharness import InputError, Scene, TorqueLaw, kernels, prepare, solve
 from pyharness.checks import Check
 from pyharness.reference import reference
 from pyharness.scene import Triple
@@ -136,7 +139,7 @@ def _stepped(bias: float) -> length.Runner:
         for each in times:
             number = max(1, round((each - begin) / step))
             for _ in range(number):
-                omega = solver(omega, (each - begin) / number) * 1.0
+                omega = solver(omega, (each - begin) / number)
                 omega += bias * brouwer.ROUNDING * omega
             begin, count = each, count + number
             rows.append(omega)
@@ -227,14 +230,27 @@ def test_a_buffer_that_threads_share_is_found(shared: bool) -> None:
     assert bool(differing) == shared
 
 
-def test_a_solver_in_another_thread_than_its_own_is_what_the_trial_avoids() -> None:
-    """Each job prepares its own: two solvers of one scene share no memory."""
-    scene = threads.SCENES[0]
-    first, second = prepare(scene), prepare(scene)
-    kept = first(np.array(scene.omega), 1.0)
-    before = kept.copy()
-    second(np.array(scene.omega), 2.0)
-    np.testing.assert_array_equal(kept, before)
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_kernel_that_writes_where_all_do_is_found(
+    shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All threads call one solver, whose buffer was its own."""
+    entry, buffer = kernels.extension().solve_packed, np.zeros(3)
+
+    def kernel(*arguments: Any) -> Any:
+        omega, *rest = entry(*arguments)
+        own = buffer if shared else np.zeros(3)
+        own[:] = omega
+        time.sleep(1e-5)
+        return own.copy(), *rest
+
+    monkeypatch.setattr(room, "extension", lambda: SimpleNamespace(solve_packed=kernel))
+    threads._shared.cache_clear()
+    jobs = [each for each in threads.jobs() if each.subject == "prepared-rk4"]
+    differing = threads.different(jobs, repeats=3)
+    threads._shared.cache_clear()
+    assert len(jobs) == 3
+    assert bool(differing) == shared
 
 
 # What the trials found.

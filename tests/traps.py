@@ -20,7 +20,7 @@ import numpy as np
 
 from pyharness.kernels import GAVE_UP, OVERFLOW
 from pyharness.plan import EITHER
-from pyharness.solver import _CODES, _STATUS_AT
+from pyharness.solver import _CODES
 
 _METHOD_AT = 0
 _ON_ARM = platform.machine().lower() in ("arm64", "aarch64")
@@ -61,12 +61,10 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         if not raised:
             return answer
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
-        if name == "solve_packed":
-            found["status"] = int(args[0][_STATUS_AT])
-            if args[0][_METHOD_AT] in _TRIES_AGAIN:
-                # An attempt with too long steps may overflow; then it is made again with shorter
-                # ones, or the series answers.
-                found["status"] = OVERFLOW
+        if name == "solve_packed" and args[0][_METHOD_AT] in _TRIES_AGAIN:
+            # An attempt with too long steps may overflow; then it is made again with shorter ones,
+            # or the series answers.
+            found["status"] = OVERFLOW
         untold = raised & ~_told(found, bool(raised & TOO_LARGE) or not _finite(args))
         if not untold or _are_extreme((*args, found.get("rows", 0.0))):
             return answer

@@ -12,7 +12,7 @@ module prepared
   implicit none(type, external)
   private
 
-  ! Places in the packed array; pyharness/solver.py fills it.
+  ! Places in the packed array; pyharness/solver.py fills it, and any number of threads read it.
   integer, parameter :: METHOD = 1
   integer, parameter :: TOLERANCE = 2    ! relative, of the series
   integer, parameter :: STEP = 3         ! s, of the methods with a fixed step
@@ -21,9 +21,7 @@ module prepared
   integer, parameter :: COEFFICIENTS = 6 ! three
   integer, parameter :: M_CONSTANT = 9   ! three, 1/s2
   integer, parameter :: M_RATE = 12      ! three, 1/s3
-  integer, parameter :: STATUS = 15      ! out
-  integer, parameter :: STEPS = 16       ! out: steps, or right-hand sides, of the last call
-  integer, parameter :: WAVES = 17       ! four for each sine, then for each cosine
+  integer, parameter :: WAVES = 15       ! four for each sine, then for each cosine
 
   ! Values of METHOD; 10 + s is Gauss collocation of s stages.
   integer, parameter :: TORQUE_FREE = 1
@@ -48,33 +46,37 @@ module prepared
 
 contains
 
-  subroutine solve_prepared(packed, n_packed, omega0, t_end, omega)
-    !! Angular velocity at `t_end` by the method that was prepared; NaN unless STATUS is 0.
+  subroutine solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps)
+    !! Angular velocity at `t_end` by the method that was prepared; NaN unless `status` is 0.
     integer, intent(in) :: n_packed
-    real(dp), intent(inout) :: packed(n_packed)
+    real(dp), intent(in) :: packed(n_packed)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
+    integer, intent(out) :: status     !! of the module statuses
+    integer, intent(out) :: steps      !! or right-hand sides, of Gauss collocation
     real(dp) :: largest
 
     largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
     if (largest <= LARGE .and. largest*LARGE >= 1.0_dp) then
-      call solve_as_given(packed, n_packed, omega0, t_end, omega)
+      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps)
     else
-      call solve_near_one(packed, n_packed, omega0, t_end, largest, omega)
+      call solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps)
     end if
     ! Not ieee_value: that module ties the binary to libgfortran.
-    if (int(packed(STATUS)) /= COMPLETE) omega = transfer(huge(0_int64), 1.0_dp)
+    if (status /= COMPLETE) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
 
-  subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega)
+  subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps)
     !! The same in units that bring omega near 1, by a power of two: it changes no digit.
     integer, intent(in) :: n_packed
-    real(dp), intent(inout) :: packed(n_packed)
+    real(dp), intent(in) :: packed(n_packed)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(in) :: largest    !! of omega0, rad/s
     real(dp), intent(out) :: omega(3)  !! rad/s
+    integer, intent(out) :: status     !! of the module statuses
+    integer, intent(out) :: steps      !! or right-hand sides, of Gauss collocation
     real(dp) :: copy(n_packed)
     real(dp) :: start(3)
     real(dp) :: reach      ! omega0 and what the torque gives, rad/s
@@ -113,30 +115,28 @@ contains
     if (.not. (all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
                .and. (abs(time) >= tiny(time) .or. .not. abs(t_end) > 0.0_dp))) power = 0
     if (power == 0) then
-      call solve_as_given(packed, n_packed, omega0, t_end, omega)
+      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps)
       return
     end if
     do i = 1, 3
       start(i) = scale(omega0(i), -power)
     end do
-    call solve_as_given(copy, n_packed, start, time, omega)
+    call solve_as_given(copy, n_packed, start, time, omega, status, steps)
     do i = 1, 3
       omega(i) = scale(omega(i), power)
     end do
-    if (int(copy(STATUS)) == COMPLETE .and. .not. all(abs(omega) <= huge(time))) then
-      copy(STATUS) = real(OVERFLOW, dp)
-    end if
-    packed(STATUS) = copy(STATUS)
-    packed(STEPS) = copy(STEPS)
+    if (status == COMPLETE .and. .not. all(abs(omega) <= huge(time))) status = OVERFLOW
   end subroutine solve_near_one
 
-  subroutine solve_as_given(packed, n_packed, omega0, t_end, omega)
-    !! The same without a look at the scale; omega means nothing unless STATUS is 0.
+  subroutine solve_as_given(packed, n_packed, omega0, t_end, omega, ended, count)
+    !! The same without a look at the scale; omega means nothing unless `ended` is 0.
     integer, intent(in) :: n_packed
-    real(dp), intent(inout) :: packed(n_packed)
+    real(dp), intent(in) :: packed(n_packed)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
+    integer, intent(out) :: ended      !! of the module statuses
+    integer, intent(out) :: count      !! or right-hand sides, of Gauss collocation
     real(dp) :: times(1)
     real(dp) :: rows(3, 1)
     real(dp) :: reached(4)
@@ -145,8 +145,6 @@ contains
     integer :: cosines
     integer :: cosines_at
     integer :: n_rows
-    integer :: ended
-    integer :: count
     integer :: evaluations
 
     sines = int(packed(N_SINES))
@@ -197,8 +195,6 @@ contains
     end select
     ! A start that is not finite may come back as it is, at time 0 for one.
     if (ended == COMPLETE .and. .not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
-    packed(STATUS) = real(ended, dp)
-    packed(STEPS) = real(count, dp)
   end subroutine solve_as_given
 
   pure integer function fixed_method(code)

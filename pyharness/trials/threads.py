@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.methods import IMPLEMENTATIONS, METHODS, PROGRAM_REGISTRY, solve
 from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
-from pyharness.solver import PREPARED, prepare
+from pyharness.solver import PREPARED, Solver, prepare
 from pyharness.stress import Outcome, Trial, replay
 from pyharness.trials import promises
 
@@ -117,7 +117,6 @@ def jobs() -> list[Job]:
         for name in METHODS:
             found.append(Job(name, scene, partial(_rows, scene, name)))
         for name in PREPARED:
-            # `prepare` in the thread itself: a solver belongs to one.
             found.append(Job(f"prepared-{name}", scene, partial(_prepared, scene, name)))
         for program in PROGRAMS:
             for listing in (original(program), corrected(program)):
@@ -137,13 +136,19 @@ def _rows(scene: Scene, name: str) -> bytes:
 
 
 def _prepared(scene: Scene, name: str) -> bytes:
-    solver, other = (prepare(each, name, 1e-7) for each in (scene, SCENES[0]))
+    solver, other = _shared(scene, name), _shared(SCENES[0], name)
     found = []
     for k in range(20):
         start = np.array(scene.omega) + 0.1 * k
         found.append(solver(start, _TIMES[-1]).tobytes() + solver.status.encode())
         found.append(other(start, -_TIMES[0]).tobytes())
     return b"".join(found)
+
+
+@cache
+def _shared(scene: Scene, name: str) -> Solver:
+    """Return the one solver that all threads call."""
+    return prepare(scene, name, 1e-7)
 
 
 def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:

@@ -214,7 +214,7 @@ def held(id: str, scene: Scene, truth: Truth, name: str, tolerance: float) -> Ch
 def _end(scene: Scene, time: float, name: str, tolerance: float) -> tuple[Array, str]:
     if name in _PREPARED:
         solver = prepare(scene, _PREPARED[name], tolerance)
-        return solver(np.array(scene.omega), time).copy(), solver.status
+        return solver(np.array(scene.omega), time), solver.status
     found = solve(scene, [time], name, tolerance)
     return found.omega[-1] if len(found.omega) else np.full(3, math.nan), found.ended
 

@@ -143,7 +143,7 @@ def run_method(name: str, scene: Scene, time: float, tolerance: float | None) ->
     """
     if name in ("auto", "quick") or tolerance is None:
         solver = prepare(scene, name, tolerance or 1.0)
-        omega = solver(np.array(scene.omega), time).copy()
+        omega = solver(np.array(scene.omega), time)
         if solver.status in ("refused", "gave up"):
             raise InputError(f"{name}: {solver.status}")
         steps = solver.steps if tolerance is not None else _steps(scene, time)

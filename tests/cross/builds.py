@@ -50,7 +50,7 @@ class Build:
 
 
 def make(build: Build, folder: Path) -> Path:
-    """Copy the checkout into `folder`, build there, and put the extension into its package.
+    """Copy the checkout into `folder`, build there, and put the extensions into its package.
 
     Raises
     ------
@@ -80,10 +80,11 @@ def make(build: Build, folder: Path) -> Path:
         if done.returncode:
             end = "\n".join(done.stdout.splitlines()[-20:])
             raise RuntimeError(f"{build.name}: {shlex.join(command)} failed\n{end}")
-    (module,) = (
-        path for path in (tree / "build").glob("_kernels.*") if path.suffix in (".so", ".pyd")
-    )
-    shutil.copy2(module, tree / "pyharness")
+    for name in ("_kernels", "_solver"):
+        (module,) = (
+            path for path in (tree / "build").glob(f"{name}.*") if path.suffix in (".so", ".pyd")
+        )
+        shutil.copy2(module, tree / "pyharness")
     shutil.copy2(tree / "build" / "_build.py", tree / "pyharness")
     return tree
 

@@ -1,0 +1,445 @@
+/* The call of a prepared solver, from the interpreter into the kernel with no Python between: the
+   arguments are looked at, not converted, and what is not plainly right goes to a check in Python.
+
+   The kernel is f2py's: its address comes from there, so that no Fortran is linked twice. It only
+   reads the packed array, and writes into this call's own stack; so threads may share a solver. */
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+#include <stddef.h>
+
+#define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
+#define NPY_TARGET_VERSION NPY_2_0_API_VERSION
+#include <numpy/arrayobject.h>
+
+/* solve_packed of api.f90. */
+typedef void kernel(const double *packed, const int *n_packed, const double *omega0,
+                    const double *t_end, double *omega, int *status, int *steps);
+
+/* How a thread's last call ended. A thread's number is never given again, as its address is. */
+typedef struct {
+  uint64_t thread;
+  int status;
+  int steps;
+} ending;
+
+typedef struct {
+  PyObject_HEAD
+  vectorcallfunc vectorcall;
+  PyObject *callable;    /* the kernel as Python has it */
+  kernel *address;       /* NULL where it is not f2py's: then it is called as Python would */
+  PyArrayObject *packed; /* read-only */
+  PyObject *check;       /* (omega0, t_end, out) -> (three floats, float), or its InputError */
+  ending *endings;
+  Py_ssize_t n_endings;
+  Py_ssize_t room;
+  Py_ssize_t latest; /* where the last call's ending is */
+} bound_kernel;
+
+static PyObject *out_name; /* interned, as the compiler's names of keywords are */
+static npy_intp three[1] = {3};
+
+/* ---- Endings ------------------------------------------------------------------------------ */
+
+static ending *find_ending(bound_kernel *self, uint64_t thread)
+{
+  if (self->latest < self->n_endings && self->endings[self->latest].thread == thread) {
+    return self->endings + self->latest;
+  }
+  for (Py_ssize_t i = 0; i < self->n_endings; i++) {
+    if (self->endings[i].thread == thread) {
+      self->latest = i;
+      return self->endings + i;
+    }
+  }
+  return NULL;
+}
+
+static int is_running(uint64_t thread)
+{
+  PyThreadState *each = PyInterpreterState_ThreadHead(PyInterpreterState_Get());
+  for (; each != NULL; each = PyThreadState_Next(each)) {
+    if (PyThreadState_GetID(each) == thread) return 1;
+  }
+  return 0;
+}
+
+/* Give a thread a place. Those of threads that are gone are taken first, so that there are never
+   more than four times as many places as there were threads at once. */
+static ending *add_ending(bound_kernel *self, uint64_t thread)
+{
+  if (self->n_endings == self->room) {
+    Py_ssize_t kept = 0;
+    for (Py_ssize_t i = 0; i < self->n_endings; i++) {
+      if (is_running(self->endings[i].thread)) self->endings[kept++] = self->endings[i];
+    }
+    self->n_endings = kept;
+    if (2 * kept >= self->room) {
+      const Py_ssize_t room = self->room ? 2 * self->room : 2;
+      ending *grown = PyMem_Realloc(self->endings, (size_t)room * sizeof(ending));
+      if (grown == NULL) {
+        PyErr_NoMemory();
+        return NULL;
+      }
+      self->endings = grown;
+      self->room = room;
+    }
+  }
+  self->latest = self->n_endings++;
+  self->endings[self->latest] = (ending){thread, 0, 0};
+  return self->endings + self->latest;
+}
+
+static PyObject *get_ending(PyObject *object, void *Py_UNUSED(closure))
+{
+  const ending *own =
+    find_ending((bound_kernel *)object, PyThreadState_GetID(PyThreadState_Get()));
+  return own ? Py_BuildValue("(ii)", own->status, own->steps) : Py_BuildValue("(ii)", 0, 0);
+}
+
+/* ---- Arguments ---------------------------------------------------------------------------- */
+
+typedef struct {
+  PyObject *omega0;
+  PyObject *t_end;
+  PyObject *out; /* or None */
+} arguments;
+
+/* Put what was given into its place by position and name, as for
+   def solver(omega0, t_end, *, out=None). */
+static int sort_arguments(arguments *found, PyObject *const *given, Py_ssize_t count,
+                          PyObject *names)
+{
+  static const char *const known[] = {"omega0", "t_end", "out"};
+  PyObject **const places[] = {&found->omega0, &found->t_end, &found->out};
+  const Py_ssize_t n_names = names ? PyTuple_GET_SIZE(names) : 0;
+
+  if (count > 2) {
+    PyErr_Format(PyExc_TypeError,
+                 "solver(omega0, t_end, *, out=None) takes 2 positional arguments but %zd were given",
+                 count);
+    return 0;
+  }
+  for (Py_ssize_t i = 0; i < count; i++) *places[i] = given[i];
+  for (Py_ssize_t i = 0; i < n_names; i++) {
+    PyObject *name = PyTuple_GET_ITEM(names, i);
+    int k = 0;
+    while (k < 3 && PyUnicode_CompareWithASCIIString(name, known[k]) != 0) k++;
+    if (k == 3) {
+      PyErr_Format(PyExc_TypeError,
+                   "solver(omega0, t_end, *, out=None) got an unexpected keyword argument '%U'", name);
+      return 0;
+    }
+    if (*places[k] != NULL) {
+      PyErr_Format(PyExc_TypeError,
+                   "solver(omega0, t_end, *, out=None) got multiple values for argument '%s'",
+                   known[k]);
+      return 0;
+    }
+    *places[k] = given[count + i];
+  }
+  for (int k = 0; k < 2; k++) {
+    if (*places[k] == NULL) {
+      PyErr_Format(PyExc_TypeError, "solver(omega0, t_end, *, out=None) missing argument '%s'",
+                   known[k]);
+      return 0;
+    }
+  }
+  if (found->out == NULL) found->out = Py_None;
+  return 1;
+}
+
+static inline int is_three(PyArrayObject *array)
+{
+  return PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == 3;
+}
+
+/* NumPy's numbers that are all in the range of a double: no longdouble, no time span. */
+static int is_narrow(PyObject *object)
+{
+  return PyArray_IsScalar(object, Floating)  ? !PyArray_IsScalar(object, LongDouble)
+         : PyArray_IsScalar(object, Integer) ? !PyArray_IsScalar(object, Timedelta)
+                                             : 0;
+}
+
+static inline int read_number(PyObject *object, double *number)
+{
+  if (PyFloat_Check(object)) {
+    *number = PyFloat_AS_DOUBLE(object);
+    return 1;
+  }
+  if (PyLong_CheckExact(object)) {
+    int is_beyond;
+    const long whole = PyLong_AsLongAndOverflow(object, &is_beyond);
+    *number = (double)whole;
+    return !is_beyond;
+  }
+  if (!is_narrow(object)) return 0;
+  *number = PyFloat_AsDouble(object);
+  if (!PyErr_Occurred()) return 1;
+  PyErr_Clear();
+  return 0;
+}
+
+/* Read an array of another kind of numbers, or of bytes that lie otherwise. */
+static int read_converted(PyArrayObject *array, double start[3])
+{
+  const int type = PyArray_TYPE(array);
+  if (!PyTypeNum_ISINTEGER(type) && type != NPY_HALF && type != NPY_FLOAT && type != NPY_DOUBLE) {
+    return 0;
+  }
+  PyArrayObject *same =
+    (PyArrayObject *)PyArray_FROM_OTF((PyObject *)array, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
+  if (same == NULL) {
+    PyErr_Clear();
+    return 0;
+  }
+  memcpy(start, PyArray_DATA(same), 3 * sizeof(double));
+  Py_DECREF(same);
+  return 1;
+}
+
+/* Read a start, if it is plainly one; an array's stride may be any. */
+static inline int read_start(PyObject *object, double start[3])
+{
+  if (PyArray_CheckExact(object)) {
+    PyArrayObject *array = (PyArrayObject *)object;
+    if (!is_three(array)) return 0;
+    if (PyArray_TYPE(array) != NPY_DOUBLE || !PyArray_ISBEHAVED_RO(array)) {
+      return read_converted(array, start);
+    }
+    const char *data = PyArray_BYTES(array);
+    const npy_intp stride = PyArray_STRIDE(array, 0);
+    for (int i = 0; i < 3; i++) start[i] = *(const double *)(data + i * stride);
+    return 1;
+  }
+  if (PyTuple_CheckExact(object) && PyTuple_GET_SIZE(object) == 3) {
+    return read_number(PyTuple_GET_ITEM(object, 0), start) &&
+           read_number(PyTuple_GET_ITEM(object, 1), start + 1) &&
+           read_number(PyTuple_GET_ITEM(object, 2), start + 2);
+  }
+  if (PyList_CheckExact(object) && PyList_GET_SIZE(object) == 3) {
+    return read_number(PyList_GET_ITEM(object, 0), start) &&
+           read_number(PyList_GET_ITEM(object, 1), start + 1) &&
+           read_number(PyList_GET_ITEM(object, 2), start + 2);
+  }
+  return 0;
+}
+
+static inline int is_buffer(PyObject *object)
+{
+  PyArrayObject *array = (PyArrayObject *)object;
+  return PyArray_Check(object) && is_three(array) && PyArray_TYPE(array) == NPY_DOUBLE &&
+         PyArray_ISCARRAY(array);
+}
+
+/* Let Python say what is wrong, or convert what is not. */
+static int read_slowly(bound_kernel *self, const arguments *given, double start[3], double *time)
+{
+  PyObject *found =
+    PyObject_CallFunctionObjArgs(self->check, given->omega0, given->t_end, given->out, NULL);
+  if (found == NULL) return 0;
+  const int is_right = PyTuple_Check(found) && PyTuple_GET_SIZE(found) == 2 &&
+                       read_start(PyTuple_GET_ITEM(found, 0), start) &&
+                       read_number(PyTuple_GET_ITEM(found, 1), time) &&
+                       (given->out == Py_None || is_buffer(given->out));
+  Py_DECREF(found);
+  if (!is_right) PyErr_SetString(PyExc_SystemError, "the check let through what can't be read");
+  return is_right;
+}
+
+/* ---- The call ----------------------------------------------------------------------------- */
+
+/* Enter a kernel of another kind, one that stands in f2py's place. */
+static int call_object(bound_kernel *self, const double start[3], double time, double omega[3],
+                       ending *found)
+{
+  int is_right = 0;
+  PyObject *result = NULL, *values;
+  PyArrayObject *array = NULL;
+  PyObject *omega0 = PyArray_SimpleNew(1, three, NPY_DOUBLE);
+  if (omega0 == NULL) return 0;
+  memcpy(PyArray_DATA((PyArrayObject *)omega0), start, 3 * sizeof(double));
+  result = PyObject_CallFunction(self->callable, "OOd", self->packed, omega0, time);
+  if (result != NULL && !PyTuple_Check(result)) {
+    PyErr_SetString(PyExc_TypeError, "the kernel returned no tuple");
+  } else if (result != NULL &&
+             PyArg_ParseTuple(result, "Oii", &values, &found->status, &found->steps)) {
+    array = (PyArrayObject *)PyArray_FROM_OTF(values, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
+  }
+  if (array != NULL) {
+    is_right = is_three(array);
+    if (is_right) memcpy(omega, PyArray_DATA(array), 3 * sizeof(double));
+    else PyErr_SetString(PyExc_ValueError, "the kernel returned no three numbers");
+  }
+  Py_XDECREF(array);
+  Py_XDECREF(result);
+  Py_DECREF(omega0);
+  return is_right;
+}
+
+static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, PyObject *names)
+{
+  bound_kernel *self = (bound_kernel *)object;
+  const Py_ssize_t count = PyVectorcall_NARGS(n_given);
+  arguments found = {NULL, NULL, NULL};
+  double start[3], time, omega[3];
+  ending now = {0, 0, 0};
+
+  if (count == 2 && names == NULL) {
+    found = (arguments){given[0], given[1], Py_None};
+  } else if (count == 2 && PyTuple_GET_SIZE(names) == 1 &&
+             PyTuple_GET_ITEM(names, 0) == out_name) {
+    found = (arguments){given[0], given[1], given[2]};
+  } else if (!sort_arguments(&found, given, count, names)) {
+    return NULL;
+  }
+  if (!(read_start(found.omega0, start) && read_number(found.t_end, &time) &&
+        (found.out == Py_None || is_buffer(found.out)))) {
+    if (!read_slowly(self, &found, start, &time)) return NULL;
+  }
+
+  if (self->address != NULL) {
+    const double *packed = PyArray_DATA(self->packed);
+    const int n_packed = (int)PyArray_DIM(self->packed, 0);
+    PyThreadState *thread = PyEval_SaveThread();
+    self->address(packed, &n_packed, start, &time, omega, &now.status, &now.steps);
+    PyEval_RestoreThread(thread);
+    /* Ctrl-C, which a kernel asks about now and then, ends it with this set. */
+    if (PyErr_Occurred()) return NULL;
+    now.thread = PyThreadState_GetID(thread);
+  } else {
+    if (!call_object(self, start, time, omega, &now)) return NULL;
+    now.thread = PyThreadState_GetID(PyThreadState_Get());
+  }
+
+  ending *own = find_ending(self, now.thread);
+  if (own == NULL) own = add_ending(self, now.thread);
+  if (own == NULL) return NULL;
+  *own = now;
+
+  PyObject *result = found.out;
+  if (result == Py_None) {
+    result = PyArray_SimpleNew(1, three, NPY_DOUBLE);
+    if (result == NULL) return NULL;
+  } else {
+    Py_INCREF(result);
+  }
+  memcpy(PyArray_DATA((PyArrayObject *)result), omega, 3 * sizeof(double));
+  return result;
+}
+
+/* ---- The type ----------------------------------------------------------------------------- */
+
+static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
+{
+  static char *known[] = {"kernel", "packed", "check", NULL};
+  PyObject *callable, *packed, *check;
+  if (!PyArg_ParseTupleAndKeywords(args, names, "OOO", known, &callable, &packed, &check)) {
+    return NULL;
+  }
+  bound_kernel *self = (bound_kernel *)type->tp_alloc(type, 0);
+  if (self == NULL) return NULL;
+  self->vectorcall = call;
+  self->callable = Py_NewRef(callable);
+  self->check = Py_NewRef(check);
+  PyObject *address = PyObject_GetAttrString(callable, "_cpointer");
+  if (address != NULL) {
+    self->address = (kernel *)PyCapsule_GetPointer(address, PyCapsule_GetName(address));
+    Py_DECREF(address);
+    if (self->address == NULL) goto failed;
+  } else if (PyErr_ExceptionMatches(PyExc_AttributeError)) {
+    PyErr_Clear();
+  } else {
+    goto failed;
+  }
+  self->packed = (PyArrayObject *)PyArray_FROM_OTF(packed, NPY_DOUBLE,
+                                                   NPY_ARRAY_CARRAY | NPY_ARRAY_ENSURECOPY);
+  if (self->packed == NULL) goto failed;
+  if (PyArray_NDIM(self->packed) != 1 || PyArray_DIM(self->packed, 0) > INT_MAX) {
+    PyErr_SetString(PyExc_ValueError, "packed: allowed: one dimension");
+    goto failed;
+  }
+  PyArray_CLEARFLAGS(self->packed, NPY_ARRAY_WRITEABLE);
+  return (PyObject *)self;
+failed:
+  Py_DECREF(self);
+  return NULL;
+}
+
+/* Before Python 3.12 a class does not inherit the quick call, though it may: nothing in it is
+   overridden. */
+static PyObject *init_subclass(PyObject *class, PyObject *Py_UNUSED(unused))
+{
+#if PY_VERSION_HEX < 0x030C0000
+  PyTypeObject *type = (PyTypeObject *)class;
+  if (type->tp_call == PyVectorcall_Call) type->tp_flags |= Py_TPFLAGS_HAVE_VECTORCALL;
+#else
+  (void)class;
+#endif
+  Py_RETURN_NONE;
+}
+
+static int traverse(PyObject *object, visitproc visit, void *arg)
+{
+  bound_kernel *self = (bound_kernel *)object;
+  Py_VISIT(self->callable);
+  Py_VISIT(self->packed);
+  Py_VISIT(self->check);
+  return 0;
+}
+
+static void dealloc(PyObject *object)
+{
+  bound_kernel *self = (bound_kernel *)object;
+  PyObject_GC_UnTrack(object);
+  Py_XDECREF(self->callable);
+  Py_XDECREF(self->packed);
+  Py_XDECREF(self->check);
+  PyMem_Free(self->endings);
+  Py_TYPE(object)->tp_free(object);
+}
+
+static PyMethodDef methods[] = {
+  {"__init_subclass__", init_subclass, METH_CLASS | METH_NOARGS, NULL},
+  {NULL, NULL, 0, NULL},
+};
+
+static PyGetSetDef attributes[] = {
+  {"_ending", get_ending, NULL, "Status and steps of this thread's last call.", NULL},
+  {NULL, NULL, NULL, NULL, NULL},
+};
+
+static PyTypeObject bound_kernel_type = {
+  PyVarObject_HEAD_INIT(NULL, 0)
+  .tp_name = "pyharness._solver.BoundKernel",
+  .tp_doc = "A kernel with what it is given in every call.",
+  .tp_basicsize = sizeof(bound_kernel),
+  .tp_flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_BASETYPE | Py_TPFLAGS_HAVE_GC |
+              Py_TPFLAGS_HAVE_VECTORCALL,
+  .tp_new = new_kernel,
+  .tp_call = PyVectorcall_Call,
+  .tp_vectorcall_offset = offsetof(bound_kernel, vectorcall),
+  .tp_traverse = traverse,
+  .tp_dealloc = dealloc,
+  .tp_methods = methods,
+  .tp_getset = attributes,
+};
+
+static struct PyModuleDef module = {
+  PyModuleDef_HEAD_INIT,
+  .m_name = "pyharness._solver",
+  .m_size = -1,
+};
+
+PyMODINIT_FUNC PyInit__solver(void)
+{
+  import_array();
+  out_name = PyUnicode_InternFromString("out");
+  if (out_name == NULL || PyType_Ready(&bound_kernel_type) < 0) return NULL;
+  PyObject *created = PyModule_Create(&module);
+  if (created != NULL &&
+      PyModule_AddObjectRef(created, "BoundKernel", (PyObject *)&bound_kernel_type) < 0) {
+    Py_CLEAR(created);
+  }
+  return created;
+}

@@ -1,0 +1,563 @@
+"""Plants of a chosen size: one just beyond every limit of `verify` and `stress`, one just within.
+
+What a limit promises is written down here once more, from its words and not from the code: a limit
+that becomes looser lets its plant pass, one that becomes too tight fails what lies within.
+"""
+
+import itertools
+import math
+import pkgutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from pyharness.errors import InputError
+from pyharness.kernels import extension
+from pyharness.listing import PROGRAMS
+from pyharness.methods import METHODS
+from pyharness.original.linear_solver import SINGULAR
+from pyharness.reference import reference
+from pyharness.scene import Scene
+from pyharness.scene_file import case_scene
+from pyharness.trajectory import Array, Trajectory
+from pyharness.trials import length
+
+# Half a unit in the last place of 1, and a whole one.
+U = 2.0**-53
+ULP = 2.0 * U
+
+Plant = Callable[[float], AbstractContextManager[Any]]
+
+
+@dataclass(frozen=True)
+class Slack:
+    """A limit between two plants.
+
+    Attributes
+    ----------
+    check : str
+        The check that is asked for.
+    planted : callable
+        From a size to the context in which what is measured is wrong by so much.
+    beyond, within : float
+        Sizes with which the check fails, and passes.
+    failing : str
+        The check that fails, where it is another.
+    """
+
+    check: str
+    planted: Plant
+    beyond: float
+    within: float
+    failing: str = ""
+
+
+def near(check: str, planted: Plant, due: float) -> Slack:
+    """Return a limit that is `due`, of an error that adds to what there is."""
+    return Slack(check, planted, 1.5 * due, 0.75 * due)
+
+
+def exact(check: str, planted: Plant, least: float = 1.0, failing: str = "") -> Slack:
+    """Return a limit of nothing at all: the least there can be fails."""
+    return Slack(check, planted, least, 0.0, failing)
+
+
+# What is planted: `change(found, size)`, or with all that a call was given.
+
+
+def off(found: Any, size: float) -> Any:
+    """Let every omega be larger by a part of the largest."""
+    if not isinstance(found, np.ndarray):
+        return replace(found, omega=off(found.omega, size))
+    return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
+
+
+def last_off(found: Trajectory, size: float) -> Trajectory:
+    """As `off`, in the last row alone."""
+    return replace(found, omega=np.vstack([found.omega[:-1], off(found.omega[-1:], size)]))
+
+
+def end_off(found: tuple[Array, str], size: float) -> tuple[Array, str]:
+    return off(found[0], size), found[1]
+
+
+def field_off(name: str) -> Callable[[Any, float], Any]:
+    """Return the change of an array by a part of its largest element."""
+    return lambda found, size: replace(found, **{name: off(getattr(found, name), size)})
+
+
+def counted_off(name: str) -> Callable[[Any, float], Any]:
+    return lambda found, size: replace(found, **{name: getattr(found, name) + int(size)})
+
+
+def value_off(found: float, size: float) -> float:
+    """Let a number be larger by a part of itself."""
+    return found * (1.0 + size)
+
+
+def quotient_off(found: Trajectory, size: float) -> Trajectory:
+    if found.stop is None:
+        return found
+    quotient = found.stop.quotient * (1.0 + size)
+    return replace(found, stop=replace(found.stop, quotient=quotient))
+
+
+def cut(found: Trajectory, size: float) -> Trajectory:
+    """Leave out so many of the last rows."""
+    return replace(found, omega=found.omega[: len(found.omega) - int(size)])
+
+
+def singular(found: Trajectory, size: float) -> Trajectory:
+    """Let the matrices of so many of the last steps be singular that were not."""
+    if found.ier is None or not size:
+        return found
+    ier = found.ier.copy()
+    ier[-int(size) :] = SINGULAR
+    return replace(found, ier=ier)
+
+
+def ended(found: Any, size: float) -> Any:
+    return replace(found, ended="overflow") if size else found
+
+
+class _Solver:
+    """A prepared solver whose results are off."""
+
+    def __init__(self, solver: Any, size: float, status: str = "") -> None:
+        self._solver, self._size, self._status = solver, size, status
+
+    def __call__(self, *rest: Any) -> Array:
+        return np.asarray(off(self._solver(*rest).copy(), self._size))
+
+    def __getattr__(self, name: str) -> Any:
+        return self._status if name == "status" and self._status else getattr(self._solver, name)
+
+
+def solver_off(found: Any, size: float) -> Any:
+    return _Solver(found, size)
+
+
+def gives_up(found: Any, size: float) -> Any:
+    return _Solver(found, 0.0, "gave up") if size else found
+
+
+def probe_off(found: Any, size: float) -> Any:
+    return replace(found, found=found.found + size)
+
+
+# Where it is planted.
+
+
+def on(target: str, change: Callable[..., Any], call: int | None = None) -> Plant:
+    """Return the change of what `target`, a dotted name, returns: of every call, or of one."""
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        right = pkgutil.resolve_name(target)
+        calls = itertools.count(1)
+
+        def faulty(*rest: Any, **named: Any) -> Any:
+            found = right(*rest, **named)
+            return found if call and next(calls) != call else change(found, size)
+
+        return patch(target, faulty)
+
+    return planted
+
+
+def refuses(target: str) -> Plant:
+    """Return a refusal of everything, where the size is not 0."""
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        right = pkgutil.resolve_name(target)
+
+        def faulty(*rest: Any, **named: Any) -> Any:
+            if size:
+                raise InputError("no")
+            return right(*rest, **named)
+
+        return patch(target, faulty)
+
+    return planted
+
+
+def instead(target: str, stand_in: Callable[..., Any]) -> Plant:
+    """Return a function in the place of another; the size comes before its arguments."""
+    return lambda size: patch(target, partial(stand_in, size))
+
+
+@cache
+def _truth(case: int, quantity: str) -> Array:
+    scene = case_scene(case)
+    found = getattr(reference(scene, scene.times(), velocity=True), quantity)
+    return np.asarray(found)
+
+
+def graded(target: str, error: Callable[[Scene, float], float]) -> Plant:
+    """Return results that are the truth of Case 5 and an error of so much of the largest."""
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        right = pkgutil.resolve_name(target)
+
+        def faulty(*rest: Any, **named: Any) -> Trajectory:
+            scene = next(each for each in rest if isinstance(each, Scene))
+
+            def rows(quantity: str) -> Array:
+                truth = _truth(5, quantity)
+                parts = scene.steps // len(truth)
+                found = np.zeros((scene.steps, 3))
+                found[parts - 1 :: parts] = truth + error(scene, size) * np.abs(truth).max()
+                return found
+
+            found = right(*(case_scene(5) if each is scene else each for each in rest), **named)
+            velocity = None if found.velocity is None else rows("velocity")
+            omega = rows("omega")
+            return replace(found, ier=None, steps=scene.steps, omega=omega, velocity=velocity)
+
+        return patch(target, faulty)
+
+    return planted
+
+
+def of_order(due: int) -> Callable[[Scene, float], float]:
+    """Return an error whose order misses by the size."""
+    return lambda scene, size: 1e-3 * (scene.step_size / case_scene(5).step_size) ** (due - size)
+
+
+def roundings(more: float) -> Callable[[Scene, float], float]:
+    """Return the size times 8 roundings of every step, and `more`."""
+    return lambda scene, size: size * (8.0 * U * scene.steps + more)
+
+
+def stop_test(size: float) -> AbstractContextManager[Any]:
+    """Let the program be given another constant."""
+    target = "pyharness.methods.Program.run"
+    right = pkgutil.resolve_name(target)
+
+    def faulty(*rest: Any, **named: Any) -> Any:
+        if "lipschitz" in named:
+            named["lipschitz"] *= 1.0 + size
+        return right(*rest, **named)
+
+    return patch(target, faulty)
+
+
+@contextmanager
+def _shorter() -> Iterator[None]:
+    """Follow two starts through a thousand revolutions."""
+    contenders = {
+        name: replace(each, revolutions=1e3, others=1e3)
+        for name, each in length.CONTENDERS.items()
+    }
+    with patch.object(length, "CONTENDERS", contenders), patch.object(length, "STARTS", 2):
+        yield
+
+
+def watched(error: Callable[[float, float], float]) -> Plant:
+    """Let the error of energy, momentum and phase be `error(size, time)`."""
+
+    @contextmanager
+    def planted(size: float) -> Iterator[None]:
+        def faulty(scene: Scene, body: Any, time: float, omega: Array) -> dict[str, float]:
+            return dict.fromkeys(length.LAWS, error(size, time))
+
+        with _shorter(), patch.object(length.brouwer, "errors", faulty):
+            yield
+
+    return planted
+
+
+def shortly(planted: Plant) -> Plant:
+    """Return a plant in the trial of length, of which little is run."""
+
+    @contextmanager
+    def both(size: float) -> Iterator[None]:
+        with ExitStack() as stack:
+            stack.enter_context(_shorter())
+            stack.enter_context(planted(size))
+            yield
+
+    return both
+
+
+def solved_off(size: float) -> AbstractContextManager[Any]:
+    """Let the compiled solver of linear equations be off by a part of every result."""
+    right = extension().solve_linear
+
+    def faulty(a: Array, b: Array) -> tuple[Array, Array, int]:
+        factors, x, ier = right(a, b)
+        return factors, x * (1.0 + size), ier
+
+    return patch("pyharness.kernels.extension", lambda: SimpleNamespace(solve_linear=faulty))
+
+
+def crossing_off(size: float) -> AbstractContextManager[Any]:
+    """Let truncation rule down to a step of 10**-3.75 s times 10**-size, and nothing below."""
+    from pyharness.trials import step_size
+
+    def error(scene: Scene, name: str, case: int, listing: Any) -> tuple[float, str]:
+        rules = math.log10(scene.step_size) > -3.75 - size
+        return (step_size._forecaster(case, name).at(scene.steps).truncation if rules else 1.0), ""
+
+    return patch.object(step_size, "_error", error)
+
+
+def some_bits(size: float) -> AbstractContextManager[Any]:
+    """Let so many of the calls in threads give other bits."""
+    calls = itertools.count()
+    # Three jobs are made alone, each, before they are made at once.
+    return patch("pyharness.trials.threads.bits", lambda job: bytes(3 <= next(calls) < 3 + size))
+
+
+_RUN = "pyharness.methods.Program.run"
+_COMPILED = "pyharness.kernels.run"
+_CASES = "pyharness.verify_methods"
+_HELD = "pyharness.trials.truth.run_method"
+_TORQUE = "pyharness.trials.torque"
+_TURNED = "pyharness.trials.invariance"
+_REGIONS = "pyharness.trials.regions"
+_STEPS = "pyharness.trials.step_size"
+_MATRICES = "pyharness.trials.matrices"
+
+_BITS = "cells/runge-kutta/case-3/original"
+_ORDERS = {"two-term": 2, "four-term": 2, "runge-kutta": 4}
+_TEXTBOOKS = {"improved-euler": 2, "taylor-3": 2, "rk4": 4}
+_GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
+_JUDGED = [name for name, method in METHODS.items() if method.finest < 1.0 and name != "reference"]
+
+
+def _with_form(name: str) -> int:
+    """Return a case that the method takes."""
+    return 4 if name == "closed-form" else 5
+
+
+VERIFY = (
+    # Every bit, counter and label, in one language and in both alike.
+    exact("cells/two-term/case-3/corrected", on(_COMPILED, off), ULP),
+    exact("random/0/program", on(_COMPILED, off), ULP),
+    exact(_BITS, on(_COMPILED, field_off("velocity")), ULP),
+    exact(_BITS, on(_COMPILED, field_off("recorded_time")), ULP),
+    exact(_BITS, on(_COMPILED, field_off("time")), ULP),
+    exact(_BITS, on(_RUN, field_off("time")), ULP),
+    exact(_BITS, on(_COMPILED, ended)),
+    exact(_BITS, on(_COMPILED, counted_off("evaluations"))),
+    exact(_BITS, on(_RUN, counted_off("evaluations"))),
+    exact("cells/four-term/case-3/corrected", on(_COMPILED, singular)),
+    exact("cells/two-term/case-3/corrected", refuses("pyharness.verify_programs.case_scene"),
+          failing="cells/refused"),
+    # A step h of Case 7, ends at (.25, .91, 1.08): 4 roundings of either end of it, and h times 32
+    # of the sum of the sizes of all terms of a rate; with collocation times the condition of its
+    # matrix, 16 and 1400. Of omega1 the share is the largest but with four terms, omega3.
+    near("schemes/two-term/case-7", on(_RUN, last_off), 8.2 * U / 1.08),
+    near("schemes/four-term/case-7", on(_RUN, last_off), 37.0 * U / 1.08),
+    near("schemes/runge-kutta/case-7", on(_RUN, last_off), 2.9 * U / 1.08),
+    exact("schemes/runge-kutta/case-7", on(_RUN, cut)),
+    exact("stops/case-3/corrected", on(_RUN, cut)),
+    # The rates of Case 3 are some 50 rad/s**2, each with 32 roundings; a step changes them little.
+    near("stops/case-3/corrected", on(_RUN, quotient_off), 2.3e-13),
+    # Constants stand twice the rounding beside a quotient.
+    near("stops/case-3/corrected", stop_test, 4.6e-13),
+    # A tolerance, relative to the largest omega.
+    *(
+        near(f"methods/{name}/case-{_with_form(name)}/1.0e-06", on(f"{_CASES}.solve", off), 1e-6)
+        for name in _JUDGED
+    ),
+    # Of a steady spin nothing is left but 8 roundings of the start and 8 of the result, and half a
+    # unit in the last place of the truth itself.
+    near("methods/taylor/case-1/1.0e-15", on(f"{_CASES}.solve", off), 1e-15 + 17.0 * U),
+    exact("methods/taylor/case-5/1.0e-06", refuses(f"{_CASES}.solve")),
+    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", field_off("time")), ULP),
+    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", ended)),
+    *(
+        near(f"prepared/{name}/case-{_with_form(name)}/{end}/1.0e-06",
+             on(f"{_CASES}.prepare", solver_off), 1e-6)
+        for name in ("auto", "taylor", "quick", "closed-form")
+        for end in (3, -1)
+    ),
+    exact("prepared/quick/case-5/1/1.0e-06", on(f"{_CASES}.prepare", gives_up)),
+    *(
+        exact(f"prepared/{name}/case-5/bits", on(f"{_CASES}.prepare", solver_off), ULP)
+        for name in (*_TEXTBOOKS, *_GAUSS)
+    ),
+    # A fifth of an order.
+    *(
+        near(f"orders/{name}/case-5{what}", graded(_RUN, of_order(_ORDERS[name])), 0.2)
+        for name in PROGRAMS
+        for what in ("", "/velocity")
+    ),
+    *(
+        near(f"orders/{name}/case-5", graded(f"{_CASES}.solve", of_order(due)), 0.2)
+        for name, due in _TEXTBOOKS.items()
+    ),
+    # An error is that of rounding up to 8 of every step, and what the truth is wrong by: 7e-13 if
+    # it is that of `solve_ivp`.
+    near("orders/two-term/case-5", graded(_RUN, roundings(7e-13)), 1.0),
+    near("orders/two-term/case-5/velocity", graded(_RUN, roundings(0.0)), 1.0),
+    # A method against print: half a unit of its last digit or what its source admits (5e-15 here),
+    # the finest tolerance, and two roundings of each number of the problem, which move the omega
+    # that they move the least by 4e-15.
+    near("external/detest-b5/20/taylor", on("pyharness.external.solve", off), 1.0e-14),
+    near("external/detest-b5/20/gauss-8", on("pyharness.external.solve", off), 1.9e-14),
+    near("external/detest-b5/20/quick", on("pyharness.external.prepare", solver_off), 1e-9),
+    # Steps of SciPy, 7e-13 for 8 radians of 20, are amplified by 5.
+    near("external/detest-b5/20/lsoda", on("pyharness.external.solve", off), 8.3e-12),
+    near("external/nasa-brick/30/taylor", on("pyharness.external.solve", off), 2e-8 / 34.3),
+    # Half a unit of three digits, 3.9e-4 of which there are, and the halved steps' own error.
+    Slack("external/hairer-rigid-body/20/runge-kutta", on(_RUN, off), 4e-4, 1e-4),
+    exact("external/detest-b5/20/auto", refuses("pyharness.external.solve")),
+    exact("external/detest-b5/20/two-term", on(_RUN, singular)),
+    # Both the record and the result may be wrong by 1e-9; where every bit counts, none.
+    near("golden/taylor/case-5", on("pyharness.golden.solve", off), 2e-9),
+    exact("golden/taylor/case-5", on("pyharness.golden.solve", field_off("time")), ULP),
+    exact("golden/rk4/case-5", on("pyharness.golden.solve", off), ULP),
+    exact("golden/two-term/case-5/corrected", on(_RUN, off), ULP),
+)  # fmt: skip
+
+_SPHERE = "near-symmetry/{}/sphere-equal/{}"
+_FREE = f"{_TURNED}.end"
+
+STRESS = (
+    exact("separatrix/taylor/none", refuses("pyharness.trials.separatrix.run_method"),
+          failing="separatrix/refused"),
+    exact("separatrix/taylor/none", on("pyharness.trials.separatrix.run_method", off), ULP),
+    near("separatrix/quick/none", on("pyharness.trials.separatrix.run_method", off), ULP),
+    exact("separatrix/taylor/none", on("pyharness.trials.separatrix.run_method", ended)),
+    # Near the separatrix the flow amplifies tolerances, 10.4 times here, and says nothing where
+    # less than two digits are left.
+    near("separatrix/taylor/early-1e-01/1e-06/error", on(_HELD, off), 1.04e-5),
+    near("separatrix/taylor/on-1e-04/1e-06/error", on(_HELD, off), 6.4e-3 / 0.63),
+    exact("separatrix/taylor/early-1e-01/1e-06/error", on(_HELD, ended)),
+    exact("separatrix/taylor/early-1e-01/1e-06/error", refuses(_HELD)),
+    # A sphere's flow amplifies nothing: a tolerance, 8 roundings of the start and 8 of the result,
+    # half a unit in the last place of the truth, and one of each of the 10 steps of a method that
+    # does not compensate, 4 where its steps are iterated.
+    *(
+        near(_SPHERE.format(name, "1e-06/error"), on(_HELD, off), 1e-6)
+        for name in ("taylor", *_GAUSS, "dop853", "lsoda", "radau", "rk45")
+    ),
+    near(_SPHERE.format("taylor", "1e-15/error"), on(_HELD, off), 1e-15 + 17.0 * U),
+    near(_SPHERE.format("taylor", "1e-15/drift"), on(_HELD, off), 1e-15 + 16.0 * U),
+    near(_SPHERE.format("rk4", "steps/error"), on(_HELD, off), 27.0 * U),
+    near(_SPHERE.format("rk4", "steps/drift"), on(_HELD, off), 26.0 * U),
+    near(_SPHERE.format("gauss-4", "steps/drift"), on(_HELD, off), 56.0 * U),
+    near(_SPHERE.format("closed-form", "1e-14/error"), on(_HELD, off), 1e-14),
+    near(_SPHERE.format("auto", "1e-14/drift"), on(_HELD, off), 1e-14),
+    # What the rounding of A, B and C makes of 1e6 s, 2.7e-12, and is.
+    Slack("near-symmetry/closed-form/large-pair-long-1e-01/1e-14/error", on(_HELD, off), 4e-12,
+          1e-12),
+    # 14.5 radians where LSODA claims its finest for 8, amplified 18.8 times.
+    near("near-symmetry/lsoda/small-pair-1e-01/7e-13/drift", on(_HELD, off), 7e-13 * 14.5 / 8.0),
+    near("near-symmetry/lsoda/small-pair-1e-01/7e-13/error", on(_HELD, off), 2.3e-11),
+    # What a step of .002 radians may leave out, by the largest derivatives, 20 000 times.
+    near("near-symmetry/improved-euler/small-pair-1e-01/steps/drift", on(_HELD, off), 1.38e-4),
+    near("near-symmetry/rk4/small-pair-1e-01/steps/drift", on(_HELD, off), 1.19e-9),
+    near("shapes/taylor/plate-123/1e-06/error", on(_HELD, off), 9.2e-5),
+    near("shapes/quick/plate-123/1e-06/drift", on(_HELD, off), 1e-6),
+    near("scales/gauss-4/1e0/1e-06/drift", on(_HELD, off), 1e-6),
+    near("scales/taylor/1e0/1e-06/error", on(_HELD, off), 4.1e-4),
+    exact("scales/taylor/same-2^100", on("pyharness.trials.scales.run_method", off, call=2), ULP),
+    exact("scales/taylor/beyond", on("pyharness.trials.scales.run_method",
+          lambda found, size: replace(found, ended="complete") if size else found)),
+    # The flow of the driven body amplifies 4 times.
+    *(
+        near(f"torque/{name}/tiny-1e-12/1e-06", on(f"{_TORQUE}._end", end_off), 4e-6)
+        for name in ("taylor", "auto", "prepared-auto", "quick", "gauss-4", "dop853")
+    ),
+    exact("torque/taylor/tiny-1e-12/1e-06", refuses(f"{_TORQUE}.solve")),
+    exact("torque/prepared-auto/tiny-1e-12/1e-06", on(f"{_TORQUE}.prepare", gives_up)),
+    exact("torque/taylor/tiny-1e-12/1e-06",
+          on(f"{_TORQUE}._end", lambda found, size: (found[0], "overflow" if size else found[1]))),
+    # The sphere's angle has two words, and the sum 16 roundings of its terms.
+    near("torque/closed-form/no-digits-1e16/1e-14", on(f"{_TORQUE}._end", end_off),
+         1e-14 + 16.0 * U),
+    # 1e4 radians in binary64, of n evaluations 4 sqrt(n).
+    near("torque/taylor/axial-1e4/1e-15", on(f"{_TORQUE}._end", end_off), 4.8e-10),
+    # What a wave of 1e16 rad/s moves can't be seen: tolerance, amplified twice.
+    near("torque/quick/averaged-1e16/1e-06", on(f"{_TORQUE}._end", end_off), 2.03e-6),
+    # 4 sqrt(n) of one rounding of a step, and n times what it leaves out.
+    *(
+        near(f"length/{name}/tumbling/{what}/1000", watched(lambda size, time: size), due)
+        for name, what, due in (
+            ("taylor", "energy", 4.4e-13), ("taylor", "momentum", 2.3e-13),
+            ("taylor", "phase", 9.5e-10), ("gauss-4", "energy", 4.6e-13),
+            ("gauss-4", "momentum", 2.4e-13), ("gauss-4", "phase", 2.9e-7),
+        )
+    ),
+    # The power of the growth, half way to the next.
+    *(
+        near(f"length/{name}/tumbling/{what}/power", watched(lambda size, time: 1e-20 * time**size),
+             due)
+        for name, what, due in (
+            ("taylor", "energy", 1.25), ("taylor", "phase", 2.25), ("gauss-4", "momentum", 0.75),
+            ("gauss-4", "phase", 1.75),
+        )
+    ),
+    *(
+        near(f"length/closed-form/tumbling/{what}", watched(lambda size, time: size), due)
+        # 16 roundings of omega.
+        for what, due in (("energy", 6.3e-15), ("momentum", 3.5e-15), ("phase", 6.7e-15))
+    ),
+    exact("length/taylor/tumbling/prepared",
+          shortly(on("pyharness.trials.length.prepare", solver_off)), ULP),
+    exact("invariance/taylor/signs-12/free/1e-06", on(_FREE, off, call=2), ULP),
+    exact("invariance/runge-kutta/cyclic/free/corrected", on(_RUN, off, call=2), ULP),
+    exact("invariance/taylor/signs-12/free/1e-06", refuses(_FREE)),
+    # Both solutions may be wrong by the tolerance, amplified 2.7 times.
+    near("invariance/taylor/cyclic/free/1e-06", on(_FREE, off, call=2), 5.4e-6),
+    near("invariance/dop853/times-1.7/free/1e-06", on(_FREE, off, call=2), 5.4e-6),
+    # The way back amplifies the error of the way there, and makes its own.
+    near("invariance/taylor/back/free/1e-06", on(_FREE, off, call=2), 8.6e-6),
+    # Four pieces, each amplified by those that follow, against one.
+    near("invariance/taylor/split/free/1e-06", on(_FREE, off, call=5), 1.8e-5),
+    exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
+    exact("matrices/two-term/1e-02/bits", solved_off, ULP),
+    # 3n roundings of a sum; carried by the inverse.
+    near("matrices/two-term/1e-02/residual", solved_off, 6.0 * U),
+    near("matrices/two-term/1e-02/forward", solved_off, 18.0 * U),
+    near("matrices/two-term/1e-02/increment", solved_off, 41.0 * U),
+    near("matrices/four-term/1e-02/residual", solved_off, 12.0 * U),
+    # Two sums, each wrong by n + 2 roundings.
+    near("matrices/two-term/1e-02/pivots", on(f"{_MATRICES}.solved",
+         lambda found, size: replace(found, pivoting=(size, found.pivoting[1]))), 16.0 * U),
+    near("matrices/four-term/threshold",
+         on(f"{_MATRICES}.declared_singular_below", value_off), 1.3e-14),
+    exact("matrices/four-term/original/ier-1e-04", on(_COMPILED, singular)),
+    # Roundings of a step, amplified by the differences that find its derivative.
+    *(
+        near(f"regions/{program}/corrected/{check}", on(f"{_REGIONS}.{probe}", probe_off), due)
+        for program, check, probe, due in (
+            ("two-term", "first-step-spin-0.25", "first_step", 7.0e-14),
+            ("four-term", "first-step-spin-0.25", "first_step", 9.5e-11),
+            ("runge-kutta", "first-step-spin-0.25", "first_step", 4.8e-13),
+            ("two-term", "10-steps-imaginary-0.5", "later_steps", 5.9e-13),
+            ("runge-kutta", "10-steps-imaginary-0.5", "later_steps", 8.8e-14),
+            ("two-term", "boundary-real", "observed_boundary", 1.0e-12),
+            ("runge-kutta", "boundary-real", "observed_boundary", 1.1e-13),
+            ("two-term", "step-10-at--2", "complex_step", 5.0e-13),
+            ("four-term", "step-10-at--2", "complex_step", 3.7e-9),
+            ("two-term", "step-10-case-6", "moving_step", 1.9e-13),
+        )
+    ),
+    # Twice what steps miss, carried to the end, and in a million steps the roundings of each.
+    *(
+        near(f"step-size/{check}", instead(f"{_STEPS}._error", lambda size, *_: (size, "")), due)
+        for check, due in (
+            ("two-term/case-5/corrected/1e-02", 9.2e-4), ("rk4/case-5/1e-02", 6.4e-8),
+            ("four-term/case-5/corrected/1e-06", 6.3e-6), ("rk4/case-5/1e-06", 2.9e-10),
+            ("two-term/case-5/corrected/1e-06", 5.8e-10),
+        )
+    ),
+    # A quarter of a decade, and a decade of rounding by its root: the next of the steps is beyond.
+    Slack("step-size/rk4/case-5/crossing", crossing_off, 0.3, 0.2),
+    # Where the wobble of a spin has doubled.
+    near("step-size/rk4/case-4/diverges",
+         on("pyharness.stability.divergence.smallest_divergent", value_off), 0.0575),
+    exact("threads/linear-solver", some_bits),
+)  # fmt: skip
+
+SLACK: Sequence[Slack] = (*VERIFY, *STRESS)

@@ -1,6 +1,7 @@
 """Slack of `verify` and `stress`: what lies just beyond a limit fails, what lies within passes."""
 
 import ast
+import pkgutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from pyharness.checks import Check, bounded
 from pyharness.selection import Selection
 from pyharness.stress import TRIALS, stress
 from pyharness.verify import KINDS, verify
-from tests.slack import SLACK, Slack
+from tests.slack import SLACK, Slack, kept
 
 PACKAGE = Path(pyharness.__file__).parent
 # A place of the source: file and line.
@@ -47,20 +48,65 @@ def _failing(places: set[Place]) -> Iterator[None]:
         yield
 
 
+# What plants don't touch and limits are made of.
+_KEPT = ("verify_methods", "trials.truth", "trials.torque", "trials.scales")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _once() -> Iterator[None]:
+    """Compute truths and conditionings once."""
+    with pytest.MonkeyPatch.context() as patched:
+        for room in _KEPT:
+            for name in ("conditioning", "reference"):
+                target = f"pyharness.{room}.{name}"
+                if hasattr(pkgutil.resolve_name(f"pyharness.{room}"), name):
+                    patched.setattr(target, kept(pkgutil.resolve_name(target)))
+        yield
+
+
 @cache
-def _fared(slack: Slack) -> tuple[bool | None, bool | None, frozenset[Place]]:
-    """Return whether the check passed within, and beyond, and where it failed."""
+def _fared(slack: Slack) -> tuple[list[Check], list[Check], frozenset[Place]]:
+    """Return the checks within and beyond, and where those failed."""
     places: set[Place] = set()
-    id = slack.failing or slack.check
     with slack.planted(slack.within):
-        within = {check.id: check.passed for check in _made(slack.check)}
+        within = _made(slack.check)
     with slack.planted(slack.beyond), _failing(places):
-        beyond = {check.id: check.passed for check in _made(slack.check)}
-    return within.get(slack.check), beyond.get(id), frozenset(places)
+        beyond = _made(slack.check)
+    return within, beyond, frozenset(places)
 
 
 @pytest.mark.parametrize("slack", SLACK, ids=lambda slack: slack.check)
 def test_limit_lies_between_the_plants(slack: Slack) -> None:
     within, beyond, _ = _fared(slack)
-    assert within is True
-    assert beyond is False
+    own = [check for check in within if check.id == slack.check] or within
+    assert own
+    assert all(check.passed for check in own)
+    assert (slack.failing or slack.check) in [check.id for check in beyond if not check.passed]
+
+
+def test_every_kind_and_every_trial_has_a_plant() -> None:
+    assert {slack.check.partition("/")[0] for slack in SLACK} == {*KINDS, *TRIALS}
+
+
+def _sites() -> Iterator[tuple[str, range]]:
+    """Yield the places of the source where a check is made that can fail."""
+    for path in sorted([*PACKAGE.glob("*.py"), *PACKAGE.glob("trials/*.py")]):
+        if path.name in ("checks.py", "self_test.py"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
+                continue
+            always = len(node.args) > 1 and getattr(node.args[1], "value", None) is True
+            if node.func.id in ("bounded", "Check") and not always:
+                last = node.end_lineno or node.lineno
+                yield str(path.relative_to(PACKAGE)), range(node.lineno, last + 1)
+
+
+def test_every_place_that_makes_a_check_is_seen_to_fail() -> None:
+    places = {place for slack in SLACK for place in _fared(slack)[2]}
+    unseen = [
+        f"{file}:{lines.start}"
+        for file, lines in _sites()
+        if not any((file, line) in places for line in lines)
+    ]
+    assert unseen == []

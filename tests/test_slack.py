@@ -17,7 +17,8 @@ from pyharness.checks import Check, bounded
 from pyharness.selection import Selection
 from pyharness.stress import TRIALS, stress
 from pyharness.verify import KINDS, verify
-from tests.slack import SLACK, Slack, kept
+from tests.slack import SLACK
+from tests.slack_plants import Slack, kept
 
 PACKAGE = Path(pyharness.__file__).parent
 # A place of the source: file and line.

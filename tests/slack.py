@@ -6,6 +6,7 @@ that becomes looser lets its plant pass, one that becomes too tight fails what l
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from pyharness.listing import PROGRAMS
 from pyharness.methods import METHODS
@@ -14,13 +15,13 @@ from tests.slack_plants import (
     Slack,
     U,
     beside,
+    bit_off,
     counted_off,
     crossing_off,
     cut,
     end_off,
     ended,
     exact,
-    field_off,
     form_for_all,
     gives_up,
     graded,
@@ -39,6 +40,7 @@ from tests.slack_plants import (
     singular,
     solved,
     solved_off,
+    solver_bit_off,
     solver_off,
     some_bits,
     stop_test,
@@ -57,6 +59,7 @@ _REGIONS = "pyharness.trials.regions"
 _STEPS = "pyharness.trials.step_size"
 _MATRICES = "pyharness.trials.matrices"
 
+_TIME = partial(bit_off, name="time")
 _BITS = "cells/runge-kutta/case-3/original"
 _ORDERS = {"two-term": 2, "four-term": 2, "runge-kutta": 4}
 _TEXTBOOKS = {"improved-euler": 2, "taylor-3": 2, "rk4": 4}
@@ -71,12 +74,12 @@ def _with_form(name: str) -> int:
 
 VERIFY = (
     # Every bit, counter and label, in one language and in both alike.
-    exact("cells/two-term/case-3/corrected", on(_COMPILED, off), ULP),
-    exact("random/0/program", on(_COMPILED, off), ULP),
-    exact(_BITS, on(_COMPILED, field_off("velocity")), ULP),
-    exact(_BITS, on(_COMPILED, field_off("recorded_time")), ULP),
-    exact(_BITS, on(_COMPILED, field_off("time")), ULP),
-    exact(_BITS, on(_RUN, field_off("time")), ULP),
+    exact("cells/two-term/case-3/corrected", on(_COMPILED, bit_off), ULP),
+    exact("random/0/program", on(_COMPILED, bit_off), ULP),
+    exact(_BITS, on(_COMPILED, partial(bit_off, name="velocity")), ULP),
+    exact(_BITS, on(_COMPILED, partial(bit_off, name="recorded_time")), ULP),
+    exact(_BITS, on(_COMPILED, _TIME), ULP),
+    exact(_BITS, on(_RUN, _TIME), ULP),
     exact(_BITS, on(_COMPILED, ended)),
     exact(_BITS, on(_COMPILED, counted_off("evaluations"))),
     exact(_BITS, on(_RUN, counted_off("evaluations"))),
@@ -108,7 +111,7 @@ VERIFY = (
     near("methods/taylor/case-1/1.0e-15", on(f"{_CASES}.solve", off), 1e-15 + 17.0 * U),
     exact("methods/taylor/case-5/1.0e-06", refuses(f"{_CASES}.solve")),
     exact("methods/closed-form/case-5/1.0e-06", instead(f"{_CASES}.solve", form_for_all)),
-    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", field_off("time")), ULP),
+    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", _TIME), ULP),
     exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", ended)),
     *(
         near(f"prepared/{name}/case-{_with_form(name)}/{end}/1.0e-06",
@@ -118,7 +121,7 @@ VERIFY = (
     ),
     exact("prepared/quick/case-5/1/1.0e-06", on(f"{_CASES}.prepare", gives_up)),
     *(
-        exact(f"prepared/{name}/case-5/bits", on(f"{_CASES}.prepare", solver_off), ULP)
+        exact(f"prepared/{name}/case-5/bits", on(f"{_CASES}.prepare", solver_bit_off), ULP)
         for name in (*_TEXTBOOKS, *_GAUSS)
     ),
     # A fifth of an order.
@@ -152,23 +155,24 @@ VERIFY = (
     exact("external/detest-b5/20/two-term", on(_RUN, singular)),
     # Both the record and the result may be wrong by 1e-9; where every bit counts, none.
     near("golden/taylor/case-5", on("pyharness.golden.solve", off), 2e-9),
-    exact("golden/taylor/case-5", on("pyharness.golden.solve", field_off("time")), ULP),
+    exact("golden/taylor/case-5", on("pyharness.golden.solve", _TIME), ULP),
     exact("golden/taylor/case-5", on("pyharness.golden.read_record", without)),
     exact("golden/taylor", on("pyharness.golden.recorded", without),
           failing="golden/taylor/case-5-method-taylor-tolerance-1e-09"),
     # Sine and cosine of another library may differ by what rounding may do to a wave.
     near("golden/rk4/case-7", beside(other_library, on("pyharness.golden.solve", off)), 3.4e-15),
-    exact("golden/rk4/case-5", on("pyharness.golden.solve", off), ULP),
-    exact("golden/two-term/case-5/corrected", on(_RUN, off), ULP),
+    exact("golden/rk4/case-5", on("pyharness.golden.solve", bit_off), ULP),
+    exact("golden/two-term/case-5/corrected", on(_RUN, bit_off), ULP),
 )  # fmt: skip
 
+_SCALED = "pyharness.trials.scales.run_method"
 _SPHERE = "near-symmetry/{}/sphere-equal/{}"
 _FREE = f"{_TURNED}.end"
 
 STRESS = (
     exact("separatrix/taylor/none", refuses("pyharness.trials.separatrix.run_method"),
           failing="separatrix/refused"),
-    exact("separatrix/taylor/none", on("pyharness.trials.separatrix.run_method", off), ULP),
+    exact("separatrix/taylor/none", on("pyharness.trials.separatrix.run_method", bit_off), ULP),
     near("separatrix/quick/none", on("pyharness.trials.separatrix.run_method", off), ULP),
     exact("separatrix/taylor/none", on("pyharness.trials.separatrix.run_method", ended)),
     # Near the separatrix the flow amplifies tolerances, 10.4 times here, and says nothing where
@@ -204,8 +208,8 @@ STRESS = (
     near("shapes/quick/plate-123/1e-06/drift", on(_HELD, off), 1e-6),
     near("scales/gauss-4/1e0/1e-06/drift", on(_HELD, off), 1e-6),
     near("scales/taylor/1e0/1e-06/error", on(_HELD, off), 4.1e-4),
-    exact("scales/taylor/same-2^100", on("pyharness.trials.scales.run_method", off, call=2), ULP),
-    exact("scales/taylor/beyond", on("pyharness.trials.scales.run_method",
+    exact("scales/taylor/same-2^100", on(_SCALED, bit_off, call=2), ULP),
+    exact("scales/taylor/beyond", on(_SCALED,
           lambda found, size: replace(found, ended="complete") if size else found)),
     # The flow of the driven body amplifies 4 times.
     *(
@@ -247,9 +251,9 @@ STRESS = (
         for what, due in (("energy", 6.3e-15), ("momentum", 3.5e-15), ("phase", 6.7e-15))
     ),
     exact("length/taylor/tumbling/prepared",
-          beside(shorter, on("pyharness.trials.length.prepare", solver_off)), ULP),
-    exact("invariance/taylor/signs-12/free/1e-06", on(_FREE, off, call=2), ULP),
-    exact("invariance/runge-kutta/cyclic/free/corrected", on(_RUN, off, call=2), ULP),
+          beside(shorter, on("pyharness.trials.length.prepare", solver_bit_off)), ULP),
+    exact("invariance/taylor/signs-12/free/1e-06", on(_FREE, bit_off, call=2), ULP),
+    exact("invariance/runge-kutta/cyclic/free/corrected", on(_RUN, bit_off, call=2), ULP),
     exact("invariance/taylor/signs-12/free/1e-06", refuses(_FREE)),
     # Both solutions may be wrong by the tolerance, amplified 2.7 times.
     near("invariance/taylor/cyclic/free/1e-06", on(_FREE, off, call=2), 5.4e-6),

@@ -83,9 +83,13 @@ def end_off(found: tuple[Array, str], size: float) -> tuple[Array, str]:
     return off(found[0], size), found[1]
 
 
-def field_off(name: str) -> Callable[[Any, float], Any]:
-    """Return the change of an array by a part of its largest element."""
-    return lambda found, size: replace(found, **{name: off(getattr(found, name), size)})
+def bit_off(found: Any, size: float, name: str = "omega") -> Any:
+    """Let the largest element of an array be larger by a part of itself, and nothing else."""
+    if not isinstance(found, np.ndarray):
+        return replace(found, **{name: bit_off(getattr(found, name), size)})
+    changed = found.copy()
+    changed[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
+    return changed
 
 
 def counted_off(name: str) -> Callable[[Any, float], Any]:
@@ -125,22 +129,28 @@ def ended(found: Any, size: float) -> Any:
 class _Solver:
     """A prepared solver whose results are off."""
 
-    def __init__(self, solver: Any, size: float, status: str = "") -> None:
-        self._solver, self._size, self._status = solver, size, status
+    def __init__(
+        self, solver: Any, size: float, change: Callable[[Any, float], Any], status: str = ""
+    ) -> None:
+        self._solver, self._size, self._change, self._status = solver, size, change, status
 
     def __call__(self, *rest: Any) -> Array:
-        return np.asarray(off(self._solver(*rest).copy(), self._size))
+        return np.asarray(self._change(self._solver(*rest).copy(), self._size))
 
     def __getattr__(self, name: str) -> Any:
         return self._status if name == "status" and self._status else getattr(self._solver, name)
 
 
 def solver_off(found: Any, size: float) -> Any:
-    return _Solver(found, size)
+    return _Solver(found, size, off)
+
+
+def solver_bit_off(found: Any, size: float) -> Any:
+    return _Solver(found, size, bit_off)
 
 
 def gives_up(found: Any, size: float) -> Any:
-    return _Solver(found, 0.0, "gave up") if size else found
+    return _Solver(found, 0.0, off, "gave up") if size else found
 
 
 def probe_off(found: Any, size: float) -> Any:
@@ -351,5 +361,5 @@ def crossing_off(size: float) -> AbstractContextManager[Any]:
 def some_bits(size: float) -> AbstractContextManager[Any]:
     """Let so many of the calls in threads give other bits."""
     calls = itertools.count()
-    # Three jobs are made alone, each, before they are made at once.
-    return patch("pyharness.trials.threads.bits", lambda job: bytes(3 <= next(calls) < 3 + size))
+    # Seven jobs are made alone before they are made at once.
+    return patch("pyharness.trials.threads.bits", lambda job: bytes(7 <= next(calls) < 7 + size))

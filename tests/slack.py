@@ -27,6 +27,7 @@ from tests.slack_plants import (
     graded,
     instead,
     last_off,
+    linear,
     near,
     of_order,
     off,
@@ -39,7 +40,6 @@ from tests.slack_plants import (
     shorter,
     singular,
     solved,
-    solved_off,
     solver_bit_off,
     solver_off,
     some_bits,
@@ -263,12 +263,12 @@ STRESS = (
     # Four pieces, each amplified by those that follow, against one.
     near("invariance/taylor/split/free/1e-06", on(_FREE, off, call=5), 1.8e-5),
     exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
-    exact("matrices/two-term/1e-02/bits", solved_off, ULP),
+    exact("matrices/two-term/1e-02/bits", linear(bit_off), ULP),
     # 3n roundings of a sum; carried by the inverse.
-    near("matrices/two-term/1e-02/residual", solved_off, 6.0 * U),
-    near("matrices/two-term/1e-02/forward", solved_off, 18.0 * U),
-    near("matrices/two-term/1e-02/increment", solved_off, 41.0 * U),
-    near("matrices/four-term/1e-02/residual", solved_off, 12.0 * U),
+    near("matrices/two-term/1e-02/residual", linear(value_off), 6.0 * U),
+    near("matrices/two-term/1e-02/forward", linear(value_off), 18.0 * U),
+    near("matrices/two-term/1e-02/increment", linear(value_off), 41.0 * U),
+    near("matrices/four-term/1e-02/residual", linear(value_off), 12.0 * U),
     # Two sums, each wrong by n + 2 roundings.
     near("matrices/two-term/1e-02/pivots", on(f"{_MATRICES}.solved",
          lambda found, size: replace(found, pivoting=(size, found.pivoting[1]))), 16.0 * U),

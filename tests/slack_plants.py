@@ -96,8 +96,8 @@ def counted_off(name: str) -> Callable[[Any, float], Any]:
     return lambda found, size: replace(found, **{name: getattr(found, name) + int(size)})
 
 
-def value_off(found: float, size: float) -> float:
-    """Let a number be larger by a part of itself."""
+def value_off(found: Any, size: float) -> Any:
+    """Let a number, or each of an array, be larger by a part of itself."""
     return found * (1.0 + size)
 
 
@@ -336,15 +336,19 @@ def without(found: Iterator[Any] | dict[str, Any], size: float) -> Any:
     return {**found, "taylor": {**found["taylor"], "trajectory": rest}}
 
 
-def solved_off(size: float) -> AbstractContextManager[Any]:
-    """Let the compiled solver of linear equations be off by a part of every result."""
-    right = extension().solve_linear
+def linear(change: Callable[[Any, float], Any]) -> Plant:
+    """Change what the compiled solver of linear equations returns."""
 
-    def faulty(a: Array, b: Array) -> tuple[Array, Array, int]:
-        factors, x, ier = right(a, b)
-        return factors, x * (1.0 + size), ier
+    def planted(size: float) -> AbstractContextManager[Any]:
+        right = extension().solve_linear
 
-    return patch("pyharness.kernels.extension", lambda: SimpleNamespace(solve_linear=faulty))
+        def faulty(a: Array, b: Array) -> tuple[Array, Array, int]:
+            factors, x, ier = right(a, b)
+            return factors, change(x, size), ier
+
+        return patch("pyharness.kernels.extension", lambda: SimpleNamespace(solve_linear=faulty))
+
+    return planted
 
 
 def crossing_off(size: float) -> AbstractContextManager[Any]:

@@ -64,7 +64,7 @@ def exact(check: str, planted: Plant, least: float = 1.0, failing: str = "") -> 
     return Slack(check, planted, least, 0.0, failing)
 
 
-# What is planted: `change(found, size)`, or with all that a call was given.
+# What is planted: `change(found, size)`.
 
 
 def off(found: Any, size: float) -> Any:

@@ -24,7 +24,7 @@ RightHandSide = Callable[[float, Sequence[float]], list[float]]
 # motion of a few radians, and so much more for each radian times the factor by which a difference
 # grows. Measured on random scenes other than those that check it, with half as much again.
 _SUM = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 90.0}
-_SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 0.6}
+_SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 0.4}
 # Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
 # place takes it for a constant torque, however small the differences that it sees.
 _WAVE_STEP = 2.0

@@ -81,7 +81,11 @@ def test_way_passes_through_the_largest_omega() -> None:
 @pytest.mark.parametrize(
     ("scene", "time", "words"),
     [
-        (Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0)), 2.0, "(leaves every bound|300 steps)"),
+        (
+            Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0)),
+            2.0,
+            "(leaves every bound|300 steps)",
+        ),
         (Scene("", (1.0, 2.0, 3.0), BODY), 1e5, "more than 20 steps"),
     ],
 )

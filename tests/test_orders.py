@@ -13,6 +13,7 @@ from pyharness import orders
 from pyharness.build import build
 from pyharness.compare import compare
 from pyharness.comparison_tables import comparison_table
+from pyharness.conditioning import ROUNDING
 from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, Listing, corrected
 from pyharness.methods import PROGRAM_REGISTRY, Program
@@ -169,6 +170,27 @@ def test_only_what_shows_the_order_is_as_due(
     order = order_of(scene, solution, 2, reference(scene, scene.times()), most_steps=2**10)
     assert order.state == state
     assert order.value == (None if value is None else pytest.approx(value, abs=1e-6))
+
+
+@pytest.mark.parametrize(("order", "state"), [(1.6, "as due"), (1.4, "misses")])
+def test_half_an_order_may_be_missing(order: float, state: str) -> None:
+    scene = _steps(3, 0.01, 4)
+
+    def solution(finer: Scene) -> Array:
+        return _shifted(finer, 1e-3 * (finer.step_size / scene.step_size) ** order)
+
+    found = order_of(scene, solution, 2, reference(scene, scene.times()))
+    assert found.state == state
+    assert found.value == pytest.approx(order, abs=1e-6)
+
+
+@pytest.mark.parametrize(("share", "grew"), [(0.7, True), (1.5, False)])
+def test_rounding_that_grew_is_no_more_than_eight_a_step(share: float, grew: bool) -> None:
+    """Of a sphere nothing grows: there are 8 roundings of a step, and 8 of either end."""
+    scene = Scene("", (0.3, 1.0, -0.6), (2.0, 2.0, 2.0), steps=1000)
+    error = share * 8.0 * ROUNDING * (1000.0 + 2.0)
+    found = Order(4, "misses", 0.0, 0.01, 1000, error, 10.0)
+    assert orders._is_grown_rounding(scene, found) == grew
 
 
 def test_one_halving_is_no_proof() -> None:

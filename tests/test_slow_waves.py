@@ -96,7 +96,9 @@ def test_scipy_refuses_what_it_can_not_meet(method: str) -> None:
     scene = Scene("middle", (1e-6, 3.0, 1e-6), BODY)
     least = finest(method, scene, 8.0)
     assert least > 20.0 * METHODS[method].finest
-    with pytest.raises(InputError, match=r"can't meet it .* grow .* times; allowed for this motion"):
+    with pytest.raises(
+        InputError, match=r"can't meet it .* grow .* times; allowed for this motion"
+    ):
         solve(scene, [8.0], method, METHODS[method].finest)
     assert _errs(solve(scene, [8.0], method, 2.0 * least).omega[-1], scene, 8.0) <= 2.0 * least
 

@@ -28,8 +28,8 @@ _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 0.4}
 # Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
 # place takes it for a constant torque, however small the differences that it sees.
 _WAVE_STEP = 2.0
-# solve_ivp takes none below 100 times the rounding of 1; what is claimed with it is for motions of a
-# few radians.
+# solve_ivp takes none below 100 times the rounding of 1; what is claimed with it is for motions
+# of a few radians.
 _FINEST_STEP = 2.222e-14
 _A_FEW = 1.05
 FINEST = {name: _A_FEW * _FINEST_STEP * total for name, total in _SUM.items()}

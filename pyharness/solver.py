@@ -10,6 +10,7 @@ from typing import Self
 
 import numpy as np
 
+from pyharness.effort import checked_effort
 from pyharness.errors import InputError, unknown
 from pyharness.kernels import ENDS, extension, normalized
 from pyharness.plan import EITHER, Plan, plan
@@ -17,7 +18,7 @@ from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
 # Places in the packed array: see fortran/modern/prepared.f90.
-_STATUS_AT, _STEPS_AT, _WAVES_AT = 14, 15, 16
+_STATUS_AT, _STEPS_AT, _EFFORT_AT, _WAVES_AT = 14, 15, 16, 17
 _CODES = {
     "closed-form": 1,
     "sphere": 2,
@@ -56,15 +57,19 @@ class Solver(partial[Array]):
     plan: Plan
     _scene: Scene
     _tolerance: float
+    _effort: float
     _asked: str
 
-    def __new__(cls, scene: Scene, chosen: Plan, tolerance: float, asked: str) -> Self:
+    def __new__(
+        cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0
+    ) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
-        packed = _pack(scene, _code(chosen, asked), tolerance)
+        packed = _pack(scene, _code(chosen, asked), tolerance, effort)
         solver = super().__new__(cls, extension().solve_packed, packed, np.empty(3))
         solver.plan = chosen
         solver._scene = scene
         solver._tolerance = tolerance
+        solver._effort = effort
         solver._asked = asked
         return solver
 
@@ -74,7 +79,7 @@ class Solver(partial[Array]):
 
     @property
     def status(self) -> str:
-        """How the last call ended: complete, overflow, refused or gave up."""
+        """How the last call ended: complete, overflow, refused, gave up or interrupted."""
         return ENDS[int(self.args[0][_STATUS_AT])]
 
     @property
@@ -106,10 +111,12 @@ class Solver(partial[Array]):
         first, second, third = (float(each) for each in omega0)
         scene = replace(self._scene, omega=(first, second, third))
         method = "taylor" if self._asked == "quick" else self._asked
-        return solve_by_name(scene, times, method, self._tolerance)
+        return solve_by_name(scene, times, method, self._tolerance, self._effort)
 
 
-def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Solver:
+def prepare(
+    scene: Scene, method: str = "auto", tolerance: float = 1e-12, effort: float = 1.0
+) -> Solver:
     """Prepare a solver.
 
     Parameters
@@ -122,6 +129,8 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
         Largest error at the end over the largest angular velocity on the way; the methods with
         a fixed step do not look at it. Where small differences grow by a factor K on the way, no
         method keeps less than some 1e-15 K.
+    effort : float
+        Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
 
     Returns
     -------
@@ -131,7 +140,8 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene, or a tolerance out of range.
+        For an unknown method, one that can't take the scene, or a tolerance or an effort out of
+        range.
     NotBuiltError
         Where the extension is not built.
 
@@ -145,11 +155,16 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
     """
     if method not in PREPARED:
         raise unknown("method", method, PREPARED)
-    return Solver(scene, plan(scene, method, tolerance), tolerance, method)
+    effort = checked_effort(effort)
+    return Solver(scene, plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def solve(
-    scene: Scene, times: Sequence[float], method: str = "auto", tolerance: float = 1e-12
+    scene: Scene,
+    times: Sequence[float],
+    method: str = "auto",
+    tolerance: float = 1e-12,
+    effort: float = 1.0,
 ) -> Trajectory:
     """Solve a scene.
 
@@ -163,6 +178,8 @@ def solve(
         A name in `pyharness.methods.METHODS`.
     tolerance : float
         Largest error at `times`, relative to the largest angular velocity.
+    effort : float
+        Factor on the work after which the method gives up: 1 is some ten seconds.
 
     Returns
     -------
@@ -172,8 +189,8 @@ def solve(
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene, times out of order, or a tolerance
-        that the method can't meet.
+        For an unknown method, one that can't take the scene, times out of order, a tolerance
+        that the method can't meet, or one that takes more work than `effort` allows.
 
     Examples
     --------
@@ -184,7 +201,7 @@ def solve(
     """
     from pyharness.methods import solve as solve_by_name
 
-    return solve_by_name(scene, times, method, tolerance)
+    return solve_by_name(scene, times, method, tolerance, effort)
 
 
 def _code(chosen: Plan, asked: str) -> int:
@@ -197,7 +214,7 @@ def _code(chosen: Plan, asked: str) -> int:
     return _CODES[chosen.method]
 
 
-def _pack(scene: Scene, code: int, tolerance: float) -> Array:
+def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
     # A wave without amplitude has no effect, and would cost its sine and cosine.
     sines, cosines = (waves[:, waves[:3].any(axis=0)] for waves in (sines, cosines))
@@ -206,6 +223,7 @@ def _pack(scene: Scene, code: int, tolerance: float) -> Array:
     packed[0] = code
     packed[1:5] = tolerance, scene.step_size, sines.shape[1], cosines.shape[1]
     packed[5:14] = np.concatenate([coefficients, constant, rate])
+    packed[_EFFORT_AT] = effort
     packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
     packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
     return packed

@@ -2,16 +2,20 @@ module gauss_collocation
   !! Gauss collocation of 1 to 8 stages, order twice that, in equal steps between the times.
   !! Iterated until rounding stops it, sums carried along, weights in two words, after Hairer,
   !! McLachlan and Razakarivony 2008: then energy and momentum wander like rounding, no faster.
+  use, intrinsic :: iso_fortran_env, only: int64
+  use interruption, only: interrupt_raised
   use kinds, only: dp
   use gauss_tables, only: MOST_STAGES, NODES, WEIGHTS, WEIGHTS_LOW, MATRIX, &
                           MATRIX_LOW, ONWARD
   use torque_law, only: torque_at
-  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   implicit none(type, external)
   private
 
   integer, parameter :: MOST_ITERATIONS = 60
-  integer, parameter :: MOST_EVALUATIONS = 400000000 ! some ten seconds
+  real(dp), parameter :: MOST_EVALUATIONS = 4e8_dp ! some ten seconds
+  real(dp), parameter :: COUNTABLE = 4e18_dp
+  integer(int64), parameter :: BETWEEN_LOOKS = 500000 ! at the user; right-hand sides, or waves
   real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling
   real(dp), parameter :: EXCESS = 1e-6_dp       ! of a step, rather than one step more
 
@@ -19,9 +23,9 @@ module gauss_collocation
 
 contains
 
-  pure subroutine gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                             cosines, omega0, n_times, times, stages, step, rows, reached, &
-                             n_rows, status, evaluations)
+  subroutine gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                        cosines, omega0, n_times, times, stages, step, effort, rows, reached, &
+                        n_rows, status, evaluations)
     !! Angular velocity at each of `times`, which lead away from 0.
     real(dp), intent(in) :: coefficients(3)        !! A, B, C
     real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
@@ -35,11 +39,12 @@ contains
     real(dp), intent(in) :: times(n_times)         !! s
     integer, intent(in) :: stages                  !! 1 to 8
     real(dp), intent(in) :: step                   !! at the most, s, above 0
+    real(dp), intent(in) :: effort                 !! factor on the right-hand sides allowed
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
     real(dp), intent(out) :: reached(4)            !! time and omega after the last good step
     integer, intent(out) :: n_rows                 !! rows that hold a result
-    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW or GAVE_UP
-    integer, intent(out) :: evaluations            !! right-hand sides
+    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
+    integer(int64), intent(out) :: evaluations     !! right-hand sides
     real(dp) :: y(3)
     real(dp) :: carry(3)             ! what rounding took off y
     real(dp) :: m(MOST_STAGES, 3)    ! torque at the nodes
@@ -50,6 +55,9 @@ contains
     real(dp) :: n_steps
     real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
+    real(dp) :: most                 ! right-hand sides
+    integer(int64) :: seen           ! work at the last look at the user
+    integer(int64) :: turned         ! waves
     logical :: varies
     integer :: i
     integer :: k
@@ -57,6 +65,9 @@ contains
     n_rows = 0
     status = COMPLETE
     evaluations = 0
+    seen = 0
+    turned = 0
+    most = min(COUNTABLE, effort*MOST_EVALUATIONS)
     y = omega0
     carry = 0.0_dp
     f = 0.0_dp
@@ -69,8 +80,8 @@ contains
     do i = 1, n_times
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
       ! Two iterations a step at the least; a wave costs as much as one.
-      cost = n_steps*real(stages, dp)*real(2 + n_sines + n_cosines, dp)
-      if (.not. cost <= real(MOST_EVALUATIONS - evaluations, dp)) then
+      cost = n_steps*real(stages, dp)*(2.0_dp + real(n_sines, dp) + real(n_cosines, dp))
+      if (.not. cost <= most - real(evaluations, dp)) then
         status = GAVE_UP
         return
       end if
@@ -86,8 +97,16 @@ contains
             m(k, :) = at_node
           end do
         end if
-        call advance(coefficients, m, h, stages, y, carry, f, status, evaluations)
+        call advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
         if (status /= COMPLETE) return
+        turned = turned + int(n_sines, int64) + int(n_cosines, int64)
+        if (evaluations + stages*turned - seen > BETWEEN_LOOKS) then
+          seen = evaluations + stages*turned
+          if (interrupt_raised() /= 0) then
+            status = INTERRUPTED
+            return
+          end if
+        end if
         done = done + 1.0_dp
         reached = [begin + done*h, y]
       end do
@@ -97,17 +116,18 @@ contains
     end do
   end subroutine gauss_rows
 
-  pure subroutine advance(coefficients, m, h, stages, y, carry, f, status, evaluations)
+  pure subroutine advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
     !! One step.
     real(dp), intent(in) :: coefficients(3)
     real(dp), intent(in) :: m(MOST_STAGES, 3)
     real(dp), intent(in) :: h
     integer, intent(in) :: stages
+    real(dp), intent(in) :: most                  !! right-hand sides
     real(dp), intent(inout) :: y(3)
     real(dp), intent(inout) :: carry(3)
     real(dp), intent(inout) :: f(MOST_STAGES, 3)  !! rates of the last step, 0 if there is none
     integer, intent(out) :: status
-    integer, intent(inout) :: evaluations
+    integer(int64), intent(inout) :: evaluations
     real(dp) :: z(MOST_STAGES, 3)       ! states at the nodes less y
     real(dp) :: zero(MOST_STAGES, 3)
     real(dp) :: z_before(MOST_STAGES, 3)
@@ -160,7 +180,7 @@ contains
       change_before = change
     end do
     evaluations = evaluations + stages*min(iteration, MOST_ITERATIONS)
-    if (evaluations > MOST_EVALUATIONS - MOST_STAGES*MOST_ITERATIONS) status = GAVE_UP
+    if (real(evaluations, dp) > most) status = GAVE_UP
 
     do axis = 1, 3
       increment = 0.0_dp

@@ -7,7 +7,7 @@ module prepared
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
   use sphere, only: sphere_rows
-  use statuses, only: COMPLETE, OVERFLOW, REFUSED
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED
   use torque_free, only: torque_free_end
   implicit none(type, external)
   private
@@ -23,7 +23,8 @@ module prepared
   integer, parameter :: M_RATE = 12      ! three, 1/s3
   integer, parameter :: STATUS = 15      ! out
   integer, parameter :: STEPS = 16       ! out: steps, or right-hand sides, of the last call
-  integer, parameter :: WAVES = 17       ! four for each sine, then for each cosine
+  integer, parameter :: EFFORT = 17      ! factor on the limits
+  integer, parameter :: WAVES = 18       ! four for each sine, then for each cosine
 
   ! Values of METHOD; 10 + s is Gauss collocation of s stages.
   integer, parameter :: TORQUE_FREE = 1
@@ -142,8 +143,10 @@ contains
     integer :: cosines_at
     integer :: n_rows
     integer :: ended
-    integer :: count
-    integer :: evaluations
+    integer :: quick_steps
+    integer(int64) :: count
+    integer(int64) :: evaluations
+    real(dp) :: needed
 
     sines = int(packed(N_SINES))
     cosines = int(packed(N_COSINES))
@@ -156,12 +159,13 @@ contains
       if (ended == REFUSED .and. int(packed(METHOD)) == FREE_OR_SERIES) then
         call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                           packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
-                          1, times, rows, n_rows, ended, count)
+                          packed(EFFORT), 1, times, rows, n_rows, ended, count, needed)
         omega = rows(:, 1)
       end if
     case (SPHERE)
       call sphere_rows(packed(M_CONSTANT), packed(M_RATE), sines, packed(WAVES), cosines, &
-                       packed(cosines_at), omega0, 1, times, rows, n_rows, ended)
+                       packed(cosines_at), omega0, packed(EFFORT), 1, times, rows, n_rows, ended, &
+                       needed)
       omega = rows(:, 1)
     case (SERIES, QUICK, QUICK_OR_SERIES)
       ended = REFUSED
@@ -170,25 +174,27 @@ contains
         tolerance_left = AUTO_SHARE*tolerance_left
         call quick_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
-                         t_end, int(packed(METHOD)) - QUICK, omega, ended, count)
+                         packed(EFFORT), t_end, int(packed(METHOD)) - QUICK, omega, ended, &
+                         quick_steps)
+        count = quick_steps
       end if
-      if (ended /= COMPLETE .and. int(packed(METHOD)) /= QUICK) then
+      if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. int(packed(METHOD)) /= QUICK) then
         call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                           packed(WAVES), cosines, packed(cosines_at), omega0, tolerance_left, &
-                          1, times, rows, n_rows, ended, count)
+                          packed(EFFORT), 1, times, rows, n_rows, ended, count, needed)
         omega = rows(:, 1)
       end if
     case (EULER_STEPS:RUNGE_KUTTA_STEPS)
       call fixed_step_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                            packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
-                           fixed_method(int(packed(METHOD))), packed(STEP), rows, n_rows, ended, &
-                           count, evaluations)
+                           fixed_method(int(packed(METHOD))), packed(STEP), packed(EFFORT), rows, &
+                           n_rows, ended, count, evaluations, needed)
       omega = rows(:, 1)
     case default
       call gauss_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                       packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
-                      int(packed(METHOD)) - GAUSS, packed(STEP), rows, reached, n_rows, ended, &
-                      count)
+                      int(packed(METHOD)) - GAUSS, packed(STEP), packed(EFFORT), rows, reached, &
+                      n_rows, ended, count)
       omega = rows(:, 1)
     end select
     ! A start that is not finite may come back as it is, at time 0 for one.

@@ -29,6 +29,8 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   real(8), intent(in) :: lipschitz
   integer(4), intent(in) :: may_stop
   integer(4), intent(in) :: with_velocity  ! 0: V1-V3 of the rows are not set
+  ! Not filled with zeros first: of many steps that alone would take seconds.
+  !f2py intent(cache) rows, ier_rows
   real(8), intent(out) :: rows(8, n_steps)  ! n h, TIME, U1-U3, V1-V3 for n_rows results
   integer(4), intent(out) :: ier_rows(n_steps)    ! IER as printed, 0 for runge-kutta
   integer(4), intent(out) :: n_rows

@@ -5,13 +5,31 @@ seconds. `effort` is a factor on all of them.
 """
 
 import math
+from collections.abc import Sequence
+from typing import Protocol
 
 from pyharness.errors import InputError
+from pyharness.scene import Scene
+from pyharness.trajectory import Trajectory
 
 # Of a forecast: the pace so far is not that of the rest.
 _SLACK = 1.5
 # Where there is no forecast.
 _UNFORESEEN = 10.0
+
+
+# Steps of a program without waves, some 30 s of the slowest; and what a wave costs of such a step.
+_MOST_STEPS = {"fortran": 1e8, "python": 5e5}
+_A_WAVE = {"fortran": 1.0, "python": 0.05}
+
+
+class Solver(Protocol):
+    """What turns a scene into rows at times that run away from 0."""
+
+    def __call__(
+        self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
+    ) -> Trajectory:
+        """Solve, or raise InputError."""
 
 
 def checked_effort(effort: float) -> float:
@@ -43,10 +61,33 @@ def advice(instead: str, effort: float, needed: float | None = None) -> str:
 
 def suggested(effort: float, needed: float | None = None) -> str:
     """Return a factor that should do: two digits, rounded up."""
-    known = needed is not None and math.isfinite(needed) and needed > 0.0
-    assert needed is not None or not known
-    factor = max(_SLACK * needed, effort) if known and needed else _UNFORESEEN * effort
-    if not factor < 1e300:
-        return "1e+300"
+    factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
+    factor = min(1e300, factor)
     digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
     return f"{math.ceil(factor / digit) * digit:.2g}"
+
+
+def waves(scene: Scene) -> int:
+    """Return the number of waves in a torque, which every step has to sum up."""
+    return len(scene.torque.sines) + len(scene.torque.cosines)
+
+
+def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
+    """Refuse a scene that takes a program longer than anyone waits who was not asked.
+
+    Raises
+    ------
+    InputError
+        It names the option that lifts the limit, and how far.
+    """
+    cost = 1.0 + _A_WAVE[implementation] * waves(scene)
+    needed = scene.steps * cost / _MOST_STEPS[implementation]
+    if needed <= effort:
+        return
+    load = f"{scene.steps} steps"
+    if waves(scene):
+        load += f" with {waves(scene)} waves of torque"
+    raise InputError(
+        f"{program} ({implementation}): {load} would take too long; "
+        + advice("take fewer steps", effort, needed / _SLACK)
+    )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from pyharness.effort import Solver, advice, waves
 from pyharness.errors import InputError, TimedError
 from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
@@ -32,13 +33,15 @@ _RADAU_SHARE = 2
 _SHORTEST_SPAN = 2.0**-300
 
 
-def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
+def scipy_method(name: str) -> Solver:
     """Return the solver by a method of `solve_ivp`, with the scene's own right-hand side.
 
     Its finest tolerance is for as many radians as `RADIANS` says; for more it grows with them.
     """
 
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
         from scipy.integrate import solve_ivp
 
         if times[-1] == 0.0:
@@ -53,8 +56,7 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
         unit = _unit(times[-1])
         right_hand_side = _in_units(scene.right_hand_side(), unit)
         evaluations = 0
-        waves = len(scene.torque.sines) + len(scene.torque.cosines)
-        most = _MOST_EVALUATIONS * 8 // (8 + waves)
+        most = int(effort * _MOST_EVALUATIONS * 8 / (8 + waves(scene)))
         if name == "Radau":
             most //= _RADAU_SHARE
 
@@ -63,8 +65,12 @@ def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Traject
             evaluations += 1
             if evaluations > most:
                 raise TimedError(
-                    f"{name} gave up at t = {{time}} s after {most} right-hand sides; take a "
-                    "shorter time or a larger tolerance",
+                    f"{name} gave up at t = {{time}} s after {most} right-hand sides; "
+                    + advice(
+                        "take a shorter time or a larger tolerance",
+                        effort,
+                        effort * times[-1] / (time * unit) if time else None,
+                    ),
                     time * unit,
                 )
             return right_hand_side(time, omega)

@@ -228,7 +228,7 @@ def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
             sines.shape[1], _address(sines), cosines.shape[1], _address(cosines),
             _address(np.array(scene.omega)), _address(np.array([1e-12])),
             _address(np.array([1.0])), 1, _address(np.array([2.0])), _address(found),
-            *map(ctypes.byref, (n_rows, ended, count, ctypes.c_double())),
+            *(ctypes.byref(each) for each in (n_rows, ended, count, ctypes.c_double())),
         )  # fmt: skip
         omega, status, steps = _end(scene, 2.0, 1e-12)
         assert (ended.value, abs(count.value - steps) <= 1) == (status, True), name

@@ -13,7 +13,7 @@ module taylor
 
   ! Without waves; some ten seconds. A wave costs A_WAVE of a step without any.
   real(dp), parameter :: MOST_STEPS = 1e7_dp
-  real(dp), parameter :: A_WAVE = 0.25_dp
+  real(dp), parameter :: A_WAVE = 0.5_dp
   real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e5_dp ! at the user
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**19
   integer, parameter :: MANY_WAVES = 1000 ! so that a step is worth a look

@@ -29,7 +29,7 @@ module deck
   end type stop_t
 
   ! Looks at the user (Ctrl-C): so many steps apart, where no wave makes them longer.
-  real(dp), parameter :: STEPS_BETWEEN = 1e5_dp
+  real(dp), parameter :: STEPS_BETWEEN = 5e4_dp
 
   public :: euler_coefficients, normalized_torque, accelerations, is_finite, steps_between_looks
 

@@ -13,7 +13,9 @@ from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
 
 # Of a forecast: the pace so far is not that of the rest.
-_SLACK = 1.5
+_SLACK = 2.0
+# Of an effort that was advised, and rounded.
+_ROUNDING = 1.0 + 1e-9
 # Where there is no forecast.
 _UNFORESEEN = 10.0
 
@@ -35,11 +37,12 @@ class Solver(Protocol):
 def checked_effort(effort: float) -> float:
     """Return the factor; InputError where it is no finite number above 0."""
     try:
-        value = float(effort)
+        value = math.nan if isinstance(effort, str) else float(effort)
+        shown = repr(effort)
     except (TypeError, ValueError, OverflowError):
-        value = math.nan
+        value, shown = math.nan, f"a {type(effort).__name__} that is no such number"
     if not 0.0 < value < math.inf:
-        raise InputError(f"effort: {effort}; allowed: a finite number above 0")
+        raise InputError(f"effort: {shown}; allowed: a finite number above 0")
     return value
 
 
@@ -64,7 +67,8 @@ def suggested(effort: float, needed: float | None = None) -> str:
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
     digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
-    return f"{math.ceil(factor / digit) * digit:.2g}"
+    rounded = math.ceil(factor / digit) * digit
+    return f"{rounded:.0f}" if 10.0 <= rounded < 1e15 else f"{rounded:.2g}"
 
 
 def waves(scene: Scene) -> int:
@@ -82,7 +86,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
     """
     cost = 1.0 + _A_WAVE[implementation] * waves(scene)
     needed = scene.steps * cost / _MOST_STEPS[implementation]
-    if needed <= effort:
+    if needed <= effort * _ROUNDING:
         return
     load = f"{scene.steps} steps"
     if waves(scene):

@@ -248,7 +248,7 @@ class _Limit:
             if rest > 10 * Decimal(self._most) * abs(length):
                 self._refuse(rest / abs(length))
         elif step >= self._most:
-            self._refuse(step * (1 + rest / abs(begin)))
+            self._refuse(step + rest / min(abs(length), abs(begin) / step))
         elif self._effort is not None and step >= self._next:
             self._next = 2.0 * step
             needed = step * (1 + rest / abs(begin))
@@ -262,8 +262,8 @@ class _Limit:
         if self._effort is not None:
             instead = advice(instead, self._effort, steps / self._ordinary)
         raise InputError(
-            f"reference: some {steps:.2g} Taylor steps would be needed, allowed are "
-            f"{self._most:.6g}; {instead}"
+            f"reference: more than {self._most:.0f} Taylor steps would be needed, some "
+            f"{steps:.2g}; {instead}"
         )
 
 

@@ -21,6 +21,7 @@ module taylor
   integer, parameter :: MOST_TRIES = 60
   real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
   real(dp), parameter :: PLANNED = 3.0_dp ! growth of a difference that the share allows for
+  real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
   real(dp), parameter :: SAFETY = 10.0_dp  ! one difference may miss where others grow
   real(dp), parameter :: ROUNDING = 2e-16_dp ! relative
   real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
@@ -85,6 +86,8 @@ contains
                  1 + int(STEPS_BETWEEN_LOOKS/cost, c_int64_t), n_times, times, rows, n_rows, &
                  status, steps, growth, ahead)
       if (status == GAVE_UP) then
+        ! Differences that have grown already will ask for another march, in shorter steps.
+        if (growth > known) ahead = ANOTHER*ahead
         needed = (spent + ahead)*cost/MOST_STEPS
         steps = steps + int(spent, c_int64_t)
       end if
@@ -296,7 +299,8 @@ contains
       h = next
       if (steps >= next_look) then
         if (real(steps, dp) >= most_steps) then
-          ahead = real(steps, dp)*(1.0_dp + abs(rest/t))
+          ! By the mean step or by the next one, whichever is shorter: motions grow faster.
+          ahead = real(steps, dp) + abs(rest)/max(min(abs(h), abs(t)/real(steps, dp)), tiny(h))
           status = GAVE_UP
         else if (steps == 1 .and. abs(rest) > (HOPELESS*most_steps)*abs(h)) then
           ahead = abs(rest)/max(abs(h), tiny(h))

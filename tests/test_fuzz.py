@@ -281,7 +281,7 @@ def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_reference_as_a_method_gives_up_in_time() -> None:
     """It took minutes; whoever asks `pyharness.reference` may wait as long."""
     scene = Scene("", (0.01, 7.0, -9.7), moments=(9.85, 2.99, 1800.0))
-    with pytest.raises(InputError, match=r"more than (14286|20000|[0-9]+) Taylor steps"):
+    with pytest.raises(InputError, match="more than 20000 Taylor steps"):
         solve(scene, [1000.0], "reference", 1e-10)
 
 

@@ -15,7 +15,7 @@ module gauss_collocation
   integer, parameter :: MOST_ITERATIONS = 60
   real(dp), parameter :: MOST_EVALUATIONS = 4e8_dp ! some ten seconds
   real(dp), parameter :: COUNTABLE = 4e18_dp
-  integer(int64), parameter :: BETWEEN_LOOKS = 500000 ! at the user; right-hand sides, or waves
+  real(dp), parameter :: BETWEEN_LOOKS = 5e5_dp ! at the user; right-hand sides, some 8 a step
   real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling
   real(dp), parameter :: EXCESS = 1e-6_dp       ! of a step, rather than one step more
 
@@ -55,9 +55,9 @@ contains
     real(dp) :: n_steps
     real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
-    real(dp) :: most                 ! right-hand sides
-    integer(int64) :: seen           ! work at the last look at the user
-    integer(int64) :: turned         ! waves
+    integer(int64) :: most           ! right-hand sides
+    real(dp) :: stride               ! steps between looks at the user
+    real(dp) :: next_look            ! steps of the way to this time
     logical :: varies
     integer :: i
     integer :: k
@@ -65,9 +65,9 @@ contains
     n_rows = 0
     status = COMPLETE
     evaluations = 0
-    seen = 0
-    turned = 0
-    most = min(COUNTABLE, effort*MOST_EVALUATIONS)
+    most = int(min(COUNTABLE, effort*MOST_EVALUATIONS), int64)
+    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + real(n_sines, dp) + real(n_cosines, dp)))
+    next_look = stride
     y = omega0
     carry = 0.0_dp
     f = 0.0_dp
@@ -81,7 +81,7 @@ contains
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
       ! Two iterations a step at the least; a wave costs as much as one.
       cost = n_steps*real(stages, dp)*(2.0_dp + real(n_sines, dp) + real(n_cosines, dp))
-      if (.not. cost <= most - real(evaluations, dp)) then
+      if (.not. cost <= real(most - evaluations, dp)) then
         status = GAVE_UP
         return
       end if
@@ -99,17 +99,17 @@ contains
         end if
         call advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
         if (status /= COMPLETE) return
-        turned = turned + int(n_sines, int64) + int(n_cosines, int64)
-        if (evaluations + stages*turned - seen > BETWEEN_LOOKS) then
-          seen = evaluations + stages*turned
+        done = done + 1.0_dp
+        reached = [begin + done*h, y]
+        if (done >= next_look) then
+          next_look = done + stride
           if (interrupt_raised() /= 0) then
             status = INTERRUPTED
             return
           end if
         end if
-        done = done + 1.0_dp
-        reached = [begin + done*h, y]
       end do
+      next_look = next_look - n_steps
       begin = times(i)
       rows(:, i) = y
       n_rows = i
@@ -122,7 +122,7 @@ contains
     real(dp), intent(in) :: m(MOST_STAGES, 3)
     real(dp), intent(in) :: h
     integer, intent(in) :: stages
-    real(dp), intent(in) :: most                  !! right-hand sides
+    integer(int64), intent(in) :: most            !! right-hand sides
     real(dp), intent(inout) :: y(3)
     real(dp), intent(inout) :: carry(3)
     real(dp), intent(inout) :: f(MOST_STAGES, 3)  !! rates of the last step, 0 if there is none
@@ -180,7 +180,7 @@ contains
       change_before = change
     end do
     evaluations = evaluations + stages*min(iteration, MOST_ITERATIONS)
-    if (real(evaluations, dp) > most) status = GAVE_UP
+    if (evaluations > most) status = GAVE_UP
 
     do axis = 1, 3
       increment = 0.0_dp

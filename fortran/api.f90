@@ -29,6 +29,8 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   real(8), intent(in) :: lipschitz
   integer(4), intent(in) :: may_stop
   integer(4), intent(in) :: with_velocity  ! 0: V1-V3 of the rows are not set
+  ! Not filled with zeros first: of many steps that alone would take seconds.
+  !f2py intent(cache) rows, ier_rows
   real(8), intent(out) :: rows(8, n_steps)  ! n h, TIME, U1-U3, V1-V3 for n_rows results
   integer(4), intent(out) :: ier_rows(n_steps)    ! IER as printed, 0 for runge-kutta
   integer(4), intent(out) :: n_rows
@@ -67,7 +69,7 @@ subroutine solve_linear(n, m, a, b, factors, x, ier)
 end subroutine solve_linear
 
 subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                       omega0, n_times, times, tolerance, rows, n_rows, status, steps)
+                       omega0, n_times, times, tolerance, effort, rows, n_rows, status, steps)
   ! Taylor series: omega at times that lead away from 0 on one side.
   !f2py threadsafe
   use levels, only: taylor_solve
@@ -83,13 +85,16 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)         ! s
   real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|
+  !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
+  real(8), intent(inout) :: effort(2)           ! factor on the limits; out: what it should be
   real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
-  integer(4), intent(out) :: steps
+  integer(8), intent(out) :: steps
 
   call taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                    omega0, tolerance, n_times, times, rows, n_rows, status, steps)
+                    omega0, tolerance, effort(1), n_times, times, rows, n_rows, status, steps, &
+                    effort(2))
 end subroutine taylor_rows
 
 subroutine choose_instructions(highest, taken)
@@ -119,7 +124,7 @@ subroutine torque_free_solution(coefficients, omega0, n_times, times, rows, n_ro
 end subroutine torque_free_solution
 
 subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
-                           n_times, times, rows, n_rows, status)
+                           n_times, times, effort, rows, n_rows, status)
   ! Closed form of a sphere under the torque law of a scene.
   !f2py threadsafe
   use sphere, only: sphere_rows
@@ -133,17 +138,19 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)
+  !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
+  real(8), intent(inout) :: effort(2)
   real(8), intent(out) :: rows(3, n_times)
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status
 
-  call sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, n_times, &
-                   times, rows, n_rows, status)
+  call sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, effort(1), &
+                   n_times, times, rows, n_rows, status, effort(2))
 end subroutine sphere_solution
 
 subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                          omega0, n_times, times, stages, step, rows, reached, n_rows, status, &
-                          evaluations)
+                          omega0, n_times, times, stages, step, effort, rows, reached, n_rows, &
+                          status, evaluations)
   ! Gauss collocation in equal steps between the times.
   !f2py threadsafe
   use gauss_collocation, only: gauss_rows
@@ -160,19 +167,22 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   real(8), intent(in) :: times(n_times)     ! leading away from 0
   integer(4), intent(in) :: stages          ! 1 to 8
   real(8), intent(in) :: step               ! at the most, above 0
+  !f2py real(8), optional, intent(in) :: effort = 1.0
+  real(8), intent(in) :: effort
   real(8), intent(out) :: rows(3, n_times)
   real(8), intent(out) :: reached(4)        ! time and omega after the last good step
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status
-  integer(4), intent(out) :: evaluations
+  integer(8), intent(out) :: evaluations
 
   call gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
-                  n_times, times, stages, step, rows, reached, n_rows, status, evaluations)
+                  n_times, times, stages, step, effort, rows, reached, n_rows, status, &
+                  evaluations)
 end subroutine gauss_solution
 
 subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                               cosines, omega0, n_times, times, method, step, rows, n_rows, &
-                               status, steps, evaluations)
+                               cosines, omega0, n_times, times, method, step, effort, rows, &
+                               n_rows, status, steps, evaluations)
   ! Improved Euler, three-term Taylor, Runge-Kutta: whole steps, the last before a time shorter.
   !f2py threadsafe
   use fixed_step, only: fixed_step_rows
@@ -189,15 +199,17 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   real(8), intent(in) :: times(n_times)
   integer(4), intent(in) :: method          ! 1 improved Euler, 2 three-term Taylor, 3 Runge-Kutta
   real(8), intent(in) :: step               ! above 0
+  !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
+  real(8), intent(inout) :: effort(2)
   real(8), intent(out) :: rows(3, n_times)
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status
-  integer(4), intent(out) :: steps
-  integer(4), intent(out) :: evaluations
+  integer(8), intent(out) :: steps
+  integer(8), intent(out) :: evaluations
 
   call fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                       omega0, n_times, times, method, step, rows, n_rows, status, steps, &
-                       evaluations)
+                       omega0, n_times, times, method, step, effort(1), rows, n_rows, status, &
+                       steps, evaluations, effort(2))
 end subroutine fixed_step_solution
 
 subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps)
@@ -212,7 +224,7 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps)
   real(8), intent(in) :: t_end       ! s
   real(8), intent(out) :: omega(3)   ! rad/s; NaN unless the status is 0
   integer(4), intent(out) :: status
-  integer(4), intent(out) :: steps   ! or right-hand sides, of Gauss collocation
+  integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps)
 end subroutine solve_packed

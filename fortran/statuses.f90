@@ -8,5 +8,6 @@ module statuses
   integer, parameter, public :: OVERFLOW = 2 !! an angular velocity left the range of numbers
   integer, parameter, public :: REFUSED = 3  !! the method can't take these coefficients
   integer, parameter, public :: GAVE_UP = 4  !! no digit of the phase is left, or too many steps
+  integer, parameter, public :: INTERRUPTED = 5 !! by the user; an exception is set
 
 end module statuses

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from pyharness.agreement import accuracy
+from pyharness.effort import check_steps
 from pyharness.errors import unknown
 from pyharness.facts import facts
 from pyharness.listing import Listing, corrected, names_of, original, subset
@@ -72,9 +73,15 @@ def entry(name: str) -> dict[str, Any]:
     raise unknown("entry", name, [each["id"] for each in entries()])
 
 
-def effect(scene: Scene, listing: Listing, truth: Reference, may_stop: bool = True) -> Effect:
+def effect(
+    scene: Scene,
+    listing: Listing,
+    truth: Reference,
+    may_stop: bool = True,
+    effort: float = 1.0,
+) -> Effect:
     """Run a listing and hold it against the truth (with velocity) at the scene's times."""
-    run = PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=may_stop)
+    run = PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=may_stop, effort=effort)
     found = accuracy(scene, run, truth)
     velocity = math.nan if found.velocity is None else found.velocity
     return Effect(listing, max(found.omega), velocity, run.steps, run.ended, run.stop)
@@ -116,14 +123,18 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
             )
 
 
-def lattice(scene: Scene, program: str, readings: tuple[str, ...] = ()) -> list[Effect]:
+def lattice(
+    scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
+) -> list[Effect]:
     """Return the effect of every subset of a program's defects, largest error of omega first."""
-    truth = reference(scene, scene.times(), velocity=True)
+    check_steps(scene, program, "fortran", effort)
+    truth = reference(scene, scene.times(), velocity=True, effort=effort)
     names = names_of("defect", program)
     found = []
     for bits in range(2 ** len(names)):
         active = frozenset(name for i, name in enumerate(names) if bits >> i & 1)
-        found.append(effect(scene, Listing(program, active, frozenset(readings)), truth))
+        listing = Listing(program, active, frozenset(readings))
+        found.append(effect(scene, listing, truth, effort=effort))
     return sorted(found, key=_size, reverse=True)
 
 

@@ -4,6 +4,7 @@ Two notions of agreement, never mixed: bits between languages (in units in the l
 error against the truth (in rad/s, never below what the reference itself may be wrong by).
 """
 
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -11,9 +12,10 @@ from dataclasses import dataclass
 from functools import partial
 
 from pyharness.agreement import Accuracy, accuracy, differences, distance
+from pyharness.effort import check_steps
 from pyharness.errors import InputError, unknown
 from pyharness.listing import PROGRAMS, Listing, names_of, subset
-from pyharness.methods import PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.methods import IMPLEMENTATIONS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
 from pyharness.orders import Order, measured_order
 from pyharness.reference import Reference, reference
 from pyharness.scene import Scene
@@ -87,6 +89,7 @@ def compare(
     lipschitz: float = 500.0,
     may_stop: bool = True,
     tolerance: float = 1e-8,
+    effort: float = 1.0,
 ) -> Comparison:
     """Compare programs and methods on one scene.
 
@@ -102,6 +105,8 @@ def compare(
         Whether the stop test may end a run.
     tolerance : float
         What `solve_ivp` is asked for, relative to the largest angular velocity.
+    effort : float
+        Factor on the work of each of them after which it gives up.
 
     Returns
     -------
@@ -113,14 +118,18 @@ def compare(
     NotBuiltError
         Where the extension is not built.
     InputError
-        Where the reference would need too many steps.
+        Where the reference or a program would need too many steps.
     """
-    truth = reference(scene, scene.times(), velocity=True)
+    for listing, implementation in itertools.product(listings, IMPLEMENTATIONS):
+        check_steps(scene, listing.program, implementation, effort)
+    truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:
         program = PROGRAM_REGISTRY[listing.program]
-        compiled = program.run(scene, listing, "fortran", lipschitz, may_stop)
-        twin = program.run(scene, listing, "python", lipschitz, may_stop)
+        run = partial(
+            program.run, scene, listing, lipschitz=lipschitz, may_stop=may_stop, effort=effort
+        )
+        compiled, twin = run("fortran"), run("python")
         judged = not listing.defects and not listing.readings
         programs.append(
             ProgramFinding(
@@ -130,15 +139,12 @@ def compare(
                 ulps=distance(compiled, twin),
                 differences=tuple(differences(compiled, twin)),
                 order=measured_order(scene, program, listing, truth) if judged else None,
-                seconds_per_step=_seconds(
-                    partial(program.run, scene, listing, "fortran", lipschitz, may_stop)
-                )
-                / max(compiled.steps, 1),
+                seconds_per_step=_seconds(partial(run, "fortran")) / max(compiled.steps, 1),
             )
         )
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
-    methods = [_method(scene, name, tolerance, truth) for name in SCIPY_METHODS]
+    methods = [_method(scene, name, tolerance, effort, truth) for name in SCIPY_METHODS]
     return Comparison(scene, lipschitz, truth, tuple(programs), tuple(methods))
 
 
@@ -180,10 +186,12 @@ def listings_for(
     return result
 
 
-def _method(scene: Scene, name: str, tolerance: float, truth: Reference) -> MethodFinding:
+def _method(
+    scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
+) -> MethodFinding:
     start = time.perf_counter()
     try:
-        trajectory = solve(scene, scene.times(), name, tolerance)
+        trajectory = solve(scene, scene.times(), name, tolerance, effort)
     except InputError as error:
         return MethodFinding(name, tolerance, None, None, math.nan, str(error))
     seconds = time.perf_counter() - start

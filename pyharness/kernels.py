@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.effort import advice
 from pyharness.errors import InputError, NotBuiltError, TimedError
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scene import Scene, Wave
 from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 
 # The status codes of fortran/statuses.f90, and what a user reads.
-COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP = range(5)
-ENDS = ("complete", "stopped", "overflow", "refused", "gave up")
+COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP, INTERRUPTED = range(6)
+ENDS = ("complete", "stopped", "overflow", "refused", "gave up", "interrupted")
 
 
 def extension() -> ModuleType:
@@ -108,7 +109,9 @@ def program_arguments(
     )
 
 
-def taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+def taylor(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
     """Solve a scene by Taylor series.
 
     Parameters
@@ -119,6 +122,8 @@ def taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory
         Strictly monotonic away from 0, on one side of it (s); not checked.
     tolerance : float
         Largest error at `times`, relative to the largest angular velocity.
+    effort : float
+        Factor on the work after which it gives up.
 
     Returns
     -------
@@ -132,14 +137,15 @@ def taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory
     NotBuiltError
         Where the extension is not built.
     """
+    work = np.array([effort, 0.0])
     rows, n_rows, status, steps = extension().taylor_rows(
-        *normalized(scene), scene.omega, times, tolerance
+        *normalized(scene), scene.omega, times, tolerance, effort=work
     )
     if status == GAVE_UP:
         count = "1 step" if steps == 1 else f"{steps} steps"
         raise TimedError(
-            f"taylor gave up before t = {{time}} s after {count}; take a shorter time or a larger "
-            "tolerance",
+            f"taylor gave up before t = {{time}} s after {count}; "
+            + advice("take a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )
     time = np.array(times[:n_rows], dtype=float)

@@ -3,9 +3,10 @@
 import importlib
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pyharness.effort import Solver, check_steps, checked_effort
 from pyharness.errors import InputError, TimedError, unknown
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scaling import factor_near_one, scaled, unscaled
@@ -14,9 +15,6 @@ from pyharness.scipy_methods import FINEST, finest_tolerance, rows_trajectory, s
 from pyharness.trajectory import Trajectory
 
 IMPLEMENTATIONS = ("fortran", "python")
-
-Solver = Callable[[Scene, Sequence[float], float], Trajectory]
-
 
 # Of 1 to 8 stages: low orders would need more steps than anyone waits for.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
@@ -51,6 +49,7 @@ class Program:
         lipschitz: float = 500.0,
         may_stop: bool = True,
         velocity: bool = True,
+        effort: float = 1.0,
     ) -> Trajectory:
         """Run the program.
 
@@ -69,12 +68,17 @@ class Program:
         velocity : bool
             Whether the velocity is wanted; the compiled program then computes it only if its
             stop test needs it.
+        effort : float
+            Factor on the steps, times waves, that are run without being asked for.
 
         Raises
         ------
+        InputError
+            For more steps than that.
         NotBuiltError
             Where the compiled program is asked for and not built.
         """
+        check_steps(scene, self.name, implementation, checked_effort(effort))
         if implementation == "fortran":
             from pyharness import kernels
 
@@ -95,7 +99,7 @@ class Method:
     finest : float
         The smallest tolerance that it claims to meet.
     solve : callable
-        ``solve(scene, times, tolerance)``; times are checked, and run away from 0.
+        ``solve(scene, times, tolerance, effort)``; times are checked, and run away from 0.
     """
 
     name: str
@@ -105,7 +109,9 @@ class Method:
     solve: Solver
 
 
-def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -> Trajectory:
+def solve(
+    scene: Scene, times: Sequence[float], method: str, tolerance: float, effort: float = 1.0
+) -> Trajectory:
     """Solve a scene by a method of the registry.
 
     Parameters
@@ -118,6 +124,8 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
         A name in `METHODS`.
     tolerance : float
         Largest error at `times`, relative to the largest initial angular velocity.
+    effort : float
+        Factor on the work after which the method gives up.
 
     Returns
     -------
@@ -127,7 +135,8 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
     Raises
     ------
     InputError
-        For an unknown method, times out of order, or a tolerance that the method can't meet.
+        For an unknown method, times out of order, a tolerance that the method can't meet, or one
+        that takes more work than `effort` allows.
     """
     if method not in METHODS:
         raise unknown("method", method, METHODS)
@@ -141,14 +150,15 @@ def solve(scene: Scene, times: Sequence[float], method: str, tolerance: float) -
         raise InputError(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
+    effort = checked_effort(effort)
     ordered, turned = _outward(times)
     factor = 1.0 if method in _ANY_SCALE else factor_near_one(scene, ordered[-1])
     if factor == 1.0:
-        trajectory = chosen.solve(scene, ordered, tolerance)
+        trajectory = chosen.solve(scene, ordered, tolerance, effort)
     else:
         faster = [t / factor for t in ordered]
         try:
-            found = chosen.solve(scaled(scene, factor), faster, tolerance)
+            found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
         except TimedError as refusal:
             raise refusal.slower(factor) from None
         trajectory = unscaled(found, ordered, factor)
@@ -201,35 +211,39 @@ def _outward(times: Sequence[float]) -> tuple[list[float], bool]:
     return values, turned
 
 
-def _auto(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+def _auto(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
     from pyharness.plan import closed_form
 
     if closed_form(scene):
         form = METHODS["closed-form"]
         try:
             # As good as rounding lets it be, whatever is asked.
-            return form.solve(scene, times, max(tolerance, form.finest))
+            return form.solve(scene, times, max(tolerance, form.finest), effort)
         except InputError as refusal:
             # A disturbance of the middle axis may be too faint for it, but not for a series.
             try:
-                return METHODS["taylor"].solve(scene, times, tolerance)
+                return METHODS["taylor"].solve(scene, times, tolerance, effort)
             except InputError:
                 raise refusal from None
-    return METHODS["taylor"].solve(scene, times, tolerance)
+    return METHODS["taylor"].solve(scene, times, tolerance, effort)
 
 
-def _taylor(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+def _taylor(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
     from pyharness import kernels
 
-    return kernels.taylor(scene, times, tolerance)
+    return kernels.taylor(scene, times, tolerance, effort)
 
 
-def _reference(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+def _reference(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
     from pyharness.reference import reference
 
-    # Some ten seconds; whoever holds something against the truth may wait longer.
-    waves = len(scene.torque.sines) + len(scene.torque.cosines)
-    result = reference(scene, times, most_steps=100_000 // (5 + waves))
+    result = reference(scene, times, effort=effort)
     ended = "complete" if len(result.time) == len(times) else "overflow"
     return rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
 
@@ -237,11 +251,13 @@ def _reference(scene: Scene, times: Sequence[float], tolerance: float) -> Trajec
 def _modern(factory: str, argument: str | int | None = None) -> Solver:
     """Return a solver of `pyharness.modern`, which is imported when it is first used."""
 
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
         solver = getattr(importlib.import_module("pyharness.modern"), factory)
         if argument is not None:
             solver = solver(argument)
-        trajectory: Trajectory = solver(scene, times, tolerance)
+        trajectory: Trajectory = solver(scene, times, tolerance, effort)
         return trajectory
 
     return solve

@@ -2,22 +2,22 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.effort import Solver, advice, waves
 from pyharness.errors import InputError, TimedError
 from pyharness.kernels import COMPLETE, GAVE_UP, REFUSED, extension, normalized
 from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
-Solver = Callable[[Scene, Sequence[float], float], Trajectory]
-
 FIXED_STEP = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
 MOST_STAGES = 8
 
-# Right-hand sides of all trial steps of Gauss collocation together, some ten seconds.
+# Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
+# as much as half of one.
 _MOST_EVALUATIONS = 200_000_000
 _ORDER_THAT_SHOWS = 8
 # Two solutions that differ by so many units in the last place will not get closer.
@@ -26,19 +26,28 @@ _ROUNDING = 16 * 2.0**-53
 _NEAR_THE_END = 1e300
 
 
-def closed_form(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+def closed_form(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
     """Solve a scene that has a closed form; the tolerance plays no part.
 
     Raises
     ------
     InputError
         Where the scene has none: torque on a body that is no sphere, or coefficients all of
-        one sign; and where the phase is so large that it has no digit left.
+        one sign; and where the phase is so large that it has no digit left, or the times and
+        waves are too many.
     """
+    work = np.array([effort, 0.0])
     if not any(scene.euler_coefficients):
         rows, n_rows, status = extension().sphere_solution(
-            *normalized(scene)[1:], scene.omega, times
+            *normalized(scene)[1:], scene.omega, times, effort=work
         )
+        if status == GAVE_UP:
+            raise InputError(
+                f"closed-form: {waves(scene)} waves at {len(times)} times would take too long; "
+                + advice("take fewer times", effort, work[1])
+            )
     elif not scene.torque.is_zero:
         raise InputError(
             "closed-form: the scene has torque, and its body is no sphere; "
@@ -69,15 +78,18 @@ def fixed_step(name: str) -> Solver:
     """
     number = FIXED_STEP[name]
 
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        work = np.array([effort, 0.0])
         rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(
             scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
-            scene.step_size,
+            scene.step_size, effort=work,
         )  # fmt: skip
         if status == GAVE_UP:
             raise TimedError(
                 f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s are too many; "
-                "take a larger step or a shorter time",
+                + advice("take a larger step or a shorter time", effort, work[1]),
                 scene.step_size,
             )
         return _trajectory(times, rows, n_rows, status, steps, evaluations)
@@ -93,29 +105,47 @@ def gauss(stages: int) -> Solver:
     of high order are long, and the coarser ones too long for the order to show.
     """
 
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
         torque = normalized(scene)[1:]
         if times[-1] == 0.0:
             return _trajectory(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
         scale = max(map(abs, scene.omega))
         start = max(scale, _driven(torque, times[-1]))
         step, spent, reached = _first_step(scene, times), 0, 0.0
+        most = effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
+        more = 1.0  # times the steps of the next try that will be needed, as far as known
+        pace = 2.0 * stages  # right-hand sides of a step
         before: _Solution | None = None
         counts = previous = _counts(times, step)
         while True:
             # Each step takes two iterations at the least.
-            if not step or spent + 2.0 * stages * float(counts.sum()) > _MOST_EVALUATIONS:
+            steps = float(counts.sum())
+            if not step or spent + 2.0 * stages * steps > most:
+                needed = spent + steps * (pace * (more - 1.0) + 2.0 * stages * more)
                 raise TimedError(
                     f"gauss-{stages} gave up at t = {{time}} s after {spent} right-hand sides; "
-                    "take a shorter time, a larger tolerance or more stages",
+                    + advice(
+                        "take a shorter time, a larger tolerance or more stages",
+                        effort,
+                        effort * max(needed, 0.5 * pace * more * steps) / most,
+                    ),
                     reached,
                 )
             found = _Solution(
                 *extension().gauss_solution(
-                    scene.euler_coefficients, *torque, scene.omega, times, stages, step
+                    scene.euler_coefficients,
+                    *torque,
+                    scene.omega,
+                    times,
+                    stages,
+                    step,
+                    effort=effort,
                 )
             )
             spent += found.evaluations
+            pace = max(pace, found.evaluations / steps)
             reached = float(found.reached[0])
             if before is not None and before.n_rows == found.n_rows:
                 n = found.n_rows
@@ -126,6 +156,9 @@ def gauss(stages: int) -> Solver:
                 known = ratio ** min(2 * stages, _ORDER_THAT_SHOWS) - 1.0
                 allowed = max(tolerance * scale * known / 2.0, _ROUNDING * scale)
                 close = known > 0.0 and difference <= allowed
+                if known > 0.0 and allowed > 0.0:
+                    excess = difference / (allowed * (known + 1.0))
+                    more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
                 if (close and found.status == COMPLETE) or found.blows_up(before, start):
                     count = int(counts.sum())
                     return _trajectory(times, found.rows, n, found.status, count, spent)
@@ -176,8 +209,8 @@ def _first_step(scene: Scene, times: Sequence[float]) -> float:
     lengths = [abs(t1 - t0) for t0, t1 in itertools.pairwise((0.0, *times)) if t1 != t0]
     shortest = min(lengths, default=1.0)
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
-    for waves in (scene.torque.sines, scene.torque.cosines):
-        rate = max([rate, *(abs(frequency) for _, frequency in waves)])
+    for _, frequency in scene.torque.sines + scene.torque.cosines:
+        rate = max(rate, abs(frequency))
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
 
 

@@ -82,6 +82,18 @@ def add_listing_options(parser: Parser) -> None:
     )
 
 
+def add_effort_option(parser: Parser) -> None:
+    """Declare what lifts the limits."""
+    parser.add_argument(
+        "--effort", metavar="F", help="factor on the work that is done before giving up (default 1)"
+    )
+
+
+def chosen_effort(options: argparse.Namespace) -> float:
+    """Return the factor on the limits."""
+    return positive(options.effort, "--effort", 1.0)
+
+
 def add_output_options(parser: Parser, formats: Sequence[str] = FORMATS) -> None:
     """Declare where results go, and in what form."""
     parser.add_argument("--format", metavar="F", help=", ".join(formats))

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from pyharness.conditioning import ROUNDING, conditioning
+from pyharness.effort import check_steps
 from pyharness.errors import InputError
 from pyharness.listing import Listing
 from pyharness.methods import Program, solve
@@ -224,9 +225,11 @@ def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
         if scene.steps * parts > most:
             return
         try:
-            yield replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
+            finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
+            check_steps(finer, "orders", "fortran", 1.0)
         except InputError:
-            return  # does not fit in memory
+            return  # does not fit in memory, or takes too long
+        yield finer
 
 
 def _fastest(scene: Scene, omega: Array) -> float:

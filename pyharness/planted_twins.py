@@ -32,12 +32,13 @@ class PlantedTwin(Program):
         lipschitz: float = 500.0,
         may_stop: bool = True,
         velocity: bool = True,
+        effort: float = 1.0,
     ) -> Trajectory:
         """Run the faulty twin, or the compiled program as it is."""
         if self.both or implementation == "python":
             trajectory: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
             return trajectory
-        return super().run(scene, listing, implementation, lipschitz, may_stop, velocity)
+        return super().run(scene, listing, implementation, lipschitz, may_stop, velocity, effort)
 
 
 def plant_in_twin(

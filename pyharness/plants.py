@@ -96,8 +96,10 @@ def _method(
     """Change what a method does."""
     known = METHODS[name]
 
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        return change(scene, times, lambda s, t: known.solve(s, t, tolerance))
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        return change(scene, times, lambda s, t: known.solve(s, t, tolerance, effort))
 
     return patch.dict(METHODS, {name: replace(known, solve=solve)})
 

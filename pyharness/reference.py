@@ -16,6 +16,7 @@ from operator import mul
 import numpy as np
 
 from pyharness.decimal_functions import sine_cosine
+from pyharness.effort import advice, waves
 from pyharness.errors import InputError
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
@@ -25,6 +26,12 @@ DIGITS = 40
 _QUICK = ((20, Decimal("1e-19")), (24, Decimal("1e-22")))
 _PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
 MOST_STEPS = 100_000
+# Of a series where an effort is given: some ten seconds. A wave costs a fifth of a step.
+_ORDINARY_STEPS = 20_000
+# After so many, a small part of a second, their pace tells whether the rest is out of reach; the
+# motion may become slower by so much.
+_FIRST_STEPS = 100
+_PACE_SLACK = 3.0
 _HALF_ULP = 2.0**-53
 
 Row = list[Decimal]
@@ -70,6 +77,7 @@ def reference(
     velocity: bool = False,
     precise: bool = False,
     most_steps: int = MOST_STEPS,
+    effort: float | None = None,
 ) -> Reference:
     """Return the true solution of `scene` at `times`.
 
@@ -86,6 +94,9 @@ def reference(
         allows it, and not only to more digits than binary64 has.
     most_steps : int
         Of a series; each takes about a third of a millisecond, some more with waves.
+    effort : float, optional
+        In place of `most_steps`: a factor on some ten seconds of work, beyond which the pace of
+        the first steps ends the rest.
 
     Returns
     -------
@@ -111,8 +122,8 @@ def reference(
             estimate = min(Decimal(1), largest).scaleb(3 - DIGITS)
             return _rounded(times, known, None, "known solution", estimate)
         coarse, fine = _PRECISE if precise else _QUICK
-        first = _series(scene, exact, False, *coarse, most_steps)
-        second = _series(scene, exact, velocity, *fine, most_steps)
+        first = _series(scene, exact, False, *coarse, _Limit(scene, most_steps, effort))
+        second = _series(scene, exact, velocity, *fine, _Limit(scene, most_steps, effort))
         rows = min(len(first), len(second))
         omega = [row[:3] for row in second[:rows]]
         estimate = _largest_difference(first[:rows], omega)
@@ -199,31 +210,63 @@ def _series(
     velocity: bool,
     order: int,
     tolerance: Decimal,
-    most_steps: int,
+    limit: "_Limit",
 ) -> list[Row]:
     """Return omega (and velocity) at `times` by Taylor steps; fewer rows where it blows up."""
     equations = _Equations(scene, velocity)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     begin = Decimal(0)
     rows: list[Row] = []
-    for step in range(most_steps):
+    step = 0
+    while True:
         coefficients = equations.expand(begin, state, order)
         rest = abs(times[-1] - begin)
         length = _step(coefficients, tolerance, rest).copy_sign(times[-1])
         if begin + length == begin and rest:
             return rows
-        if step == 0 and rest > 10 * most_steps * abs(length):
-            break
+        limit.check(step, begin, length, rest)
         while len(rows) < len(times) and abs(times[len(rows)]) <= abs(begin + length):
             rows.append(_evaluate(coefficients, times[len(rows)] - begin))
         if len(rows) == len(times):
             return rows
         state = _evaluate(coefficients, length)
         begin += length
-    raise InputError(
-        f"reference: more than {most_steps} Taylor steps would be needed; "
-        "take a shorter time, slower motion or slower torques"
-    )
+        step += 1
+
+
+class _Limit:
+    """How many steps a series may take, and the forecast of how many it needs."""
+
+    def __init__(self, scene: Scene, most_steps: int, effort: float | None) -> None:
+        self._effort = effort
+        self._ordinary = _ORDINARY_STEPS * 5.0 / (5 + waves(scene))
+        self._most = most_steps if effort is None else self._ordinary * effort
+        self._next = max(2.0, _FIRST_STEPS * 5.0 / (5 + waves(scene)))
+
+    def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
+        """Raise InputError before a step, where it or the rest of them would be too many."""
+        if step == 0:
+            # From the first step alone, but for what is hopeless, no one can tell.
+            if rest > 10 * Decimal(self._most) * abs(length):
+                self._refuse(rest / abs(length))
+        elif step >= self._most:
+            self._refuse(step + rest / min(abs(length), abs(begin) / step))
+        elif self._effort is not None and step >= self._next:
+            self._next = 2.0 * step
+            needed = step * (1 + rest / abs(begin))
+            # Steps that shrink end at an omega without bound; their mean says nothing.
+            if needed > _PACE_SLACK * self._most and 10 * abs(length) * step > abs(begin):
+                self._refuse(needed)
+
+    def _refuse(self, needed: Decimal) -> None:
+        steps = float(min(Decimal("1e300"), needed))
+        instead = "take a shorter time, slower motion or slower torques"
+        if self._effort is not None:
+            instead = advice(instead, self._effort, steps / self._ordinary)
+        raise InputError(
+            f"reference: more than {self._most:.0f} Taylor steps would be needed, some "
+            f"{steps:.2g}; {instead}"
+        )
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal) -> Decimal:

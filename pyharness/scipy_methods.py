@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.effort import Solver, advice, waves
 from pyharness.errors import InputError, TimedError
 from pyharness.linearised import growth, propagators
 from pyharness.scene import Scene
@@ -86,13 +87,15 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
     return _Run(scene, time, name).ahead().finest(name)
 
 
-def scipy_method(name: str) -> Callable[[Scene, Sequence[float], float], Trajectory]:
+def scipy_method(name: str) -> Solver:
     """Return the solver by a method of `solve_ivp`, with the scene's own right-hand side."""
 
-    def solve(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
         if times[-1] == 0.0:
             return rows_trajectory(times, np.array([scene.omega]), 0, 0, "complete")
-        run = _Run(scene, times[-1], name)
+        run = _Run(scene, times[-1], name, effort)
         try:
             ahead = run.ahead()
             finest = ahead.finest(name)
@@ -128,6 +131,7 @@ class _Run:
     scene: Scene
     end: float
     name: str
+    effort: float = 1.0
     evaluations: int = 0
     unit: float = field(init=False)
     rate: float = field(init=False)
@@ -138,8 +142,7 @@ class _Run:
         self.unit = _unit(self.end)
         self.rate = max(map(abs, self.scene.euler_coefficients))
         self.slopes = _in_units(self.scene.right_hand_side(), self.unit)
-        waves = len(self.scene.torque.sines) + len(self.scene.torque.cosines)
-        self.most = _MOST_EVALUATIONS * 8 // (8 + waves)
+        self.most = int(self.effort * _MOST_EVALUATIONS * 8 / (8 + waves(self.scene)))
         if self.name == "Radau":
             self.most //= _RADAU_SHARE
 
@@ -188,8 +191,12 @@ class _Run:
         self.evaluations += 1
         if self.evaluations > self.most:
             raise TimedError(
-                f"{self.name} gave up at t = {{time}} s after {self.most} right-hand sides; take a "
-                "shorter time or a larger tolerance",
+                f"{self.name} gave up at t = {{time}} s after {self.most} right-hand sides; "
+                + advice(
+                    "take a shorter time or a larger tolerance",
+                    self.effort,
+                    self.effort * self.end / (time * self.unit) if time else None,
+                ),
                 time * self.unit,
             )
         return self.slopes(time, omega)

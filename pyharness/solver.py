@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from pyharness.effort import checked_effort
 from pyharness.errors import InputError, unknown
 from pyharness.kernels import ENDS, extension, normalized
 from pyharness.plan import EITHER, Plan, plan
@@ -27,8 +28,8 @@ else:
     except ImportError:  # not built, as `extension` says when a solver is made
         BoundKernel = object
 
-# The first of the waves in the packed array: see fortran/modern/prepared.f90.
-_WAVES_AT = 14
+# Places in the packed array: see fortran/modern/prepared.f90.
+_EFFORT_AT, _WAVES_AT = 14, 15
 _CODES = {
     "closed-form": 1,
     "sphere": 2,
@@ -74,21 +75,27 @@ class Solver(BoundKernel):
     plan: Plan
     _scene: Scene
     _tolerance: float
+    _effort: float
     _asked: str
 
-    def __new__(cls, scene: Scene, chosen: Plan, tolerance: float, asked: str) -> Self:
+    def __new__(
+        cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0
+    ) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
         kernel = extension().solve_packed
-        solver = super().__new__(cls, kernel, _pack(scene, _code(chosen, asked), tolerance), _check)
+        packed = _pack(scene, _code(chosen, asked), tolerance, effort)
+        solver = super().__new__(cls, kernel, packed, _check)
         solver.plan = chosen
         solver._scene = scene
         solver._tolerance = tolerance
+        solver._effort = effort
         solver._asked = asked
         return solver
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Let a copy, in this process or another, be prepared as this one was."""
-        return type(self), (self._scene, self.plan, self._tolerance, self._asked)
+        given = (self._scene, self.plan, self._tolerance, self._asked, self._effort)
+        return type(self), given
 
     def __repr__(self) -> str:
         """Say the scene and the method."""
@@ -132,10 +139,12 @@ class Solver(BoundKernel):
 
         scene = replace(self._scene, omega=_three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
-        return solve_by_name(scene, times, method, self._tolerance)
+        return solve_by_name(scene, times, method, self._tolerance, self._effort)
 
 
-def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Solver:
+def prepare(
+    scene: Scene, method: str = "auto", tolerance: float = 1e-12, effort: float = 1.0
+) -> Solver:
     """Prepare a solver.
 
     Parameters
@@ -148,6 +157,8 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
         Largest error at the end over the largest angular velocity on the way; the methods with
         a fixed step do not look at it. Where small differences grow by a factor K on the way, no
         method keeps less than some 1e-15 K.
+    effort : float
+        Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
 
     Returns
     -------
@@ -157,7 +168,8 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene, or a tolerance out of range.
+        For an unknown method, one that can't take the scene, or a tolerance or an effort out of
+        range.
     NotBuiltError
         Where the extension is not built.
 
@@ -171,11 +183,16 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
     """
     if method not in PREPARED:
         raise unknown("method", method, PREPARED)
-    return Solver(scene, plan(scene, method, tolerance), tolerance, method)
+    effort = checked_effort(effort)
+    return Solver(scene, plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def solve(
-    scene: Scene, times: Sequence[float], method: str = "auto", tolerance: float = 1e-12
+    scene: Scene,
+    times: Sequence[float],
+    method: str = "auto",
+    tolerance: float = 1e-12,
+    effort: float = 1.0,
 ) -> Trajectory:
     """Solve a scene.
 
@@ -189,6 +206,8 @@ def solve(
         A name in `pyharness.methods.METHODS`.
     tolerance : float
         Largest error at `times`, relative to the largest angular velocity.
+    effort : float
+        Factor on the work after which the method gives up: 1 is some ten seconds.
 
     Returns
     -------
@@ -198,8 +217,8 @@ def solve(
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene, times out of order, or a tolerance
-        that the method can't meet.
+        For an unknown method, one that can't take the scene, times out of order, a tolerance
+        that the method can't meet, or one that takes more work than `effort` allows.
 
     Examples
     --------
@@ -210,7 +229,7 @@ def solve(
     """
     from pyharness.methods import solve as solve_by_name
 
-    return solve_by_name(scene, times, method, tolerance)
+    return solve_by_name(scene, times, method, tolerance, effort)
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
@@ -289,7 +308,7 @@ def _code(chosen: Plan, asked: str) -> int:
     return _CODES[chosen.method]
 
 
-def _pack(scene: Scene, code: int, tolerance: float) -> Array:
+def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
     # A wave without amplitude has no effect, and would cost its sine and cosine.
     sines, cosines = (waves[:, waves[:3].any(axis=0)] for waves in (sines, cosines))
@@ -298,6 +317,7 @@ def _pack(scene: Scene, code: int, tolerance: float) -> Array:
     packed[0] = code
     packed[1:5] = tolerance, scene.step_size, sines.shape[1], cosines.shape[1]
     packed[5:14] = np.concatenate([coefficients, constant, rate])
+    packed[_EFFORT_AT] = effort
     packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
     packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
     return packed

@@ -243,8 +243,8 @@ def test_a_method_with_a_fault_is_caught(monkeypatch: pytest.MonkeyPatch) -> Non
     """A trajectory shifted in time conserves energy and momentum, and is wrong."""
     honest = METHODS["taylor"]
 
-    def late(scene: Scene, times: list[float], tolerance: float) -> object:
-        return honest.solve(scene, [time * (1.0 + 1e-12) for time in times], tolerance)
+    def late(scene: Scene, times: list[float], *rest: float) -> object:
+        return honest.solve(scene, [time * (1.0 + 1e-12) for time in times], *rest)
 
     monkeypatch.setitem(METHODS, "taylor", replace(honest, solve=late))  # type: ignore[arg-type]
     only = [f"external/detest-b5/20/{method}" for method in ("taylor", "gauss-8", "reference")]
@@ -255,8 +255,8 @@ def test_a_method_with_a_fault_is_caught(monkeypatch: pytest.MonkeyPatch) -> Non
 def _spoiled(change: Callable[[np.ndarray], None]) -> Callable[..., object]:
     honest = METHODS["taylor"].solve
 
-    def solve(scene: Scene, times: list[float], tolerance: float) -> object:
-        found = honest(scene, times, tolerance)
+    def solve(scene: Scene, times: list[float], *rest: float) -> object:
+        found = honest(scene, times, *rest)
         change(found.omega)
         return found
 
@@ -308,10 +308,10 @@ def _impatient(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a method give up where it is asked for more than 100 s."""
     honest = METHODS[name]
 
-    def solve(scene: Scene, times: list[float], tolerance: float) -> object:
+    def solve(scene: Scene, times: list[float], *rest: float) -> object:
         if times[-1] > 100.0:
             raise InputError(f"gave up at t = {times[-1]:g} s")
-        return honest.solve(scene, times, tolerance)
+        return honest.solve(scene, times, *rest)
 
     monkeypatch.setitem(METHODS, name, replace(honest, solve=solve))  # type: ignore[arg-type]
 

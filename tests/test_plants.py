@@ -21,6 +21,8 @@ FORTRAN = Path(__file__).parent.parent / "fortran"
 SOURCES = (
     "kinds",
     "statuses",
+    "interruption",
+    "../tests/never_interrupted",
     "original/listing",
     "original/linear_solver",
     "original/deck",

@@ -335,7 +335,9 @@ def test_picture_shows_what_its_numbers_say(
 
 
 def test_method_that_refuses_what_it_has_to_take_fails() -> None:
-    def refuse(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+    def refuse(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
         raise InputError("no")
 
     only = ["torque/taylor/huge-1e+06", "shapes/taylor/case-6", "invariance/taylor/signs-12/free"]

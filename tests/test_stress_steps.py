@@ -347,9 +347,10 @@ class _Coarse(methods.Program):
         lipschitz: float = 500.0,
         may_stop: bool = True,
         velocity: bool = True,
+        effort: float = 1.0,
     ) -> Trajectory:
         """Run, then spoil the last digits."""
-        run = super().run(scene, listing, implementation, lipschitz, may_stop, velocity)
+        run = super().run(scene, listing, implementation, lipschitz, may_stop, velocity, effort)
         return replace(run, omega=np.round(run.omega, 9))
 
 

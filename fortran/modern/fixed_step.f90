@@ -1,8 +1,10 @@
 module fixed_step
   !! The methods of III.2 in steps of one size: improved Euler (eq. 29), three terms of the
   !! Taylor series (eq. 30), classical Runge-Kutta (eq. 31).
+  use, intrinsic :: iso_fortran_env, only: int64
+  use interruption, only: interrupt_raised
   use kinds, only: dp
-  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use torque_law, only: torque_at, torque_rate_at
   implicit none(type, external)
   private
@@ -10,17 +12,19 @@ module fixed_step
   integer, parameter, public :: IMPROVED_EULER = 1
   integer, parameter, public :: TAYLOR_3 = 2
   integer, parameter, public :: RUNGE_KUTTA_4 = 3
-  ! Four right-hand sides a step are counted; and some ten seconds are as long as anyone waits.
+  ! Without waves; some ten seconds, as long as anyone waits who was not asked.
   real(dp), parameter :: MOST_STEPS = 4e8_dp
+  real(dp), parameter :: COUNTABLE = 1e18_dp  ! steps
+  real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e6_dp ! at the user; without waves
   real(dp), parameter :: EXCESS = 1e-6_dp     ! of a step, rather than one step more
 
   public :: fixed_step_rows
 
 contains
 
-  pure subroutine fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                                  cosines, omega0, n_times, times, method, step, rows, n_rows, &
-                                  status, steps, evaluations)
+  subroutine fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                             cosines, omega0, n_times, times, method, step, effort, rows, n_rows, &
+                             status, steps, evaluations, needed)
     !! Angular velocity at each of `times`, which lead away from 0: as many whole steps as fit
     !! between two of them, then a shorter one (or the last one longer by up to EXCESS).
     real(dp), intent(in) :: coefficients(3)        !! A, B, C
@@ -35,39 +39,70 @@ contains
     real(dp), intent(in) :: times(n_times)         !! s
     integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RUNGE_KUTTA_4
     real(dp), intent(in) :: step                   !! s, above 0
+    real(dp), intent(in) :: effort                 !! factor on the steps allowed
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
     integer, intent(out) :: n_rows                 !! rows that hold a result
-    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW or GAVE_UP
-    integer, intent(out) :: steps                  !! taken
-    integer, intent(out) :: evaluations            !! right-hand sides
+    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
+    integer(int64), intent(out) :: steps           !! taken
+    integer(int64), intent(out) :: evaluations     !! right-hand sides
+    real(dp), intent(out) :: needed                !! effort that the times ask for
     real(dp) :: y(3)
     real(dp) :: begin
     real(dp) :: h
     real(dp) :: n_steps
-    real(dp) :: most_steps_here
+    real(dp) :: total          ! steps to all times
+    real(dp) :: cost           ! of a step, in steps without waves
+    integer(int64) :: stride   ! steps between looks at the user
+    integer(int64) :: unseen   ! steps since the last look
+    integer(int64) :: done     ! of those to this time
+    integer(int64) :: piece
     integer :: i
 
     n_rows = 0
     status = GAVE_UP
     ! A torque that varies costs as much as the step, a wave twice that.
-    most_steps_here = MOST_STEPS/(1.0_dp + 2.0_dp*real(n_sines + n_cosines, dp) &
-                                  + merge(1.0_dp, 0.0_dp, any(abs(m_rate) > 0.0_dp)))
+    cost = 1.0_dp + 2.0_dp*(real(n_sines, dp) + real(n_cosines, dp)) &
+           + merge(1.0_dp, 0.0_dp, any(abs(m_rate) > 0.0_dp))
     steps = 0
     evaluations = 0
+    total = 0.0_dp
+    begin = 0.0_dp
+    do i = 1, n_times
+      total = total + steps_to(times(i) - begin, step)
+      begin = times(i)
+    end do
+    needed = total*cost/MOST_STEPS
+    if (.not. total <= min(COUNTABLE, effort*(MOST_STEPS/cost))) return
+    stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
+    unseen = 0
     y = omega0
     begin = 0.0_dp
     do i = 1, n_times
       h = sign(step, times(i) - begin)
-      n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
-      if (.not. steps + n_steps <= most_steps_here) return
-      steps = steps + int(n_steps)
+      n_steps = steps_to(times(i) - begin, step)
+      steps = steps + int(n_steps, int64)
       evaluations = per_step(method)*steps
-      call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                   method, begin, h, int(n_steps) - 1, y)
+      done = 0
+      do
+        if (unseen >= stride) then
+          unseen = 0
+          if (interrupt_raised() /= 0) then
+            status = INTERRUPTED
+            return
+          end if
+        end if
+        piece = min(int(n_steps, int64) - 1 - done, stride)
+        if (piece == 0) exit
+        call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+                     method, begin, h, done, done + piece, y)
+        done = done + piece
+        unseen = unseen + piece
+      end do
       begin = begin + h*(n_steps - 1.0_dp)
       call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                   method, begin, times(i) - begin, 1, y)
+                   method, begin, times(i) - begin, 0_int64, 1_int64, y)
       begin = times(i)
+      unseen = unseen + 1
       if (.not. all(abs(y) <= huge(step))) then
         status = OVERFLOW
         return
@@ -78,6 +113,14 @@ contains
     status = COMPLETE
   end subroutine fixed_step_rows
 
+  pure real(dp) function steps_to(time, step)
+    !! Steps in a time.
+    real(dp), intent(in) :: time                   !! s
+    real(dp), intent(in) :: step                   !! s
+
+    steps_to = max(1.0_dp, aint(abs(time)/step + (1.0_dp - EXCESS)))
+  end function steps_to
+
   pure integer function per_step(method)
     !! Right-hand sides in a step; the derivative of one counts as another.
     integer, intent(in) :: method
@@ -86,8 +129,8 @@ contains
   end function per_step
 
   pure subroutine advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                          method, begin, h, n_steps, y)
-    !! A number of equal steps.
+                          method, begin, h, first, last, y)
+    !! The steps after `first`, to `last`, of a number of equal ones.
     real(dp), intent(in) :: coefficients(3)
     real(dp), intent(in) :: m_constant(3)
     real(dp), intent(in) :: m_rate(3)
@@ -98,7 +141,8 @@ contains
     integer, intent(in) :: method
     real(dp), intent(in) :: begin                  !! s
     real(dp), intent(in) :: h                      !! s
-    integer, intent(in) :: n_steps
+    integer(int64), intent(in) :: first
+    integer(int64), intent(in) :: last
     real(dp), intent(inout) :: y(3)                !! rad/s
     real(dp) :: m(3)
     real(dp) :: m_middle(3)
@@ -106,11 +150,11 @@ contains
     real(dp) :: m_slope(3)
     real(dp) :: t
     logical :: varies
-    integer :: n
+    integer(int64) :: n
 
     varies = n_sines + n_cosines > 0 .or. any(abs(m_rate) > 0.0_dp)
     if (method == RUNGE_KUTTA_4 .and. .not. varies) then
-      call runge_kutta_constant(coefficients, m_constant, h, n_steps, y)
+      call runge_kutta_constant(coefficients, m_constant, h, last - first, y)
       return
     end if
     m = m_constant
@@ -118,10 +162,11 @@ contains
     m_end = m_constant
     m_slope = 0.0_dp
     if (varies) then
-      call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, begin, 0.0_dp, &
-                     m_end)
+      t = begin
+      if (first > 0) t = (begin + real(first - 1, dp)*h) + h
+      call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t, 0.0_dp, m_end)
     end if
-    do n = 1, n_steps
+    do n = first + 1, last
       if (varies) then
         t = begin + real(n - 1, dp)*h
         m = m_end
@@ -215,7 +260,7 @@ contains
     real(dp), intent(in) :: coefficients(3)
     real(dp), intent(in) :: m_constant(3)
     real(dp), intent(in) :: h
-    integer, intent(in) :: n_steps
+    integer(int64), intent(in) :: n_steps
     real(dp), intent(inout) :: y(3)
     real(dp), parameter :: third = 1.0_dp/3.0_dp
     real(dp) :: a1
@@ -245,7 +290,7 @@ contains
     real(dp) :: m1      ! half a step of the torque
     real(dp) :: m2
     real(dp) :: m3
-    integer :: n
+    integer(int64) :: n
 
     a1 = 0.5_dp*h*coefficients(1)
     a2 = 0.5_dp*h*coefficients(2)

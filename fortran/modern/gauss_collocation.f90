@@ -2,17 +2,21 @@ module gauss_collocation
   !! Gauss collocation of 1 to 8 stages, order twice that, in equal steps between the times.
   !! Iterated until rounding stops it, sums carried along, weights in two words, after Hairer,
   !! McLachlan and Razakarivony 2008: then energy and momentum wander like rounding, no faster.
+  use, intrinsic :: iso_fortran_env, only: int64
+  use interruption, only: interrupt_raised
   use kinds, only: dp
   use gauss_tables, only: MOST_STAGES, NODES, WEIGHTS, WEIGHTS_LOW, MATRIX, &
                           MATRIX_LOW, ONWARD
   use torque_law, only: torque_at
-  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use two_words, only: two_product, two_sum
   implicit none(type, external)
   private
 
   integer, parameter :: MOST_ITERATIONS = 60
-  integer, parameter :: MOST_EVALUATIONS = 400000000 ! some ten seconds
+  real(dp), parameter :: MOST_EVALUATIONS = 4e8_dp ! some ten seconds
+  real(dp), parameter :: COUNTABLE = 4e18_dp
+  real(dp), parameter :: BETWEEN_LOOKS = 5e5_dp ! at the user; right-hand sides, some 8 a step
   real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling
   real(dp), parameter :: EXCESS = 1e-6_dp       ! of a step, rather than one step more
 
@@ -20,9 +24,9 @@ module gauss_collocation
 
 contains
 
-  pure subroutine gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                             cosines, omega0, n_times, times, stages, step, rows, reached, &
-                             n_rows, status, evaluations)
+  subroutine gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
+                        cosines, omega0, n_times, times, stages, step, effort, rows, reached, &
+                        n_rows, status, evaluations)
     !! Angular velocity at each of `times`, which lead away from 0.
     real(dp), intent(in) :: coefficients(3)        !! A, B, C
     real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
@@ -36,11 +40,12 @@ contains
     real(dp), intent(in) :: times(n_times)         !! s
     integer, intent(in) :: stages                  !! 1 to 8
     real(dp), intent(in) :: step                   !! at the most, s, above 0
+    real(dp), intent(in) :: effort                 !! factor on the right-hand sides allowed
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
     real(dp), intent(out) :: reached(4)            !! time and omega after the last good step
     integer, intent(out) :: n_rows                 !! rows that hold a result
-    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW or GAVE_UP
-    integer, intent(out) :: evaluations            !! right-hand sides
+    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
+    integer(int64), intent(out) :: evaluations     !! right-hand sides
     real(dp) :: y(3)
     real(dp) :: carry(3)             ! what rounding took off y
     real(dp) :: m(MOST_STAGES, 3)    ! torque at the nodes
@@ -54,8 +59,13 @@ contains
     real(dp) :: done
     real(dp) :: walked               ! since `begin`, s
     real(dp) :: walked_low
-    real(dp) :: time                 ! of a node, s
+    real(dp) :: time                 ! of the step's beginning, s
     real(dp) :: time_low
+    real(dp) :: node                 ! of a node, s
+    real(dp) :: node_low
+    integer(int64) :: most           ! right-hand sides
+    real(dp) :: stride               ! steps between looks at the user
+    real(dp) :: next_look            ! steps of the way to this time
     logical :: varies
     integer :: i
     integer :: k
@@ -63,6 +73,9 @@ contains
     n_rows = 0
     status = COMPLETE
     evaluations = 0
+    most = int(min(COUNTABLE, effort*MOST_EVALUATIONS), int64)
+    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + real(n_sines, dp) + real(n_cosines, dp)))
+    next_look = stride
     y = omega0
     carry = 0.0_dp
     f = 0.0_dp
@@ -75,8 +88,8 @@ contains
     do i = 1, n_times
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
       ! Two iterations a step at the least; a wave costs as much as one.
-      cost = n_steps*real(stages, dp)*real(2 + n_sines + n_cosines, dp)
-      if (.not. cost <= real(MOST_EVALUATIONS - evaluations, dp)) then
+      cost = n_steps*real(stages, dp)*(2.0_dp + real(n_sines, dp) + real(n_cosines, dp))
+      if (.not. cost <= real(most - evaluations, dp)) then
         status = GAVE_UP
         return
       end if
@@ -91,34 +104,44 @@ contains
           do k = 1, stages
             call two_product(done, h, walked, walked_low)
             call two_sum(begin, walked, time, time_low)
-            call two_sum(time, NODES(k, stages)*h, time, walked)
-            call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, time, &
-                           time_low + (walked_low + walked + done*h_low), at_node)
+            time_low = time_low + (walked_low + done*h_low)
+            call two_sum(time, NODES(k, stages)*h, node, node_low)
+            call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, node, &
+                           node_low + time_low, at_node)
             m(k, :) = at_node
           end do
         end if
-        call advance(coefficients, m, h, stages, y, carry, f, status, evaluations)
+        call advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
         if (status /= COMPLETE) return
         done = done + 1.0_dp
         reached = [begin + done*h, y]
+        if (done >= next_look) then
+          next_look = done + stride
+          if (interrupt_raised() /= 0) then
+            status = INTERRUPTED
+            return
+          end if
+        end if
       end do
+      next_look = next_look - n_steps
       begin = times(i)
       rows(:, i) = y
       n_rows = i
     end do
   end subroutine gauss_rows
 
-  pure subroutine advance(coefficients, m, h, stages, y, carry, f, status, evaluations)
+  pure subroutine advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
     !! One step.
     real(dp), intent(in) :: coefficients(3)
     real(dp), intent(in) :: m(MOST_STAGES, 3)
     real(dp), intent(in) :: h
     integer, intent(in) :: stages
+    integer(int64), intent(in) :: most            !! right-hand sides
     real(dp), intent(inout) :: y(3)
     real(dp), intent(inout) :: carry(3)
     real(dp), intent(inout) :: f(MOST_STAGES, 3)  !! rates of the last step, 0 if there is none
     integer, intent(out) :: status
-    integer, intent(inout) :: evaluations
+    integer(int64), intent(inout) :: evaluations
     real(dp) :: z(MOST_STAGES, 3)       ! states at the nodes less y
     real(dp) :: zero(MOST_STAGES, 3)
     real(dp) :: z_before(MOST_STAGES, 3)
@@ -171,7 +194,7 @@ contains
       change_before = change
     end do
     evaluations = evaluations + stages*min(iteration, MOST_ITERATIONS)
-    if (evaluations > MOST_EVALUATIONS - MOST_STAGES*MOST_ITERATIONS) status = GAVE_UP
+    if (evaluations > most) status = GAVE_UP
 
     do axis = 1, 3
       increment = 0.0_dp

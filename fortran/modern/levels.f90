@@ -1,6 +1,6 @@
 module levels
   !! The doors of levels.c: the kernels of the instruction set that was chosen.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   implicit none(type, external)
   private
 
@@ -15,10 +15,10 @@ module levels
     end function choose_level
 
     subroutine taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                            cosines, omega, tolerance, n_times, times, rows, n_rows, status, &
-                            steps) bind(c, name="taylor_solve")
+                            cosines, omega, tolerance, effort, n_times, times, rows, n_rows, &
+                            status, steps, needed) bind(c, name="taylor_solve")
       !! As in taylor.f90.
-      import :: c_double, c_int
+      import :: c_double, c_int, c_int64_t
       implicit none(type, external)
       real(c_double), intent(in) :: coefficients(3)
       real(c_double), intent(in) :: m_constant(3)
@@ -29,16 +29,18 @@ module levels
       real(c_double), intent(in) :: cosines(4, n_cosines)
       real(c_double), intent(in) :: omega(3)
       real(c_double), intent(in) :: tolerance
+      real(c_double), intent(in) :: effort
       integer(c_int), intent(in), value :: n_times
       real(c_double), intent(in) :: times(n_times)
       real(c_double), intent(inout) :: rows(3, n_times)
       integer(c_int), intent(out) :: n_rows
       integer(c_int), intent(out) :: status
-      integer(c_int), intent(out) :: steps
+      integer(c_int64_t), intent(out) :: steps
+      real(c_double), intent(out) :: needed
     end subroutine taylor_solve
 
     subroutine quick_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                           omega, tolerance, t_end, contest, result, status, steps) &
+                           omega, tolerance, effort, t_end, contest, result, status, steps) &
       bind(c, name="quick_solve")
       !! As in scaled_runge_kutta.f90.
       import :: c_double, c_int
@@ -52,6 +54,7 @@ module levels
       real(c_double), intent(in) :: cosines(4, n_cosines)
       real(c_double), intent(in) :: omega(3)
       real(c_double), intent(in) :: tolerance
+      real(c_double), intent(in) :: effort
       real(c_double), intent(in) :: t_end
       integer(c_int), intent(in), value :: contest
       real(c_double), intent(out) :: result(3)

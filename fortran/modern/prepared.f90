@@ -7,7 +7,7 @@ module prepared
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
   use sphere, only: sphere_rows
-  use statuses, only: COMPLETE, OVERFLOW, REFUSED
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED
   use torque_free, only: torque_free_end
   implicit none(type, external)
   private
@@ -21,7 +21,8 @@ module prepared
   integer, parameter :: COEFFICIENTS = 6 ! three
   integer, parameter :: M_CONSTANT = 9   ! three, 1/s2
   integer, parameter :: M_RATE = 12      ! three, 1/s3
-  integer, parameter :: WAVES = 15       ! four for each sine, then for each cosine
+  integer, parameter :: EFFORT = 15      ! factor on the limits
+  integer, parameter :: WAVES = 16       ! four for each sine, then for each cosine
 
   ! Values of METHOD; 10 + s is Gauss collocation of s stages.
   integer, parameter :: TORQUE_FREE = 1
@@ -54,7 +55,7 @@ contains
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! of the module statuses
-    integer, intent(out) :: steps      !! or right-hand sides, of Gauss collocation
+    integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
     real(dp) :: largest
 
     largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
@@ -76,7 +77,7 @@ contains
     real(dp), intent(in) :: largest    !! of omega0, rad/s
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! of the module statuses
-    integer, intent(out) :: steps      !! or right-hand sides, of Gauss collocation
+    integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
     real(dp) :: copy(n_packed)
     real(dp) :: start(3)
     real(dp) :: reach      ! omega0 and what the torque gives, rad/s
@@ -136,7 +137,7 @@ contains
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: ended      !! of the module statuses
-    integer, intent(out) :: count      !! or right-hand sides, of Gauss collocation
+    integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
     real(dp) :: times(1)
     real(dp) :: rows(3, 1)
     real(dp) :: reached(4)
@@ -145,7 +146,9 @@ contains
     integer :: cosines
     integer :: cosines_at
     integer :: n_rows
-    integer :: evaluations
+    integer :: quick_steps
+    integer(int64) :: evaluations
+    real(dp) :: needed
 
     sines = int(packed(N_SINES))
     cosines = int(packed(N_COSINES))
@@ -158,12 +161,13 @@ contains
       if (ended == REFUSED .and. int(packed(METHOD)) == FREE_OR_SERIES) then
         call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                           packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
-                          1, times, rows, n_rows, ended, count)
+                          packed(EFFORT), 1, times, rows, n_rows, ended, count, needed)
         omega = rows(:, 1)
       end if
     case (SPHERE)
       call sphere_rows(packed(M_CONSTANT), packed(M_RATE), sines, packed(WAVES), cosines, &
-                       packed(cosines_at), omega0, 1, times, rows, n_rows, ended)
+                       packed(cosines_at), omega0, packed(EFFORT), 1, times, rows, n_rows, ended, &
+                       needed)
       omega = rows(:, 1)
     case (SERIES, QUICK, QUICK_OR_SERIES)
       ended = REFUSED
@@ -172,25 +176,27 @@ contains
         tolerance_left = AUTO_SHARE*tolerance_left
         call quick_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
-                         t_end, int(packed(METHOD)) - QUICK, omega, ended, count)
+                         packed(EFFORT), t_end, int(packed(METHOD)) - QUICK, omega, ended, &
+                         quick_steps)
+        count = quick_steps
       end if
-      if (ended /= COMPLETE .and. int(packed(METHOD)) /= QUICK) then
+      if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. int(packed(METHOD)) /= QUICK) then
         call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                           packed(WAVES), cosines, packed(cosines_at), omega0, tolerance_left, &
-                          1, times, rows, n_rows, ended, count)
+                          packed(EFFORT), 1, times, rows, n_rows, ended, count, needed)
         omega = rows(:, 1)
       end if
     case (EULER_STEPS:RUNGE_KUTTA_STEPS)
       call fixed_step_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                            packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
-                           fixed_method(int(packed(METHOD))), packed(STEP), rows, n_rows, ended, &
-                           count, evaluations)
+                           fixed_method(int(packed(METHOD))), packed(STEP), packed(EFFORT), rows, &
+                           n_rows, ended, count, evaluations, needed)
       omega = rows(:, 1)
     case default
       call gauss_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
                       packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
-                      int(packed(METHOD)) - GAUSS, packed(STEP), rows, reached, n_rows, ended, &
-                      count)
+                      int(packed(METHOD)) - GAUSS, packed(STEP), packed(EFFORT), rows, reached, &
+                      n_rows, ended, count)
       omega = rows(:, 1)
     end select
     ! A start that is not finite may come back as it is, at time 0 for one.

@@ -3,10 +3,11 @@ module scaled_runge_kutta
   !! multiply-add, waves of the torque integrated exactly, equal steps of three lengths at once.
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
+  use interruption, only: interrupt_raised
   use kinds, only: dp
   use scaled_motion, only: average, integral, MOST_WAVES, motion_t, reach_of, scaled, &
                            steps_for_waves, turned, versine
-  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
   implicit none(type, external)
   private
 
@@ -14,6 +15,8 @@ module scaled_runge_kutta
   real(dp), parameter :: THIRD_PART = 1.0_dp/3.0_dp
   real(dp), parameter :: LEAST_STEPS = 2.0_dp
   real(dp), parameter :: MOST_STEPS = 2e6_dp
+  real(dp), parameter :: COUNTABLE = 2e9_dp  ! steps
+  integer, parameter :: BETWEEN_LOOKS = 2**17 - 1 ! at the user: turns of the marches' loops
   ! Beyond so many times the steps planned, the motion makes more of rounding than is allowed.
   real(dp), parameter :: MOST_TIMES = 12.0_dp
   ! Error after time T: about FIRST_GUESS (rate h)**4 rate T; from the cases.
@@ -40,7 +43,7 @@ module scaled_runge_kutta
 contains
 
   subroutine quick_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         omega, tolerance, t_end, contest, result, status, steps) &
+                         omega, tolerance, effort, t_end, contest, result, status, steps) &
     bind(c, name="quick_solve_level")
     !! Angular velocity at `t_end`.
     real(c_double), intent(in) :: coefficients(3)       !! A, B, C
@@ -52,10 +55,11 @@ contains
     real(c_double), intent(in) :: cosines(4, n_cosines) !! the same
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! relative
+    real(c_double), intent(in) :: effort                !! factor on the steps allowed
     real(c_double), intent(in) :: t_end                 !! s
     integer(c_int), intent(in), value :: contest        !! not 0: REFUSED where a series is faster
     real(c_double), intent(out) :: result(3)            !! rad/s
-    integer(c_int), intent(out) :: status               !! COMPLETE, OVERFLOW, REFUSED, GAVE_UP
+    integer(c_int), intent(out) :: status               !! any but STOPPED
     integer(c_int), intent(out) :: steps                !! of the last try
     type(motion_t) :: motion
     logical :: varies
@@ -70,6 +74,7 @@ contains
     real(dp) :: power_5      ! mean of the fifth power of the turn, whose rate grows with the torque
     real(dp) :: n_steps
     real(dp) :: most         ! steps
+    real(dp) :: allowed      ! the same, whatever was planned
     real(dp) :: aim          ! error, relative
     real(dp) :: faint        ! what averaging may cost, rad/s
     real(dp) :: left_out     ! what it costs, in the unknowns
@@ -78,6 +83,7 @@ contains
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: cost         ! in steps under constant torque
     real(dp) :: bits         ! of the tolerance
+    logical :: ended         ! by the user
     integer :: n
 
     aim = SHARE*tolerance
@@ -123,16 +129,22 @@ contains
         return
       end if
     end if
-    most = min(MOST_STEPS, MOST_TIMES*n_steps)
+    allowed = min(COUNTABLE, MOST_STEPS*effort)
+    most = min(allowed, MOST_TIMES*n_steps)
     status = GAVE_UP
     do
       if (.not. n_steps <= most) return
       n = int(0.25_dp*(n_steps + 3.0_dp))
       steps = 4*n
       if (varies) then
-        call march_varying(motion, start, (GAIN*left_out)*ASIDE, t_end, n, x, gaps, top)
+        call march_varying(motion, start, (GAIN*left_out)*ASIDE, t_end, n, x, gaps, top, &
+                           ended)
       else
-        call march_constant(motion, start, (0.25_dp*t_end)/n, n, x, gaps, top)
+        call march_constant(motion, start, (0.25_dp*t_end)/n, n, x, gaps, top, ended)
+      end if
+      if (ended) then
+        status = INTERRUPTED
+        return
       end if
       ! Not by the error: a maximum passes over what is no number.
       if (.not. sum(abs(gaps)) <= huge(error)) then
@@ -152,7 +164,7 @@ contains
         faint = faint*min(0.1_dp, 0.1_dp*aim/error)
         call average(motion, rate, t_end, faint, left_out)
         n_steps = max(n_steps, steps_for_waves(motion, t_end, aim))
-        most = min(MOST_STEPS, max(most, MOST_TIMES*steps_for_waves(motion, t_end, aim)))
+        most = min(allowed, max(most, MOST_TIMES*steps_for_waves(motion, t_end, aim)))
       end if
     end do
     x = x + gaps(:, 1)
@@ -161,7 +173,7 @@ contains
     status = COMPLETE
   end subroutine quick_solve
 
-  pure subroutine march_constant(motion, start, h, fours, x, gaps, top)
+  subroutine march_constant(motion, start, h, fours, x, gaps, top, ended)
     !! Fours of equal steps under constant torque; and beside them, in the time that the processor
     !! waits for them, steps of twice and of four times the length.
     type(motion_t), intent(in) :: motion
@@ -171,6 +183,7 @@ contains
     real(dp), intent(out) :: x(3)
     real(dp), intent(out) :: gaps(3, 2) !! from where steps of twice the length lead, and theirs
     real(dp), intent(out) :: top(3)     !! largest size of the unknowns
+    logical, intent(out) :: ended       !! by the user
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
     real(dp) :: y(3, 2)                 ! by the longer steps
     real(dp) :: whole, half, third, sixth          ! of a step
@@ -202,6 +215,7 @@ contains
     y(:, 1) = start
     y(:, 2) = start
     top = abs(start)
+    ended = .false.
     do i = 1, 2*fours
       do k = 1, 1 + mod(i, 2)
         a1 = m1 + y(2, k)*y(3, k)
@@ -258,13 +272,17 @@ contains
       top(1) = max(top(1), abs(x1))
       top(2) = max(top(2), abs(x2))
       top(3) = max(top(3), abs(x3))
+      if (iand(i, BETWEEN_LOOKS) == 0) then
+        ended = interrupt_raised() /= 0
+        if (ended) exit
+      end if
     end do
     x = [x1, x2, x3]
     gaps(:, 1) = x - y(:, 1)
     gaps(:, 2) = y(:, 1) - y(:, 2)
   end subroutine march_constant
 
-  pure subroutine march_varying(motion, start, aside, t_end, fours, x, gaps, top)
+  subroutine march_varying(motion, start, aside, t_end, fours, x, gaps, top, ended)
     !! The same under a torque of time: its integral is exact, and what remains is smooth.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: start(3)
@@ -274,6 +292,7 @@ contains
     real(dp), intent(out) :: x(3)        !! without the integral of the torque
     real(dp), intent(out) :: gaps(3, 2)
     real(dp), intent(out) :: top(3)      !! with the integral
+    logical, intent(out) :: ended        !! by the user
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
     real(dp) :: y(3, 2)                  ! by the longer steps
     real(dp) :: whole, half, third, sixth          ! of a step
@@ -325,6 +344,7 @@ contains
     y(:, 2) = x - GAIN*aside
     top = abs(start)
     s(:, 8) = motion%mean
+    ended = .false.
     do i = 1, 2*fours
       if (mod(i, 2) == 1) then
         afresh = mod(i, 2*EXACT_AGAIN) == 1
@@ -401,6 +421,10 @@ contains
       top(1) = max(top(1), abs(x1 + s(1, end_)))
       top(2) = max(top(2), abs(x2 + s(2, end_)))
       top(3) = max(top(3), abs(x3 + s(3, end_)))
+      if (iand(i, BETWEEN_LOOKS) == 0) then
+        ended = interrupt_raised() /= 0
+        if (ended) exit
+      end if
     end do
     x = [x1, x2, x3]
     gaps(:, 1) = x - y(:, 1)

@@ -13,13 +13,13 @@
 
 /* solve_packed of api.f90. */
 typedef void kernel(const double *packed, const int *n_packed, const double *omega0,
-                    const double *t_end, double *omega, int *status, int *steps);
+                    const double *t_end, double *omega, int *status, int64_t *steps);
 
 /* How a thread's last call ended. A thread's number is never given again, as its address is. */
 typedef struct {
   uint64_t thread;
   int status;
-  int steps;
+  int64_t steps;
 } ending;
 
 typedef struct {
@@ -93,7 +93,8 @@ static PyObject *get_ending(PyObject *object, void *Py_UNUSED(closure))
 {
   const ending *own =
     find_ending((bound_kernel *)object, PyThreadState_GetID(PyThreadState_Get()));
-  return own ? Py_BuildValue("(ii)", own->status, own->steps) : Py_BuildValue("(ii)", 0, 0);
+  return own ? Py_BuildValue("(iL)", own->status, (long long)own->steps)
+             : Py_BuildValue("(ii)", 0, 0);
 }
 
 /* ---- Arguments ---------------------------------------------------------------------------- */
@@ -254,6 +255,7 @@ static int call_object(bound_kernel *self, const double start[3], double time, d
                        ending *found)
 {
   int is_right = 0;
+  long long steps = 0;
   PyObject *result = NULL, *values;
   PyArrayObject *array = NULL;
   PyObject *omega0 = PyArray_SimpleNew(1, three, NPY_DOUBLE);
@@ -263,7 +265,8 @@ static int call_object(bound_kernel *self, const double start[3], double time, d
   if (result != NULL && !PyTuple_Check(result)) {
     PyErr_SetString(PyExc_TypeError, "the kernel returned no tuple");
   } else if (result != NULL &&
-             PyArg_ParseTuple(result, "Oii", &values, &found->status, &found->steps)) {
+             PyArg_ParseTuple(result, "OiL", &values, &found->status, &steps)) {
+    found->steps = steps;
     array = (PyArrayObject *)PyArray_FROM_OTF(values, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
   }
   if (array != NULL) {

@@ -1,17 +1,21 @@
 module sphere
   !! Closed form of the sphere under the torque law of a scene: the integral of the torque.
+  use interruption, only: interrupt_raised
   use kinds, only: dp
-  use statuses, only: COMPLETE, OVERFLOW
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use two_words, only: sine_cosine, two_product, two_sum
   implicit none(type, external)
   private
+
+  real(dp), parameter :: MOST_TERMS = 2e8_dp ! at all times together, some ten seconds
+  integer, parameter :: BETWEEN_LOOKS = 300000 ! at the user; terms
 
   public :: sphere_rows
 
 contains
 
-  pure subroutine sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
-                              n_times, times, rows, n_rows, status)
+  subroutine sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, effort, &
+                         n_times, times, rows, n_rows, status, needed)
     !! Angular velocity of a sphere, or of any body with A = B = C = 0: omega0 and the integral
     !! of the torque over the moment.
     real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
@@ -21,23 +25,38 @@ contains
     integer, intent(in) :: n_cosines
     real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
+    real(dp), intent(in) :: effort                 !! factor on the terms allowed
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)         !! s, in any order
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
     integer, intent(out) :: n_rows                 !! rows that hold a result
-    integer, intent(out) :: status                 !! COMPLETE or OVERFLOW
+    integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
+    real(dp), intent(out) :: needed                !! effort that the times ask for
     real(dp) :: total(3)
     real(dp) :: rest(3)    ! what rounding took off the total
     real(dp) :: t
     real(dp) :: sine       ! of half the angle
     real(dp) :: cosine
     real(dp) :: quotient   ! sine over half the angle
+    real(dp) :: unseen     ! terms since the last look
     integer :: i
     integer :: k
 
     n_rows = 0
+    status = GAVE_UP
+    needed = n_times*(1.0_dp + real(n_sines, dp) + real(n_cosines, dp))/MOST_TERMS
+    if (needed > effort) return
     status = COMPLETE
+    unseen = 0.0_dp
     do i = 1, n_times
+      unseen = unseen + (1.0_dp + real(n_sines, dp) + real(n_cosines, dp))
+      if (unseen > BETWEEN_LOOKS) then
+        unseen = 0.0_dp
+        if (interrupt_raised() /= 0) then
+          status = INTERRUPTED
+          return
+        end if
+      end if
       t = times(i)
       total = omega0
       rest = 0.0_dp

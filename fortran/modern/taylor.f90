@@ -1,19 +1,27 @@
 module taylor
   !! Taylor series by recurrence, order and step adapted; unroll.py writes out the marked loops.
   !! Terms are held with the power of the step in them, so a step ends with a plain sum.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use, intrinsic :: iso_fortran_env, only: int64
   use euler_equations, only: INVERSE, MOST_ORDER, torque_t, torque_terms
+  use interruption, only: interrupt_raised
   use kinds, only: dp
-  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_plan, only: plan
   implicit none(type, external)
   private
 
-  integer, parameter :: MOST_STEPS = 10000000
+  ! Without waves; some ten seconds. A wave costs A_WAVE of a step without any.
+  real(dp), parameter :: MOST_STEPS = 1e7_dp
+  real(dp), parameter :: A_WAVE = 0.5_dp
+  real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e5_dp ! at the user
+  integer, parameter :: ROWS_BETWEEN_LOOKS = 2**19
+  integer, parameter :: MANY_WAVES = 1000 ! so that a step is worth a look
+  real(dp), parameter :: FARTHEST_COUNT = 4e18_dp
   integer, parameter :: MOST_TRIES = 60
-  real(dp), parameter :: HOPELESS = 10.0_dp*MOST_STEPS ! steps of the first one's length
+  real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
   real(dp), parameter :: PLANNED = 3.0_dp ! growth of a difference that the share allows for
+  real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
   real(dp), parameter :: SAFETY = 10.0_dp  ! one difference may miss where others grow
   real(dp), parameter :: ROUNDING = 2e-16_dp ! relative
   real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
@@ -39,7 +47,8 @@ module taylor
 contains
 
   subroutine taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                          omega, tolerance, n_times, times, rows, n_rows, status, steps) &
+                          omega, tolerance, effort, n_times, times, rows, n_rows, status, &
+                          steps, needed) &
     bind(c, name="taylor_solve_level")
     !! Solution at `times`, which lead away from 0 on one side.
     real(c_double), intent(in) :: coefficients(3)       !! A, B, C
@@ -51,19 +60,38 @@ contains
     real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
+    real(c_double), intent(in) :: effort                !! factor on the steps allowed
     integer(c_int), intent(in), value :: n_times
     real(c_double), intent(in) :: times(n_times)        !! s
     real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
     integer(c_int), intent(out) :: n_rows
-    integer(c_int), intent(out) :: status               !! 0 complete, 2 overflow, 4 gave up
-    integer(c_int), intent(out) :: steps
+    integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted
+    integer(c_int64_t), intent(out) :: steps            !! of the last march
+    real(c_double), intent(out) :: needed               !! effort, as far as known; where it gave up
     real(dp) :: growth  ! of a small difference on the way
     real(dp) :: known   ! the same, as far as it was reckoned with
+    real(dp) :: cost    ! of a step, in steps without waves
+    real(dp) :: most    ! steps left
+    real(dp) :: spent   ! steps of the marches before
+    real(dp) :: ahead   ! steps that this march would need
 
     known = PLANNED
+    cost = 1.0_dp + A_WAVE*(real(n_sines, dp) + real(n_cosines, dp))
+    most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
+    spent = 0.0_dp
+    needed = 0.0_dp
     do
       call march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, &
-                 tolerance*(PLANNED/known), n_times, times, rows, n_rows, status, steps, growth)
+                 tolerance*(PLANNED/known), most - spent, &
+                 1 + int(STEPS_BETWEEN_LOOKS/cost, c_int64_t), n_times, times, rows, n_rows, &
+                 status, steps, growth, ahead)
+      if (status == GAVE_UP) then
+        ! Differences that have grown already will ask for another march, in shorter steps.
+        if (growth > known) ahead = ANOTHER*ahead
+        needed = (spent + ahead)*cost/MOST_STEPS
+        steps = steps + int(spent, c_int64_t)
+      end if
+      spent = spent + real(steps, dp)
       if (growth <= known .or. status /= COMPLETE .or. tolerance*(PLANNED/known) < ROUNDING) return
       ! What a step errs grew: once more, with less of it.
       known = SAFETY*growth
@@ -71,7 +99,8 @@ contains
   end subroutine taylor_solve
 
   subroutine march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                   omega, tolerance, n_times, times, rows, n_rows, status, steps, growth)
+                   omega, tolerance, most_steps, stride, n_times, times, rows, n_rows, status, &
+                   steps, growth, ahead)
     !! Once from 0 to the last of the times.
     real(c_double), intent(in) :: coefficients(3)       !! A, B, C
     real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
@@ -82,13 +111,16 @@ contains
     real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
+    real(dp), intent(in) :: most_steps
+    integer(int64), intent(in) :: stride                !! steps between looks at the user
     integer(c_int), intent(in), value :: n_times
     real(c_double), intent(in) :: times(n_times)        !! s
     real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
     integer(c_int), intent(out) :: n_rows
-    integer(c_int), intent(out) :: status               !! 0 complete, 2 overflow, 4 gave up
-    integer(c_int), intent(out) :: steps
+    integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted
+    integer(c_int64_t), intent(out) :: steps
     real(dp), intent(out) :: growth !! of a small difference; looked at where the torque varies
+    real(dp), intent(out) :: ahead  !! steps to the end, as far as known; where it gave up
     type(series_t) :: s
     type(torque_t) :: torque
     real(dp) :: w(3)          ! omega at the step's beginning, rad/s
@@ -116,11 +148,14 @@ contains
     integer :: least          ! order from which the step may do
     integer :: most           ! order allowed
     integer :: tries
+    integer(int64) :: next_look  ! steps
 
     n_rows = 0
     steps = 0
     status = COMPLETE
     growth = 1.0_dp
+    ahead = 0.0_dp
+    next_look = 1
     ! With the signs of omega, so that a change of two signs changes no bit.
     difference = sign(ASIDE, omega)
     w = omega
@@ -196,6 +231,12 @@ contains
             return
           end if
           h = h*0.0625_dp
+          if (n_sines + n_cosines > MANY_WAVES) then
+            if (interrupt_raised() /= 0) then
+              status = INTERRUPTED
+              return
+            end if
+          end if
           cycle
         end if
         next = fitting(h, s, allowed)
@@ -216,6 +257,12 @@ contains
           return
         end if
         n_rows = n_rows + 1
+        if (mod(n_rows, ROWS_BETWEEN_LOOKS) == 0) then
+          if (interrupt_raised() /= 0) then
+            status = INTERRUPTED
+            return
+          end if
+        end if
       end do
       change(1) = ((s%tail(1) + s%left(2, 3)) + s%left(2, 2)) + s%left(2, 1)
       change(2) = ((s%tail(2) + s%left(1, 3)) + s%left(1, 2)) + s%left(1, 1)
@@ -250,9 +297,19 @@ contains
       call add_time(t, t_low, h)
       rest = (times(n_times) - t) - t_low
       h = next
-      if (steps >= MOST_STEPS .or. (steps == 1 .and. abs(rest) > HOPELESS*abs(h))) then
-        status = GAVE_UP
-        return
+      if (steps >= next_look) then
+        if (real(steps, dp) >= most_steps) then
+          ! By the mean step or by the next one, whichever is shorter: motions grow faster.
+          ahead = real(steps, dp) + abs(rest)/max(min(abs(h), abs(t)/real(steps, dp)), tiny(h))
+          status = GAVE_UP
+        else if (steps == 1 .and. abs(rest) > (HOPELESS*most_steps)*abs(h)) then
+          ahead = abs(rest)/max(abs(h), tiny(h))
+          status = GAVE_UP
+        else if (steps > 1) then
+          if (interrupt_raised() /= 0) status = INTERRUPTED
+        end if
+        if (status /= COMPLETE) return
+        next_look = min(steps + stride, max(steps + 1, int(most_steps, int64)))
       end if
     end do
   end subroutine march

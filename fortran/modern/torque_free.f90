@@ -3,8 +3,9 @@ module torque_free
   !! nor error depends on the time.
   !! A symmetric body under constant torque is left to the series: its form needs Fresnel
   !! integrals of arguments that overflow as M3 -> 0, and is slower than a Taylor step.
+  use interruption, only: interrupt_raised
   use kinds, only: dp
-  use statuses, only: COMPLETE, GAVE_UP, OVERFLOW, REFUSED
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
   use two_words, only: scaled, sine_cosine, square_root, two_product, two_sum
   implicit none(type, external)
   private
@@ -12,6 +13,7 @@ module torque_free
   integer, parameter :: STEADY = 0           ! rates do not change: linear in time
   integer, parameter :: SEPARATRIX = 1       ! hyperbolic functions
   integer, parameter :: ELLIPTIC = 2
+  integer, parameter :: BETWEEN_LOOKS = 2**17 ! at the user; times
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
   real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
@@ -42,7 +44,7 @@ module torque_free
 
 contains
 
-  pure subroutine torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
+  subroutine torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
     !! Angular velocity of a torque-free body at each of `times`.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C; not all of one sign, finite
     real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
@@ -50,7 +52,7 @@ contains
     real(dp), intent(in) :: times(n_times)   !! s, in any order, finite
     real(dp), intent(out) :: rows(3, n_times) !! rad/s
     integer, intent(out) :: n_rows           !! rows that hold a result
-    integer, intent(out) :: status           !! COMPLETE, OVERFLOW, REFUSED or GAVE_UP
+    integer, intent(out) :: status           !! any but STOPPED
     type(orbit_t) :: orbit
     integer :: i
 
@@ -61,6 +63,12 @@ contains
       call evaluate(orbit, times(i), rows(:, i), status)
       if (status /= COMPLETE) return
       n_rows = i
+      if (mod(i, BETWEEN_LOOKS) == 0) then
+        if (interrupt_raised() /= 0) then
+          status = INTERRUPTED
+          return
+        end if
+      end if
     end do
   end subroutine torque_free_rows
 

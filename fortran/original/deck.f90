@@ -28,7 +28,10 @@ module deck
     real(dp) :: quotient              !! change of K over change of U, 1/s
   end type stop_t
 
-  public :: euler_coefficients, normalized_torque, accelerations, is_finite
+  ! Looks at the user (Ctrl-C): so many steps apart, where no wave makes them longer.
+  real(dp), parameter :: STEPS_BETWEEN = 5e4_dp
+
+  public :: euler_coefficients, normalized_torque, accelerations, is_finite, steps_between_looks
 
 contains
 
@@ -97,6 +100,13 @@ contains
     ACL2 = scene%forces(2)/scene%masses(2) ! 640
     ACL3 = scene%forces(3)/scene%masses(3) ! 650
   end subroutine accelerations
+
+  pure integer function steps_between_looks(scene)
+    !! Steps that take some hundredths of a second.
+    type(deck_t), intent(in) :: scene
+
+    steps_between_looks = 1 + int(STEPS_BETWEEN/(1.0_dp + size(scene%sines) + size(scene%cosines)))
+  end function steps_between_looks
 
   pure logical function is_finite(x, y, z)
     !! No NaN and no infinity. Not ieee_is_finite: that module ties the binary to libgfortran.

@@ -2,11 +2,13 @@ module four_term_program
   !! Four-term collocation, Jacobs 1982, IV.2 and the second program of the appendix (218 cards).
   !! omega = omega(0) + c1 t + c2 t**2 + c3 t**3 + c4 t**4, residual zero at .2, .4, .6, .8 DT.
   !! Faithful in every operation and its order; the margin names the card.
+  use interruption, only: interrupt_raised
   use kinds, only: dp
-  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite
+  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
+                  steps_between_looks
   use linear_solver, only: leqt1f
   use listing_flags, only: listing_t
-  use statuses, only: COMPLETE, OVERFLOW
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW
   implicit none(type, external)
   private
 
@@ -63,6 +65,7 @@ contains
     integer :: L
     integer :: M         ! right-hand sides of LEQT1F
     integer :: IER
+    integer :: next_look  ! step at which the user is looked at
 
     n_rows = 0
     status = COMPLETE
@@ -84,7 +87,15 @@ contains
     DT = scene%step_size                                                          ! 680
     M = merge(6, 3, scene%with_velocity)                                          ! 1280
 
+    next_look = steps_between_looks(scene)
     do I = 1, scene%n_steps                                                       ! 700
+      if (I >= next_look) then
+        next_look = I + steps_between_looks(scene)
+        if (interrupt_raised() /= 0) then
+          status = INTERRUPTED
+          return
+        end if
+      end if
       begin = real(I - 1, dp)*scene%step_size
       TIME = TIME + DT                                                            ! 710
       T1 = DT*0.2_dp                                                              ! 720

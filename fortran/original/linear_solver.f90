@@ -2,17 +2,19 @@ module linear_solver
   !! Stands for LEQT1F of the IMSL library: A X = B for several right-hand sides.
   !! Crout's order, implicit row scaling, partial pivoting; what is known of it and what
   !! is assumed stands in docs/reconstruction.md.
+  use interruption, only: interrupt_raised
   use kinds, only: dp
   implicit none(type, external)
   private
 
+  integer, parameter :: LARGE = 500 ! order from which a column takes long enough for a look
   integer, parameter, public :: SINGULAR = 129 !! IER: the matrix is algorithmically singular
 
   public :: leqt1f
 
 contains
 
-  pure subroutine leqt1f(a, m, n, b, ier)
+  subroutine leqt1f(a, m, n, b, ier)
     !! Solve A X = B. A is overwritten by its factors. If A is algorithmically singular,
     !! IER is 129 and B stays as it was; otherwise IER is 0 and B holds X.
     integer, intent(in) :: m            !! number of right-hand sides
@@ -26,7 +28,7 @@ contains
     if (ier == 0) call substitute(a, m, n, pivot, b)
   end subroutine leqt1f
 
-  pure subroutine factor(a, n, pivot, ier)
+  subroutine factor(a, n, pivot, ier)
     !! A = L U by Crout's order; the first of equal scaled maxima is the pivot.
     integer, intent(in) :: n
     real(dp), intent(inout) :: a(n, n)
@@ -53,6 +55,9 @@ contains
     end do
 
     do j = 1, n
+      if (n > LARGE) then
+        if (interrupt_raised() /= 0) return
+      end if
       do i = 1, j - 1
         total = a(i, j)
         do k = 1, i - 1

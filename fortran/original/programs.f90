@@ -32,8 +32,8 @@ contains
     case (2)
       call four_term(scene, listing, rows, ier_rows, n_rows, status, evaluations)
     case default
-      ier_rows = 0
       call runge_kutta(scene, listing, rows, n_rows, status, evaluations, stop_at)
+      ier_rows(:n_rows) = 0
     end select
   end subroutine run
 

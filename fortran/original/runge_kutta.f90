@@ -2,10 +2,12 @@ module runge_kutta_program
   !! Runge-Kutta, Jacobs 1982, eq. 31, IV.3 and the program RK of the appendix (151 cards).
   !! The stop test is the thesis's use of the Lipschitz condition, eq. 19.
   !! Faithful in every operation and its order; the margin names the card.
+  use interruption, only: interrupt_raised
   use kinds, only: dp
-  use deck, only: deck_t, stop_t, euler_coefficients, normalized_torque, accelerations, is_finite
+  use deck, only: deck_t, stop_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
+                  steps_between_looks
   use listing_flags, only: listing_t
-  use statuses, only: COMPLETE, OVERFLOW, STOPPED
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, STOPPED
   implicit none(type, external)
   private
 
@@ -57,6 +59,7 @@ contains
     integer :: I
     integer :: J
     integer :: L
+    integer :: next_look  ! step at which the user is looked at
 
     n_rows = 0
     status = COMPLETE
@@ -96,7 +99,15 @@ contains
     VV2 = V2(1)                                                                   ! 700
     VV3 = V3(1)                                                                   ! 710
 
+    next_look = steps_between_looks(scene)
     do L = 1, scene%n_steps                                                       ! 750
+      if (L >= next_look) then
+        next_look = L + steps_between_looks(scene)
+        if (interrupt_raised() /= 0) then
+          status = INTERRUPTED
+          return
+        end if
+      end if
       begin = real(L - 1, dp)*scene%step_size
       TIME = TIME + DT                                                            ! 760
       if (scene%torque_varies) then

@@ -2,11 +2,13 @@ module two_term_program
   !! Two-term collocation, Jacobs 1982, IV.2 and the program FEM1 of the appendix (159 cards).
   !! omega = omega(0) + c1 t + c2 t**2 (eq. 34), residual zero at T1 and T2 (eq. 36).
   !! Faithful in every operation and its order; the margin names the card.
+  use interruption, only: interrupt_raised
   use kinds, only: dp
-  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite
+  use deck, only: deck_t, euler_coefficients, normalized_torque, accelerations, is_finite, &
+                  steps_between_looks
   use linear_solver, only: leqt1f
   use listing_flags, only: listing_t
-  use statuses, only: COMPLETE, OVERFLOW
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW
   implicit none(type, external)
   private
 
@@ -54,6 +56,7 @@ contains
     integer :: I
     integer :: M         ! right-hand sides of LEQT1F
     integer :: IER
+    integer :: next_look  ! step at which the user is looked at
 
     n_rows = 0
     status = COMPLETE
@@ -76,7 +79,15 @@ contains
     DT = scene%step_size                                                          ! 670
     M = merge(6, 3, scene%with_velocity)                                          ! 1010
 
+    next_look = steps_between_looks(scene)
     do I = 1, scene%n_steps                                                       ! 690
+      if (I >= next_look) then
+        next_look = I + steps_between_looks(scene)
+        if (interrupt_raised() /= 0) then
+          status = INTERRUPTED
+          return
+        end if
+      end if
       begin = real(I - 1, dp)*scene%step_size
       TIME = TIME + DT                                                            ! 700
       T1 = DT/3.0_dp                                                              ! 710

@@ -20,6 +20,7 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--ablate", action="store_true", help="every subset of the defects, sorted by effect"
     )
+    shared.add_effort_option(parser)
     shared.add_output_options(parser)
 
 
@@ -49,7 +50,8 @@ def run(options: argparse.Namespace) -> int:
         shared.names(options.reading),
     )
     shared.check_outputs(options)
-    found = compare(scene, listings, lipschitz, not options.no_stop, tolerance)
+    effort = shared.chosen_effort(options)
+    found = compare(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
 
     if form == "json":
         from pyharness.build import build
@@ -81,6 +83,7 @@ def _ablate(options: argparse.Namespace, scene: Scene, form: str) -> int:
         allowed = [known for program in programs for known in names_of("reading", program)]
         if name not in allowed:
             raise unknown("reading", name, allowed, "--reading")
+    effort = shared.chosen_effort(options)
     shared.check_outputs(options)
 
     from pyharness.ablation import lattice
@@ -91,7 +94,7 @@ def _ablate(options: argparse.Namespace, scene: Scene, form: str) -> int:
     found = {}
     for program in programs:
         own = tuple(name for name in readings if name in names_of("reading", program))
-        found[program] = lattice(scene, program, own)
+        found[program] = lattice(scene, program, own, effort)
     if form == "table":
         parts = [lattice_table(scene, program, effects) for program, effects in found.items()]
         text = "\n".join(parts)

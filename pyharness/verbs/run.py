@@ -28,6 +28,7 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--tolerance", metavar="E", help="error at these times over the largest |omega| (methods)"
     )
+    shared.add_effort_option(parser)
     shared.add_output_options(parser, FORMATS)
 
 
@@ -106,7 +107,14 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     lipschitz = shared.positive(options.lipschitz, "--lipschitz", shared.default_lipschitz())
     shared.check_outputs(options)
     program = methods.PROGRAM_REGISTRY[name]
-    trajectory = program.run(scene, listing, implementation, lipschitz, not options.no_stop)
+    trajectory = program.run(
+        scene,
+        listing,
+        implementation,
+        lipschitz,
+        not options.no_stop,
+        effort=shared.chosen_effort(options),
+    )
     title = f"program {name} ({implementation}), {shared.listing_text(listing)}"
     return name, listing, title, trajectory
 
@@ -123,6 +131,6 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     if options.times is not None:
         times = shared.numbers(options.times, "--times")
     shared.check_outputs(options)
-    trajectory = methods.solve(scene, times, name, tolerance)
+    trajectory = methods.solve(scene, times, name, tolerance, shared.chosen_effort(options))
     title = f"method {name}: {methods.METHODS[name].title}, tolerance {tolerance:g}"
     return name, title, trajectory

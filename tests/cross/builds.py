@@ -95,11 +95,14 @@ def _fill_results_with_nan(tree: Path) -> None:
 
     text = (Path(numpy.f2py.get_include()) / "fortranobject.c").read_text()
     zeros = "PyArray_FILLWBYTE(arr, 0);"
+    # Those that begin as they happen to be, too.
+    unless = "if (!(intent & F2PY_INTENT_CACHE)) {"
     meson = (tree / "meson.build").read_text()
     place = "f2py_folder / 'fortranobject.c'"
-    if zeros not in text or place not in meson:
+    if zeros not in text or unless not in text or place not in meson:
         raise RuntimeError("numpy's fortranobject.c or meson.build is not as expected")
-    (tree / "fortranobject.c").write_text(text.replace(zeros, zeros.replace("0)", "0xFF)")))
+    text = text.replace(unless, "if (1) {").replace(zeros, zeros.replace("0)", "0xFF)"))
+    (tree / "fortranobject.c").write_text(text)
     (tree / "meson.build").write_text(meson.replace(place, "'fortranobject.c'"))
 
 

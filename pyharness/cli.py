@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit code.
 
     0 as expected; 1 an unexpected difference; 2 wrong usage or input; 3 the extension is not
-    built.
+    built; 130 interrupted.
     """
     # A command is short: collecting cycles while rooms are imported costs 4 % and frees nothing.
     gc.set_threshold(100_000)
@@ -59,6 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _leave_stdout()
         return _complain(f"standard output: {error.strerror or error}", 2)
     except KeyboardInterrupt:
+        if sys.stderr.isatty():
+            sys.stderr.write("\r\x1b[K")  # how far it was
         return _complain("interrupted", 130)
 
 

@@ -32,6 +32,8 @@ _ORDINARY_STEPS = 20_000
 # motion may become slower by so much.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
+# A power of time with which steps grow, above what they only happen to.
+_GROWING = Decimal("1.3")
 _HALF_ULP = 2.0**-53
 
 Row = list[Decimal]
@@ -241,7 +243,8 @@ class _Limit:
         self._effort = effort
         self._ordinary = _ORDINARY_STEPS * 5.0 / (5 + waves(scene))
         self._most = most_steps if effort is None else self._ordinary * effort
-        self._next = max(2.0, _FIRST_STEPS * 5.0 / (5 + waves(scene)))
+        self._next = max(2, _FIRST_STEPS * 5 // (5 + waves(scene)))
+        self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
         """Raise InputError before a step, where it or the rest of them would be too many."""
@@ -250,13 +253,27 @@ class _Limit:
             if rest > 10 * Decimal(self._most) * abs(length):
                 self._refuse(rest / abs(length))
         elif step >= self._most:
-            self._refuse(step + rest / min(abs(length), abs(begin) / step))
-        elif self._effort is not None and step >= self._next:
-            self._next = 2.0 * step
-            needed = step * (1 + rest / abs(begin))
-            # Steps that shrink end at an omega without bound; their mean says nothing.
-            if needed > _PACE_SLACK * self._most and 10 * abs(length) * step > abs(begin):
-                self._refuse(needed)
+            self._refuse(self._forecast(step, abs(begin), rest))
+        elif self._effort is not None and 2 * step >= self._next:
+            if step >= self._next:
+                needed = self._forecast(step, abs(begin), rest)
+                # Steps that shrink end at an omega without bound; their mean says nothing.
+                shrinks = 10 * abs(length) * step < abs(begin)
+                if needed > Decimal(_PACE_SLACK * self._most) and not shrinks:
+                    self._refuse(needed)
+                self._next = 2 * step
+            if 2 * step - self._next in (0, 1):
+                self._before = step, abs(begin)
+
+    def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
+        """Return the steps to the end: as many a second as so far, or more as the motion grows."""
+        step_before, begin_before = self._before
+        power = Decimal(1)
+        if 0 < step_before < step:
+            growth = (Decimal(step) / step_before).ln() / (begin / begin_before).ln()
+            if growth > _GROWING:
+                power = min(growth, Decimal(3))
+        return step * (1 + rest / begin) ** power
 
     def _refuse(self, needed: Decimal) -> None:
         steps = float(min(Decimal("1e300"), needed))

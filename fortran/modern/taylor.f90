@@ -21,6 +21,7 @@ module taylor
   integer, parameter :: MOST_TRIES = 60
   real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
   real(dp), parameter :: PLANNED = 3.0_dp ! growth of a difference that the share allows for
+  real(dp), parameter :: GROWING = 1.3_dp ! power of time with which steps do, not by chance
   real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
   real(dp), parameter :: SAFETY = 10.0_dp  ! one difference may miss where others grow
   real(dp), parameter :: ROUNDING = 2e-16_dp ! relative
@@ -149,6 +150,8 @@ contains
     integer :: most           ! order allowed
     integer :: tries
     integer(int64) :: next_look  ! steps
+    integer(int64) :: half_way   ! of the steps allowed
+    real(dp) :: t_half           ! the time then, s
 
     n_rows = 0
     steps = 0
@@ -156,6 +159,8 @@ contains
     growth = 1.0_dp
     ahead = 0.0_dp
     next_look = 1
+    half_way = max(1_int64, int(0.5_dp*most_steps, int64))
+    t_half = 0.0_dp
     ! With the signs of omega, so that a change of two signs changes no bit.
     difference = sign(ASIDE, omega)
     w = omega
@@ -299,8 +304,13 @@ contains
       h = next
       if (steps >= next_look) then
         if (real(steps, dp) >= most_steps) then
-          ! By the mean step or by the next one, whichever is shorter: motions grow faster.
-          ahead = real(steps, dp) + abs(rest)/max(min(abs(h), abs(t)/real(steps, dp)), tiny(h))
+          ! As many steps a second as so far, or more as the motion grows faster.
+          ahead = 1.0_dp
+          if (steps > half_way .and. abs(t) > abs(t_half)) then
+            ahead = log(real(steps, dp)/real(half_way, dp))/log(t/t_half)
+          end if
+          ahead = merge(min(3.0_dp, ahead), 1.0_dp, ahead > GROWING)
+          ahead = real(steps, dp)*exp(ahead*log(1.0_dp + abs(rest/t)))
           status = GAVE_UP
         else if (steps == 1 .and. abs(rest) > (HOPELESS*most_steps)*abs(h)) then
           ahead = abs(rest)/max(abs(h), tiny(h))
@@ -310,6 +320,8 @@ contains
         end if
         if (status /= COMPLETE) return
         next_look = min(steps + stride, max(steps + 1, int(most_steps, int64)))
+        if (steps == half_way) t_half = t
+        if (steps < half_way) next_look = min(next_look, half_way)
       end if
     end do
   end subroutine march

@@ -12,9 +12,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pyharness.errors import InputError, unknown
+from pyharness.errors import InputError, kind_of, unknown
 from pyharness.scene import Scene
-from pyharness.scene_file import check_keys, kind_of, number, read_toml, scene_of
+from pyharness.scene_file import check_keys, read_toml, scene_of
+from pyharness.values import number
 
 UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
 

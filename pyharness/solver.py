@@ -4,17 +4,17 @@
 three arguments and enters the kernel. `solve` is the same for one use, with rows at many times.
 """
 
-from collections.abc import Sequence
 from functools import partial
 from typing import Self
 
 import numpy as np
 
-from pyharness.errors import InputError, unknown
+from pyharness.errors import unknown
 from pyharness.kernels import ENDS, extension, normalized
-from pyharness.plan import EITHER, Plan, plan
-from pyharness.scene import Scene
+from pyharness.plan import EITHER, FINEST, Plan, plan
+from pyharness.scene import Scene, checked
 from pyharness.trajectory import Array, Trajectory
+from pyharness.values import Number, Numbers, three, tolerance_of
 
 # Places in the packed array: see fortran/modern/prepared.f90.
 _STATUS_AT, _STEPS_AT, _WAVES_AT = 14, 15, 16
@@ -82,15 +82,15 @@ class Solver(partial[Array]):
         """Steps of the last call (right-hand sides of Gauss collocation), 0 of a closed form."""
         return int(self.args[0][_STEPS_AT])
 
-    def trajectory(self, omega0: Sequence[float], times: Sequence[float]) -> Trajectory:
+    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return rows at `times` from another start.
 
         Parameters
         ----------
         omega0 : sequence of three floats
             rad/s.
-        times : sequence of float, shape (n,)
-            s; strictly monotonic, on one side of 0.
+        times : float or iterable of float, shape (n,)
+            s; strictly monotonic, also on both sides of 0.
 
         Raises
         ------
@@ -101,15 +101,12 @@ class Solver(partial[Array]):
 
         from pyharness.methods import solve as solve_by_name
 
-        if len(omega0) != 3:
-            raise InputError(f"omega0: {len(omega0)} numbers; allowed: three")
-        first, second, third = (float(each) for each in omega0)
-        scene = replace(self._scene, omega=(first, second, third))
+        scene = replace(self._scene, omega=three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
         return solve_by_name(scene, times, method, self._tolerance)
 
 
-def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Solver:
+def prepare(scene: Scene, method: str = "auto", tolerance: Number = 1e-12) -> Solver:
     """Prepare a solver.
 
     Parameters
@@ -143,13 +140,15 @@ def prepare(scene: Scene, method: str = "auto", tolerance: float = 1e-12) -> Sol
     >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
     array([-0.958924,  0.283662, 10.      ])
     """
-    if method not in PREPARED:
+    checked(scene)
+    if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
+    tolerance = tolerance_of(tolerance, FINEST)
     return Solver(scene, plan(scene, method, tolerance), tolerance, method)
 
 
 def solve(
-    scene: Scene, times: Sequence[float], method: str = "auto", tolerance: float = 1e-12
+    scene: Scene, times: Number | Numbers, method: str = "auto", tolerance: Number = 1e-12
 ) -> Trajectory:
     """Solve a scene.
 
@@ -157,8 +156,9 @@ def solve(
     ----------
     scene : Scene
         What to solve.
-    times : sequence of float, shape (n,)
-        Where the result is wanted (s): strictly monotonic, on one side of 0.
+    times : float or iterable of float, shape (n,)
+        Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
+        twice, from 0 backward and from 0 forward.
     method : str
         A name in `pyharness.methods.METHODS`.
     tolerance : float
@@ -167,7 +167,8 @@ def solve(
     Returns
     -------
     Trajectory
-        One row per time, fewer where the solution overflows.
+        One row per time, in the order of `times`; fewer where the solution overflows: those between
+        0 and the overflow, on either side. Steps and evaluations are of both sides together.
 
     Raises
     ------

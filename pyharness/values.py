@@ -1,0 +1,121 @@
+"""What a user gives, in whatever form, as plain Python: checked and converted once."""
+
+import itertools
+import math
+import operator
+from collections.abc import Iterable, Mapping, Set
+from typing import SupportsFloat, SupportsIndex
+
+from pyharness.errors import InputError, kind_of
+
+Triple = tuple[float, float, float]
+# float() makes one of Python's of it, though not of text: int, Fraction, Decimal, NumPy's scalars.
+Number = SupportsFloat | SupportsIndex
+# A list, a tuple, an array, a generator.
+Numbers = Iterable[Number]
+
+_TOO_LARGE = "a number too large for binary64"
+# Of NumPy's kinds of data, those that are real numbers.
+_REAL = "iuf"
+
+
+def number(where: str, value: object) -> float:
+    """Return a real number as a float, which may be infinite or NaN.
+
+    Raises
+    ------
+    InputError
+        Which begins with `where`, for anything else, and for a number too large for binary64.
+    """
+    found = converted(value)
+    if isinstance(found, float):
+        return found
+    if found == _TOO_LARGE:
+        raise InputError(f"{where}: {found}")
+    raise InputError(f"{where}: {found} where a number belongs")
+
+
+def converted(value: object) -> float | str:
+    """Return a real number as a float, or in words what it is instead."""
+    if type(value) is float:
+        return value
+    if is_no_number(value):
+        return kind_of(value)
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return _TOO_LARGE
+    except Exception:  # of a class of the user's: whatever it raises, it is no number
+        return kind_of(value)
+
+
+def is_no_number(value: object) -> bool:
+    """Whether it is none though float() may take it: text, truth, an array, a complex number."""
+    if isinstance(value, (bool, str, bytes, bytearray, memoryview, complex)):
+        return True
+    kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
+    return kind not in _REAL or getattr(value, "shape", ()) != ()
+
+
+def three(where: str, values: object) -> Triple:
+    """Return three finite numbers.
+
+    Raises
+    ------
+    InputError
+        Which begins with `where`, for anything else.
+    """
+    first, second, third = (finite(where, each) for each in three_things(where, values))
+    return first, second, third
+
+
+def three_things(where: str, values: object) -> list[object]:
+    """Return three of whatever they are; InputError, which begins with `where`, for no three."""
+    allowed = "allowed: three numbers"
+    found = list(itertools.islice(several(where, values, allowed), 4))
+    if len(found) != 3:
+        count = "more than 3" if len(found) > 3 else str(len(found))
+        raise InputError(f"{where}: {count} number{'s' * (count != '1')}; {allowed}")
+    return found
+
+
+def finite(where: str, value: object) -> float:
+    """Return a finite number; InputError, which begins with `where`, for anything else."""
+    found = number(where, value)
+    if not math.isfinite(found):
+        raise InputError(f"{where}: {found:g} is not finite; allowed: finite numbers")
+    return found
+
+
+def several(where: str, values: object, allowed: str) -> Iterable[object]:
+    """Return an iterator over what has an order: no text, no set, no mapping.
+
+    Raises
+    ------
+    InputError
+        ``where: what it is; allowed``.
+    """
+    if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
+        try:
+            return iter(values)  # type: ignore[call-overload, no-any-return]
+        except TypeError:
+            pass
+    raise InputError(f"{where}: {kind_of(values)}; {allowed}")
+
+
+def whole(where: str, value: object) -> int:
+    """Return a whole number; InputError, which begins with `where`, for anything else."""
+    if not is_no_number(value):
+        try:
+            return operator.index(value)  # type: ignore[arg-type]
+        except TypeError:
+            pass
+    raise InputError(f"{where} is {kind_of(value)}; it must be a whole number")
+
+
+def tolerance_of(value: object, finest: float) -> float:
+    """Return a tolerance as a float; InputError where it is no number. Its range is not checked."""
+    found = converted(value)
+    if isinstance(found, float):
+        return found
+    raise InputError(f"tolerance is {found}; allowed: a number from {finest:.2g} to 1")

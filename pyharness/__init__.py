@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from pyharness.solver import Solver, prepare, solve
     from pyharness.trajectory import Stop, Trajectory
 
+    __version__: str
+
 __all__ = [
     "InputError",
     "Listing",
@@ -47,3 +49,7 @@ def __getattr__(name: str) -> Any:
 
         return version("pyharness")
     raise AttributeError(f"module 'pyharness' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.errors import InputError, TimedError, kind_of, unknown
+from pyharness.errors import InputError, TimedError, unknown
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scaling import factor_near_one, scaled, unscaled
-from pyharness.scene import Scene, checked, most_steps
+from pyharness.scene import Scene, checked_scene, most_steps
 from pyharness.scipy_methods import rows_trajectory, scipy_method
 from pyharness.trajectory import Trajectory
 from pyharness.values import Number, Numbers, number, several, tolerance_of
@@ -80,17 +80,16 @@ class Program:
         NotBuiltError
             Where the compiled program is asked for and not built.
         """
-        checked(scene)
-        if not isinstance(listing, Listing):
-            raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as of subset")
+        from pyharness import kernels
+
+        lipschitz, may_stop, velocity = kernels.checked_run(
+            scene, listing, lipschitz, may_stop, velocity
+        )
         if listing.program != self.name:
             raise InputError(f"program {self.name}: the listing is that of {listing.program}")
-        if implementation not in IMPLEMENTATIONS:
+        if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
             raise unknown("implementation", implementation, IMPLEMENTATIONS)
-        lipschitz = number("lipschitz", lipschitz)
         if implementation == "fortran":
-            from pyharness import kernels
-
             return kernels.run(scene, listing, lipschitz, may_stop, velocity)
         twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")
         trajectory: Trajectory = twin.run(scene, listing, lipschitz, may_stop)
@@ -108,7 +107,7 @@ class Method:
     finest : float
         The smallest tolerance that it claims to meet.
     solve : callable
-        ``solve(scene, times, tolerance)``; times are checked, on one side of 0, and run away from it.
+        ``solve(scene, times, tolerance)``; times are checked, of one side, and run away from 0.
     """
 
     name: str
@@ -144,7 +143,7 @@ def solve(scene: Scene, times: Number | Numbers, method: str, tolerance: Number)
     InputError
         For an unknown method, times out of order, or a tolerance that the method can't meet.
     """
-    checked(scene)
+    checked_scene(scene)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]

@@ -92,8 +92,8 @@ class Scene:
     """One problem: what moves, under what, from where, in which steps.
 
     Exactly one of `moments` (kg m2) and `coefficients` (A, B, C of equations 13-15) is given. Three
-    numbers may be a list, a tuple or an array; the fields are plain tuples of floats. A name is kept
-    in one line of 60 characters, with what steers a terminal escaped.
+    numbers may be a list, a tuple or an array; the fields are plain tuples of floats. Of a name a
+    line of 60 characters is kept, with what steers a terminal escaped.
 
     Raises
     ------
@@ -227,7 +227,7 @@ def _size(steps: int, limit: int) -> str:
     return f"{steps}{size if steps > limit else ''}"
 
 
-def checked(scene: object) -> Scene:
+def checked_scene(scene: object) -> Scene:
     """Return a scene; InputError where it is none."""
     if isinstance(scene, Scene):
         return scene

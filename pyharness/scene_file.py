@@ -42,7 +42,8 @@ def case_scene(number: SupportsIndex) -> Scene:
                 steps=deck["steps"],
                 case=number,
             )
-    raise unknown("case", str(number), map(str, case_numbers()), "--case")
+    shown = str(number) if abs(number) < 10**18 else "of more than 18 digits"
+    raise unknown("case", shown, map(str, case_numbers()), "--case")
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
@@ -92,7 +93,7 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     body = "moments" if scene.moments is not None else "coefficients"
     law = scene.torque
     lines = [f"# {line}" for line in comments]
-    lines += [f"name = {json.dumps(scene.name)}", "[body]"]
+    lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
     lines += [f"{body} = {list(scene.moments or scene.coefficients or ())}"]
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
     lines += ["[torque]", f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]

@@ -12,7 +12,7 @@ import numpy as np
 from pyharness.errors import unknown
 from pyharness.kernels import ENDS, extension, normalized
 from pyharness.plan import EITHER, FINEST, Plan, plan
-from pyharness.scene import Scene, checked
+from pyharness.scene import Scene, checked_scene
 from pyharness.trajectory import Array, Trajectory
 from pyharness.values import Number, Numbers, three, tolerance_of
 
@@ -140,7 +140,7 @@ def prepare(scene: Scene, method: str = "auto", tolerance: Number = 1e-12) -> So
     >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
     array([-0.958924,  0.283662, 10.      ])
     """
-    checked(scene)
+    checked_scene(scene)
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     tolerance = tolerance_of(tolerance, FINEST)

@@ -113,6 +113,13 @@ def whole(where: str, value: object) -> int:
     raise InputError(f"{where} is {kind_of(value)}; it must be a whole number")
 
 
+def truth(where: str, value: object) -> bool:
+    """Return True or False; InputError, which begins with `where`, for anything else."""
+    if isinstance(value, bool) or kind_of(value) == "true or false":
+        return bool(value)
+    raise InputError(f"{where} is {kind_of(value)}; allowed: True or False")
+
+
 def tolerance_of(value: object, finest: float) -> float:
     """Return a tolerance as a float; InputError where it is no number. Its range is not checked."""
     found = converted(value)

@@ -83,7 +83,7 @@ MISTAKES = [
     ([*RUN, "--method", "dop835"], "did you mean 'dop853'"),
     ([*RUN, "--method", "dop853", "--fix", "stage-base"], "--fix has no meaning with --method"),
     ([*RUN, "--method", "dop853", "--times", "1,1"], "not strictly monotonic"),
-    ([*RUN, "--method", "dop853", "--times", "-1,1"], "both sides"),
+    ([*RUN, "--method", "dop853", "--times", "-1,1,0"], "not strictly monotonic"),
     ([*RUN, "--method", "dop853", "--times", ""], "where a number belongs"),
     ([*RUN, "--method", "dop853", "--tolerance", "0"], "allowed: a number above 0"),
     ([*RUN, "--method", "dop853", "--tolerance", "1e-20"], "allowed for dop853"),

@@ -129,7 +129,9 @@ def test_preparation_checks_once(arguments: dict[str, object], words: str) -> No
             solve(case_scene(5), [1.0], **arguments)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("times", [[], [1.0, 1.0], [-1.0, 1.0], [float("inf")], [2.0, 1.0, 3.0]])
+@pytest.mark.parametrize(
+    "times", [[], [1.0, 1.0], [-1.0, 1.0, 0.0], [float("inf")], [2.0, 1.0, 3.0]]
+)
 def test_times_are_checked(times: list[float]) -> None:
     with pytest.raises(InputError, match="times"):
         solve(case_scene(5), times)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Set
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pyharness.errors import InputError, kind_of, unknown
 from pyharness.facts import facts
@@ -28,6 +28,12 @@ class Listing:
     program: str
     defects: frozenset[str]
     readings: frozenset[str] = frozenset()
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, program: str, defects: Iterable[str], readings: Iterable[str] = ...
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Refuse names that the program does not have."""

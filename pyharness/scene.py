@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, SupportsIndex
 
 from pyharness.errors import InputError, kind_of, printable
 from pyharness.facts import facts
-from pyharness.values import Number, Numbers, finite, number, several, three, three_things, whole
+from pyharness.values import Number, Numbers, finite, number, several, three, three_floats, whole
 from pyharness.values import Triple as Triple
 
 Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
@@ -240,14 +240,13 @@ def _deck(name: str) -> Triple:
 
 
 def _above_zero(where: str, symbol: str, values: object) -> Triple:
-    found = [number(where, each) for each in three_things(where, values)]
+    found = three_floats(where, values)
     for axis, value in enumerate(found, 1):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(
                 f"{where}: {symbol}{axis} is {value:g}; allowed: a finite number above 0"
             )
-    first, second, third = found
-    return first, second, third
+    return found
 
 
 def _waves(where: str, values: object) -> tuple[Wave, ...]:

@@ -17,6 +17,7 @@ Numbers = Iterable[Number]
 _TOO_LARGE = "a number too large for binary64"
 # Of NumPy's kinds of data, those that are real numbers.
 _REAL = "iuf"
+_THREE_FLOATS = [float, float, float]
 
 
 def number(where: str, value: object) -> float:
@@ -65,26 +66,36 @@ def three(where: str, values: object) -> Triple:
     InputError
         Which begins with `where`, for anything else.
     """
-    first, second, third = (finite(where, each) for each in three_things(where, values))
-    return first, second, third
+    found = three_floats(where, values)
+    for each in found:
+        if not math.isfinite(each):
+            raise _not_finite(where, each)
+    return found
 
 
-def three_things(where: str, values: object) -> list[object]:
-    """Return three of whatever they are; InputError, which begins with `where`, for no three."""
+def three_floats(where: str, values: object) -> Triple:
+    """Return three floats, any of them; InputError, which begins with `where`, for no three."""
+    if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
+        return values
     allowed = "allowed: three numbers"
     found = list(itertools.islice(several(where, values, allowed), 4))
     if len(found) != 3:
         count = "more than 3" if len(found) > 3 else str(len(found))
         raise InputError(f"{where}: {count} number{'s' * (count != '1')}; {allowed}")
-    return found
+    first, second, third = (number(where, each) for each in found)
+    return first, second, third
 
 
 def finite(where: str, value: object) -> float:
     """Return a finite number; InputError, which begins with `where`, for anything else."""
     found = number(where, value)
     if not math.isfinite(found):
-        raise InputError(f"{where}: {found:g} is not finite; allowed: finite numbers")
+        raise _not_finite(where, found)
     return found
+
+
+def _not_finite(where: str, value: float) -> InputError:
+    return InputError(f"{where}: {value:g} is not finite; allowed: finite numbers")
 
 
 def several(where: str, values: object, allowed: str) -> Iterable[object]:

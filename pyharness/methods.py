@@ -160,15 +160,11 @@ def solve(scene: Scene, times: Number | Numbers, method: str, tolerance: Number)
     values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]
     rest = values[len(below) :]
-    if below and not any(rest):
-        below, rest = values, []
-    found = None
+    # On either side away from 0.
+    marches = [_march(chosen, scene, each, tolerance) for each in (below[::-1], rest) if each]
     if below:
-        found = _reversed(_march(chosen, scene, below[::-1], tolerance))
-    if rest:
-        forward = _march(chosen, scene, rest, tolerance)
-        found = forward if found is None else _joined(found, forward)
-    assert found is not None
+        marches[0] = _reversed(marches[0])
+    found = marches[0] if len(marches) == 1 else _joined(*marches)
     return _reversed(found) if turned else found
 
 

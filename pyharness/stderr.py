@@ -1,14 +1,11 @@
 """What is said on stderr: for the user's eyes, without a say in how a command ends."""
 
-import os
 import sys
+from contextlib import suppress
 
 
 def say(text: str) -> None:
-    """Write to stderr; where it is full or closed, fall silent for good."""
-    try:
+    """Write to stderr, where that is not full or closed."""
+    with suppress(OSError, ValueError):
         sys.stderr.write(text)
         sys.stderr.flush()
-    except (OSError, ValueError):
-        # Python would try the rest again at its end, and change the exit code.
-        sys.stderr = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)

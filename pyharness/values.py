@@ -51,8 +51,8 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Whether it is none though float() may take it: text, truth, an array, a complex number."""
-    if isinstance(value, (bool, str, bytes, bytearray, memoryview, complex)):
+    """Whether it is none though float() may take it: text, truth, an array, NumPy's complex."""
+    if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
     return kind not in _REAL or getattr(value, "shape", ()) != ()

@@ -175,6 +175,21 @@ def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path)
     assert {(True, False), (True, True)} <= set(outcomes)
 
 
+def test_a_ctrl_c_while_files_are_written_gives_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*given: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return open(*given)
+
+    monkeypatch.setattr(output, "open", interrupted, raising=False)
+    for write, _ in WRITERS.values():
+        folder = _folder(tmp_path)
+        with pytest.raises(KeyboardInterrupt):
+            write(folder)
+        assert _tree(folder) == OLD
+
+
 def _other_file_system(tmp_path: Path) -> Path:
     """Return a folder on another file system than `tmp_path`; skips where there is none."""
     shared = Path("/dev/shm")
@@ -269,7 +284,4 @@ def test_progress_falls_silent_where_the_terminal_goes_away(
     monkeypatch.setattr(sys, "stderr", Gone())
     progress("1 of 2")
     progress("2 of 2")
-    sys.stderr.close()
-    monkeypatch.setattr(sys, "stderr", Gone())
     warn("what no one reads")
-    sys.stderr.close()

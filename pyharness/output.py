@@ -153,7 +153,10 @@ class _File:
         if not self.written or os.path.lexists(self.new):
             return
         if os.path.lexists(self.old):
-            os.replace(self.old, self.target)
+            try:
+                os.replace(self.old, self.target)
+            except OSError:
+                self.old = self.new  # better left behind than lost
         elif not self.existed:
             _remove([self.target])
 

@@ -137,6 +137,15 @@ def test_nothing_is_left_behind_by_a_call_that_fails(
         assert _tree(folder) in ((OLD, after) if writer == "one" else (OLD,))
 
 
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt: a shell's background job ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path) -> None:
     """The signal itself, at each line of the room in turn."""
@@ -175,6 +184,7 @@ def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path)
     assert {(True, False), (True, True)} <= set(outcomes)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_a_ctrl_c_while_files_are_written_gives_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -90,8 +90,8 @@ def checked_run(
     checked_scene(scene)
     checked_listing(listing)
     limit = number("lipschitz", lipschitz)
-    if not limit > 0.0:
-        raise InputError(f"lipschitz is {limit:g}; allowed: a number above 0")
+    if not limit >= 0.0:
+        raise InputError(f"lipschitz is {limit:g}; allowed: a number from 0")
     return limit, truth("may_stop", may_stop), truth("velocity", velocity)
 
 

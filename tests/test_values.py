@@ -292,7 +292,7 @@ def test_other_arguments_of_public_calls_are_checked(tmp_path: Path) -> None:
         _refused("listing is ", program.run, PLAIN, bad)
         _refused("may_stop is ", program.run, PLAIN, listing, "python", 500.0, bad)
         _refused("velocity is ", program.run, PLAIN, listing, "fortran", 500.0, True, bad)
-    for bad in (None, "500", [500.0], 0.0, float("nan"), TOO_LARGE):
+    for bad in (None, "500", [500.0], -1.0, float("nan"), TOO_LARGE):
         _refused("lipschitz", kernels.run, PLAIN, listing, bad)
         _refused("lipschitz", program.run, PLAIN, listing, "python", bad)
     for bad in (None, "dt-accumulates", 3, [3], np.array("x"), {"dt-accumulates": 1}):

@@ -11,6 +11,11 @@ if TYPE_CHECKING:
     from pyharness.solver import Solver, prepare, solve
     from pyharness.trajectory import Stop, Trajectory
 
+    __version__: str
+    # What the build makes.
+    _build: Any
+    _kernels: Any
+
 __all__ = [
     "InputError",
     "Listing",
@@ -38,12 +43,19 @@ _ROOMS = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    for room, names in _ROOMS.items():
-        if name in names:
-            return getattr(import_module(f"pyharness.{room}"), name)
-    if name == "__version__":
-        from importlib.metadata import version
+# For a type checker the imports above say it all: with this, any name would be one.
+if not TYPE_CHECKING:
 
-        return version("pyharness")
-    raise AttributeError(f"module 'pyharness' has no attribute '{name}'")
+    def __getattr__(name: str) -> Any:
+        for room, names in _ROOMS.items():
+            if name in names:
+                return getattr(import_module(f"pyharness.{room}"), name)
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("pyharness")
+        raise AttributeError(f"module 'pyharness' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

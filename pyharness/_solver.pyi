@@ -1,11 +1,8 @@
-from collections.abc import Callable, Iterable
-from typing import Self, SupportsFloat, SupportsIndex
+from collections.abc import Callable
+from typing import Self
 
-from pyharness.scene import Triple
 from pyharness.trajectory import Array
-
-Number = SupportsFloat | SupportsIndex
-Numbers = Iterable[Number]
+from pyharness.values import Number, Numbers, Triple
 
 class BoundKernel:
     def __new__(

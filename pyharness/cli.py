@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from pyharness.errors import InputError, NotBuiltError, unknown
+from pyharness.stderr import say
 
 # Each verb is a module of pyharness.verbs, loaded when it is called for.
 VERBS = {
@@ -95,5 +96,5 @@ def _leave_stdout() -> None:
 def _complain(message: str, code: int) -> int:
     line = " ".join(message.split())
     # A name from the command line may hold bytes that are no text.
-    sys.stderr.write(f"pyharness: {line}\n".encode(errors="backslashreplace").decode())
+    say(f"pyharness: {line}\n".encode(errors="backslashreplace").decode())
     return code

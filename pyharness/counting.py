@@ -48,16 +48,19 @@ def _operations(listing: Listing, steps: int) -> int:
     def three(x: float, y: float, z: float) -> tuple[Counted, Counted, Counted]:
         return Counted(x), Counted(y), Counted(z)
 
-    scene = Scene(
-        "counting",
-        three(0.1, 1.0, 1.0),
-        moments=three(40.0, 30.0, 20.0),
-        torque=TorqueLaw(three(100.0, 200.0, 150.0)),
-        step_size=Counted(0.01),
-        steps=steps,
-        masses=three(100.0, 110.0, 120.0),
-        forces=three(10.0, 20.0, 40.0),
-    )
+    counted = {
+        "omega": three(0.1, 1.0, 1.0),
+        "moments": three(40.0, 30.0, 20.0),
+        "step_size": Counted(0.01),
+        "masses": three(100.0, 110.0, 120.0),
+        "forces": three(10.0, 20.0, 40.0),
+    }
+    torque = TorqueLaw(three(100.0, 200.0, 150.0))
+    scene = Scene("counting", **counted, torque=torque, steps=steps)  # type: ignore[arg-type]
+    # A scene keeps plain floats, which do not count.
+    object.__setattr__(torque, "constant", three(*torque.constant))
+    for name, value in counted.items():
+        object.__setattr__(scene, name, value)
     twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
     Counted.operations = 0
     twin.run(scene, listing, may_stop=False)

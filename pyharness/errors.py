@@ -51,15 +51,36 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def unknown(what: str, name: str, allowed: Iterable[str], where: str = "") -> InputError:
+def kind_of(value: object) -> str:
+    """Name the kind of a value for a message, the same for one of TOML and its like in Python."""
+    kinds = {
+        "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
+        "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
+        "a table": (dict,), "nothing": (type(None),),
+    }  # fmt: skip
+    for name, types in kinds.items():
+        if isinstance(value, types):
+            return name
+    # NumPy, without its import: an array is a list, of which each entry has a kind.
+    dtype_kind = getattr(getattr(value, "dtype", None), "kind", None)
+    if isinstance(dtype_kind, str):
+        if getattr(value, "shape", ()) != ():
+            return "a list"
+        scalars = {"b": bool, "i": int, "u": int, "f": float, "c": complex, "U": str, "S": str}
+        if dtype_kind in scalars:
+            return kind_of(scalars[dtype_kind]())
+    return f"a {type(value).__name__}"
+
+
+def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
     """Return the error for a name that is not among those allowed, with the nearest one.
 
     Parameters
     ----------
     what : str
         What the name should name, for instance ``"case"``.
-    name : str
-        What was given.
+    name : object
+        What was given, which may be no name at all.
     allowed : iterable of str
         What would have been right.
     where : str
@@ -68,8 +89,10 @@ def unknown(what: str, name: str, allowed: Iterable[str], where: str = "") -> In
     import difflib
 
     names = [str(each) for each in allowed]
-    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
-    hint = f"did you mean '{near[0]}'? " if near else ""
     place = f"{where}: " if where else ""
+    if not isinstance(name, str):
+        return InputError(f"{place}{what} is {kind_of(name)}; allowed: {', '.join(names)}")
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'? " if near else ""
     shown = name if len(name) <= 60 else name[:57] + "..."
     return InputError(f"{place}unknown {what} '{shown}'; {hint}allowed: {', '.join(names)}")

@@ -12,9 +12,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pyharness.errors import InputError, unknown
+from pyharness.errors import InputError, kind_of, printable, unknown
 from pyharness.scene import Scene
-from pyharness.scene_file import check_keys, kind_of, number, read_toml, scene_of
+from pyharness.scene_file import check_keys, read_toml, scene_of
+from pyharness.values import number
 
 UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
 
@@ -163,7 +164,7 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
         text = data.get(key)
         if not isinstance(text, str) or not text.strip():
             raise InputError(f"{key} is missing; give it as text")
-        texts[key] = " ".join(text.split())
+        texts[key] = printable(" ".join(text.split()))
     unit = data.get("unit", "rad/s")
     if not isinstance(unit, str) or unit not in UNITS:
         raise unknown("unit", str(unit), UNITS)

@@ -8,9 +8,10 @@ import numpy as np
 
 from pyharness.effort import advice
 from pyharness.errors import InputError, NotBuiltError, TimedError
-from pyharness.listing import PROGRAMS, Listing
-from pyharness.scene import Scene, Wave
+from pyharness.listing import PROGRAMS, Listing, checked_listing
+from pyharness.scene import Scene, Wave, checked_scene
 from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
+from pyharness.values import number, truth
 
 # The status codes of fortran/statuses.f90, and what a user reads.
 COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP, INTERRUPTED = range(6)
@@ -60,9 +61,12 @@ def run(
 
     Raises
     ------
+    InputError
+        For what is no scene, no listing, or no limit.
     NotBuiltError
         Where the extension is not built.
     """
+    lipschitz, may_stop, velocity = checked_run(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
         *program_arguments(scene, listing, lipschitz, may_stop, velocity)
     )
@@ -78,6 +82,18 @@ def run(
         stop=Stop(n_rows, STOP_VARIABLES[variable - 1], quotient) if variable else None,
         ier=None if listing.program == "runge-kutta" else ier[:n_rows],
     )
+
+
+def checked_run(
+    scene: object, listing: object, lipschitz: object, may_stop: object, velocity: object
+) -> tuple[float, bool, bool]:
+    """Return the last three of what `run` takes; InputError where one of the five is no such."""
+    checked_scene(scene)
+    checked_listing(listing)
+    limit = number("lipschitz", lipschitz)
+    if not limit >= 0.0:
+        raise InputError(f"lipschitz is {limit:g}; allowed: a number from 0")
+    return limit, truth("may_stop", may_stop), truth("velocity", velocity)
 
 
 def program_arguments(

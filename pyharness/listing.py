@@ -1,11 +1,12 @@
 """Listings: which defects of a program are active, and which readings are selected."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pyharness.errors import InputError, unknown
+from pyharness.errors import InputError, kind_of, unknown
 from pyharness.facts import facts
+from pyharness.values import several
 
 PROGRAMS = ("two-term", "four-term", "runge-kutta")
 
@@ -28,11 +29,18 @@ class Listing:
     defects: frozenset[str]
     readings: frozenset[str] = frozenset()
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, program: str, defects: Iterable[str], readings: Iterable[str] = ...
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         """Refuse names that the program does not have."""
-        if self.program not in PROGRAMS:
-            raise unknown("program", self.program, PROGRAMS)
-        for kind, names in (("defect", self.defects), ("reading", self.readings)):
+        _check_program(self.program)
+        for kind, field in (("defect", "defects"), ("reading", "readings")):
+            names = _names(field, getattr(self, field))
+            object.__setattr__(self, field, names)
             for name in sorted(names):
                 if name not in names_of(kind, self.program):
                     raise _foreign(kind, name, self.program)
@@ -102,7 +110,8 @@ def subset(
     InputError
         For a name in both `fix` and `keep`, or one that the program does not have.
     """
-    mended, kept, chosen = set(fix), set(keep), set(readings)
+    _check_program(program)
+    mended, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
     for name in sorted(mended & kept):
         raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
     for option, kind, names in (
@@ -114,10 +123,31 @@ def subset(
             raise _foreign(kind, name, program, option)
     if base is None:
         base = "corrected" if kept and not mended else "original"
-    if base not in ("original", "corrected"):
+    if not isinstance(base, str) or base not in ("original", "corrected"):
         raise unknown("listing", base, ("original", "corrected"), "--listing")
     defects = set(names_of("defect", program)) if base == "original" else set()
     return Listing(program, frozenset((defects - mended) | kept), frozenset(chosen))
+
+
+def checked_listing(listing: object) -> Listing:
+    """Return a listing; InputError where it is none."""
+    if isinstance(listing, Listing):
+        return listing
+    raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")
+
+
+def _check_program(program: object) -> None:
+    if not isinstance(program, str) or program not in PROGRAMS:
+        raise unknown("program", program, PROGRAMS)
+
+
+def _names(where: str, names: object) -> frozenset[str]:
+    allowed = "allowed: a list of names"
+    found = list(names if isinstance(names, Set) else several(where, names, allowed))
+    for name in found:
+        if not isinstance(name, str):
+            raise InputError(f"{where}: {kind_of(name)} where a name belongs")
+    return frozenset(found)
 
 
 def _foreign(kind: str, name: str, program: str, where: str = "") -> InputError:

@@ -3,16 +3,19 @@
 import importlib
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pyharness.effort import Solver, check_steps, checked_effort
 from pyharness.errors import InputError, TimedError, unknown
 from pyharness.listing import PROGRAMS, Listing
 from pyharness.scaling import factor_near_one, scaled, unscaled
-from pyharness.scene import Scene
+from pyharness.scene import Scene, checked_scene, most_steps
 from pyharness.scipy_methods import FINEST, finest_tolerance, rows_trajectory, scipy_method
 from pyharness.trajectory import Trajectory
+from pyharness.values import Number, Numbers, number, several, tolerance_of
 
 IMPLEMENTATIONS = ("fortran", "python")
 
@@ -74,14 +77,22 @@ class Program:
         Raises
         ------
         InputError
-            For more steps than that.
+            For what is no scene, a listing of another program, an unknown implementation, or more
+            steps than `effort` allows.
         NotBuiltError
             Where the compiled program is asked for and not built.
         """
+        from pyharness import kernels
+
+        lipschitz, may_stop, velocity = kernels.checked_run(
+            scene, listing, lipschitz, may_stop, velocity
+        )
+        if listing.program != self.name:
+            raise InputError(f"program {self.name}: the listing is that of {listing.program}")
+        if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
+            raise unknown("implementation", implementation, IMPLEMENTATIONS)
         check_steps(scene, self.name, implementation, checked_effort(effort))
         if implementation == "fortran":
-            from pyharness import kernels
-
             return kernels.run(scene, listing, lipschitz, may_stop, velocity)
         twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")
         trajectory: Trajectory = twin.run(scene, listing, lipschitz, may_stop)
@@ -99,7 +110,8 @@ class Method:
     finest : float
         The smallest tolerance that it claims to meet.
     solve : callable
-        ``solve(scene, times, tolerance, effort)``; times are checked, and run away from 0.
+        ``solve(scene, times, tolerance, effort)``; times are checked, of one side, and run away
+        from 0.
     """
 
     name: str
@@ -110,7 +122,11 @@ class Method:
 
 
 def solve(
-    scene: Scene, times: Sequence[float], method: str, tolerance: float, effort: float = 1.0
+    scene: Scene,
+    times: Number | Numbers,
+    method: str,
+    tolerance: Number,
+    effort: float = 1.0,
 ) -> Trajectory:
     """Solve a scene by a method of the registry.
 
@@ -118,8 +134,9 @@ def solve(
     ----------
     scene : Scene
         What to integrate; its step size plays a part only for the fixed-step methods.
-    times : sequence of float, shape (n,)
-        Where the result is wanted (s): strictly monotonic, on one side of 0.
+    times : float or iterable of float, shape (n,)
+        Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
+        twice, from 0 backward and from 0 forward.
     method : str
         A name in `METHODS`.
     tolerance : float
@@ -130,7 +147,8 @@ def solve(
     Returns
     -------
     Trajectory
-        One row per time, fewer where the solution overflows.
+        One row per time, in the order of `times`, fewer where the solution overflows: then those
+        between 0 and the overflow, on either side. Steps and evaluations are of both sides.
 
     Raises
     ------
@@ -138,9 +156,11 @@ def solve(
         For an unknown method, times out of order, a tolerance that the method can't meet, or one
         that takes more work than `effort` allows.
     """
-    if method not in METHODS:
+    checked_scene(scene)
+    if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
+    tolerance = tolerance_of(tolerance, chosen.finest)
     if chosen.finest == 1.0 and tolerance != 1.0:
         raise InputError(
             f"tolerance is {tolerance:g}; {method} takes none: it goes in the scene's steps, "
@@ -151,28 +171,17 @@ def solve(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
     effort = checked_effort(effort)
-    ordered, turned = _outward(times)
-    factor = 1.0 if method in _ANY_SCALE else factor_near_one(scene, ordered[-1])
-    if factor == 1.0:
-        trajectory = chosen.solve(scene, ordered, tolerance, effort)
-    else:
-        faster = [t / factor for t in ordered]
-        try:
-            found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
-        except TimedError as refusal:
-            raise refusal.slower(factor) from None
-        trajectory = unscaled(found, ordered, factor)
-    if not turned:
-        return trajectory
-    return Trajectory(
-        time=trajectory.time[::-1],
-        recorded_time=trajectory.recorded_time[::-1],
-        omega=trajectory.omega[::-1],
-        velocity=None,
-        steps=trajectory.steps,
-        evaluations=trajectory.evaluations,
-        ended=trajectory.ended,
-    )
+    values, turned = _ascending(times)
+    below = [t for t in values if t < 0.0]
+    rest = values[len(below) :]
+    # On either side away from 0.
+    marches = [
+        _march(chosen, scene, each, tolerance, effort) for each in (below[::-1], rest) if each
+    ]
+    if below:
+        marches[0] = _reversed(marches[0])
+    found = marches[0] if len(marches) == 1 else _joined(*marches)
+    return _reversed(found) if turned else found
 
 
 def finest(method: str, scene: Scene, time: float) -> float:
@@ -194,19 +203,62 @@ def finest(method: str, scene: Scene, time: float) -> float:
     return max(claimed, met)
 
 
-def _outward(times: Sequence[float]) -> tuple[list[float], bool]:
-    """Return the times in the order away from 0, and whether that turned them round."""
-    values = [float(t) for t in times]
+def _march(
+    chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
+) -> Trajectory:
+    """Solve at times away from 0, in units in which the method can form its products."""
+    factor = 1.0 if chosen.name in _ANY_SCALE else factor_near_one(scene, times[-1])
+    if factor == 1.0:
+        return chosen.solve(scene, times, tolerance, effort)
+    faster = [t / factor for t in times]
+    try:
+        found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
+    except TimedError as refusal:
+        raise refusal.slower(factor) from None
+    return unscaled(found, times, factor)
+
+
+def _reversed(found: Trajectory) -> Trajectory:
+    return replace(
+        found,
+        time=found.time[::-1],
+        recorded_time=found.recorded_time[::-1],
+        omega=found.omega[::-1],
+    )
+
+
+def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
+    """Return the rows of two marches from 0; what overflows is missing at the ends."""
+    return replace(
+        after,
+        time=np.concatenate([before.time, after.time]),
+        recorded_time=np.concatenate([before.recorded_time, after.recorded_time]),
+        omega=np.concatenate([before.omega, after.omega]),
+        steps=before.steps + after.steps,
+        evaluations=before.evaluations + after.evaluations,
+        ended=after.ended if before.ended == "complete" else before.ended,
+    )
+
+
+def _ascending(times: object) -> tuple[list[float], bool]:
+    """Return the times in ascending order, and whether that turned them round."""
+    if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
+        times = (times,)
+    if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
+        times = times.tolist()
+    entries = several("times", times, "allowed: a number, or numbers in order")
+    most = most_steps()
+    values = [number("times", each) for each in itertools.islice(entries, most + 1)]
     if not values:
         raise InputError("times: none given; give at least one")
+    if len(values) > most:
+        raise InputError(f"times: more than {most}, what fits in this machine's memory")
     if not all(map(math.isfinite, values)):
         raise InputError("times: one is not finite; allowed: finite numbers")
-    if min(values) < 0.0 < max(values):
-        raise InputError("times: on both sides of 0; allowed: one side")
-    turned = abs(values[0]) > abs(values[-1])
+    turned = values[0] > values[-1]
     if turned:
         values.reverse()
-    if not all(abs(t1) < abs(t2) for t1, t2 in itertools.pairwise(values)):
+    if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
         raise InputError("times: not strictly monotonic; each must differ from the one before")
     return values, turned
 

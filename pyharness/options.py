@@ -13,6 +13,7 @@ from pyharness.facts import facts
 from pyharness.listing import PROGRAMS, Listing, subset
 from pyharness.scene import Scene
 from pyharness.scene_file import case_numbers, case_scene, read_scene
+from pyharness.stderr import say
 
 FORMATS = ("table", "json", "csv", "markdown")
 _NEGATIVE = re.compile(r"-[.\d]")
@@ -215,14 +216,13 @@ def whole(text: str, option: str) -> int:
 
 def warn(message: str) -> None:
     """Say on stderr what the user should know."""
-    sys.stderr.write(f"pyharness: warning: {message}\n")
+    say(f"pyharness: warning: {message}\n")
 
 
 def progress(text: str) -> None:
     """Say on a terminal how far it is, in a line that the next one replaces; "" wipes it."""
     if sys.stderr.isatty():
-        sys.stderr.write(f"\r\x1b[K{text}")
-        sys.stderr.flush()
+        say(f"\r\x1b[K{text}")
 
 
 def check_outputs(options: argparse.Namespace) -> None:

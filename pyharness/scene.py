@@ -1,33 +1,62 @@
 """Scenes: body, torque law, initial angular velocity, step size and steps, checked once."""
 
+import itertools
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, SupportsIndex
 
-from pyharness.errors import InputError
+from pyharness.errors import InputError, kind_of, printable
 from pyharness.facts import facts
+from pyharness.values import Number, Numbers, finite, number, several, three, three_floats, whole
+from pyharness.values import Triple as Triple
 
-Triple = tuple[float, float, float]
 Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
+# What the waves of a law may be given as: pairs of three numbers and one.
+Waves = Iterable[tuple[Numbers, Number]]
 
 # A result row in binary64 with IER, once in the kernel and once in the trajectory.
 _BYTES_PER_STEP = 2 * (8 * 8 + 4)
 # The kernels count steps and right-hand sides, five a step at the most, in 32 bits.
 _COUNTABLE_STEPS = 400_000_000
+_LONGEST_NAME = 60
 
 
 @dataclass(frozen=True)
 class TorqueLaw:
     """N(t) = constant + rate t + sum of amplitude sin(frequency t) + the same with cos.
 
-    N m for a body of moments; 1/s2, torque over moment, for one of coefficients.
+    N m for a body of moments; 1/s2, torque over moment, for one of coefficients. Three numbers may
+    be a list, a tuple or an array; the fields are plain tuples of floats.
+
+    Raises
+    ------
+    InputError
+        For what is not three finite numbers, or no wave.
     """
 
     constant: Triple = (0.0, 0.0, 0.0)
     rate: Triple = (0.0, 0.0, 0.0)
     sines: tuple[Wave, ...] = ()
     cosines: tuple[Wave, ...] = ()
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            constant: Numbers = ...,
+            rate: Numbers = ...,
+            sines: Waves = ...,
+            cosines: Waves = ...,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Check and convert."""
+        for name in ("constant", "rate"):
+            object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
+        for name in ("sines", "cosines"):
+            object.__setattr__(self, name, _waves(f"[torque] {name}", getattr(self, name)))
 
     @property
     def varies(self) -> bool:
@@ -62,7 +91,9 @@ def _wave(function: Callable[[float], float], angle: float) -> float:
 class Scene:
     """One problem: what moves, under what, from where, in which steps.
 
-    Exactly one of `moments` (kg m2) and `coefficients` (A, B, C of equations 13-15) is given.
+    Exactly one of `moments` (kg m2) and `coefficients` (A, B, C of equations 13-15) is given. Three
+    numbers may be a list, a tuple or an array; the fields are plain tuples of floats. Of a name a
+    line of 60 characters is kept, with what steers a terminal escaped.
 
     Raises
     ------
@@ -77,39 +108,62 @@ class Scene:
     torque: TorqueLaw = field(default_factory=TorqueLaw)
     step_size: float = 0.01
     steps: int = 100
-    masses: Triple = field(default_factory=lambda: _triple(facts("cases")["deck"]["masses"]))
-    forces: Triple = field(default_factory=lambda: _triple(facts("cases")["deck"]["forces"]))
+    masses: Triple = field(default_factory=lambda: _deck("masses"))
+    forces: Triple = field(default_factory=lambda: _deck("forces"))
     case: int | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            name: str,
+            omega: Numbers,
+            moments: Numbers | None = None,
+            coefficients: Numbers | None = None,
+            torque: TorqueLaw = ...,
+            step_size: Number = 0.01,
+            steps: SupportsIndex = 100,
+            masses: Numbers = ...,
+            forces: Numbers = ...,
+            case: SupportsIndex | None = None,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
-        """Refuse what no method can run."""
+        """Convert, and refuse what no method can run."""
+        if not isinstance(self.name, str):
+            raise InputError(f"name is {kind_of(self.name)}; it must be text")
+        self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
         if (self.moments is None) == (self.coefficients is None):
             raise InputError("[body]: give either moments or coefficients, three numbers")
         if self.moments is not None:
-            for axis, moment in enumerate(self.moments, 1):
-                if not (math.isfinite(moment) and moment > 0.0):
-                    raise InputError(
-                        f"[body] moments: I{axis} is {moment:g}; allowed: a finite number above 0"
-                    )
-        _check_finite("[body] coefficients", self.coefficients or ())
-        _check_finite("[initial] omega", self.omega)
-        _check_finite("[torque] constant", self.torque.constant)
-        _check_finite("[torque] rate", self.torque.rate)
-        for kind, waves in (("sines", self.torque.sines), ("cosines", self.torque.cosines)):
-            for amplitude, frequency in waves:
-                _check_finite(f"[torque] {kind}", (*amplitude, frequency))
+            self._set("moments", _above_zero("[body] moments", "I", self.moments))
+        if self.coefficients is not None:
+            self._set("coefficients", three("[body] coefficients", self.coefficients))
+        self._set("omega", three("[initial] omega", self.omega))
+        if not isinstance(self.torque, TorqueLaw):
+            raise InputError(f"[torque] is {kind_of(self.torque)}; it must be a TorqueLaw")
+        self._set("step_size", number("[run] step_size", self.step_size))
         if not (math.isfinite(self.step_size) and self.step_size > 0.0):
             raise InputError(
-                f"step size is {self.step_size:g}; allowed: a finite number above 0, in seconds"
+                f"[run] step_size is {self.step_size:g}; "
+                "allowed: a finite number above 0, in seconds"
             )
+        self._set("steps", whole("[run] steps", self.steps))
         limit = most_steps()
         if not 1 <= self.steps <= limit:
             raise InputError(
-                f"steps is {_size(self.steps, limit)}; "
+                f"[run] steps is {_size(self.steps, limit)}; "
                 f"allowed: 1 to {limit}, what fits in this machine's memory"
             )
         if not math.isfinite(self.step_size * self.steps):
             raise InputError("step size times steps is not finite; take fewer or smaller steps")
+        self._set("masses", _above_zero("masses", "m", self.masses))
+        self._set("forces", three("forces", self.forces))
+        if self.case is not None:
+            self._set("case", whole("case", self.case))
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
 
     @property
     def euler_coefficients(self) -> Triple:
@@ -173,12 +227,37 @@ def _size(steps: int, limit: int) -> str:
     return f"{steps}{size if steps > limit else ''}"
 
 
-def _triple(values: Sequence[float]) -> Triple:
-    first, second, third = values
-    return float(first), float(second), float(third)
+def checked_scene(scene: object) -> Scene:
+    """Return a scene; InputError where it is none."""
+    if isinstance(scene, Scene):
+        return scene
+    raise InputError(f"scene is {kind_of(scene)}; it must be a Scene, as case_scene makes one")
 
 
-def _check_finite(where: str, values: Sequence[float]) -> None:
-    for value in values:
-        if not math.isfinite(value):
-            raise InputError(f"{where}: {value:g} is not finite; allowed: finite numbers")
+def _deck(name: str) -> Triple:
+    first, second, third = facts("cases")["deck"][name]
+    return first, second, third
+
+
+def _above_zero(where: str, symbol: str, values: object) -> Triple:
+    found = three_floats(where, values)
+    for axis, value in enumerate(found, 1):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(
+                f"{where}: {symbol}{axis} is {value:g}; allowed: a finite number above 0"
+            )
+    return found
+
+
+def _waves(where: str, values: object) -> tuple[Wave, ...]:
+    allowed = "allowed: a list of waves, each an amplitude of three numbers and a frequency"
+    waves = []
+    for value in several(where, values, allowed):
+        wave = list(itertools.islice(several(where, value, allowed), 3))
+        if len(wave) != 2:
+            raise InputError(f"{where}: a wave is not two things; {allowed}")
+        amplitude, frequency = wave
+        waves.append(
+            (three(f"{where} amplitude", amplitude), finite(f"{where} frequency", frequency))
+        )
+    return tuple(waves)

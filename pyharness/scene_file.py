@@ -1,14 +1,16 @@
 """Where scenes come from: Table 1 by number, or a TOML file of the form in the README."""
 
+import os
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsIndex
 
-from pyharness.errors import InputError, printable, unknown
+from pyharness.errors import InputError, kind_of, unknown
 from pyharness.facts import facts
 from pyharness.pipes import read_some
-from pyharness.scene import Scene, TorqueLaw, Triple, Wave
+from pyharness.scene import Scene, TorqueLaw
+from pyharness.values import whole
 
 _LARGEST_FILE = 1_000_000
 _TABLES = {
@@ -17,6 +19,7 @@ _TABLES = {
     "torque": ("constant", "rate", "sines", "cosines"),
     "run": ("step_size", "steps"),
 }
+_WAVES = ("sines", "cosines")
 
 
 def case_numbers() -> list[int]:
@@ -24,24 +27,26 @@ def case_numbers() -> list[int]:
     return [entry["number"] for entry in facts("cases")["case"]]
 
 
-def case_scene(number: int) -> Scene:
+def case_scene(number: SupportsIndex) -> Scene:
     """Return the scene of a case of Table 1; InputError where there is no such case."""
+    number = whole("case", number)
     for entry in facts("cases")["case"]:
         if entry["number"] == number:
             deck = facts("cases")["deck"]
             return Scene(
                 name=entry["title"],
-                omega=_numbers("omega", entry["omega"]),
-                moments=_numbers("moments", entry["moments"]),
-                torque=_torque(entry.get("torque", {}), "torque"),
+                omega=entry["omega"],
+                moments=entry["moments"],
+                torque=_torque(entry.get("torque", {})),
                 step_size=deck["step_size"],
                 steps=deck["steps"],
                 case=number,
             )
-    raise unknown("case", str(number), map(str, case_numbers()), "--case")
+    shown = str(number) if abs(number) < 10**18 else "of more than 18 digits"
+    raise unknown("case", shown, map(str, case_numbers()), "--case")
 
 
-def read_scene(path: str | Path) -> Scene:
+def read_scene(path: str | os.PathLike[str]) -> Scene:
     """Return the scene of a TOML file.
 
     Raises
@@ -49,6 +54,8 @@ def read_scene(path: str | Path) -> Scene:
     InputError
         Where the file can't be read, is not TOML, has an unknown key, or lacks a value.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"scene file: {kind_of(path)}; allowed: a path, as text or a Path")
     where = f"scene file '{path}'"
     data = read_toml(path, where)
     try:
@@ -57,17 +64,17 @@ def read_scene(path: str | Path) -> Scene:
         raise InputError(f"{where}: {error}") from None
 
 
-def read_toml(path: str | Path, where: str) -> dict[str, Any]:
+def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
     """Return the content of a user's TOML file; InputError, which begins with `where`, if none."""
     try:
-        content = read_some(str(path), _LARGEST_FILE + 1)
+        content = read_some(os.fspath(path), _LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{where}: {reason}; give a TOML file that can be read") from None
     if len(content) > _LARGEST_FILE:
         raise InputError(f"{where}: larger than {_LARGEST_FILE} bytes; a scene is a few lines")
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise InputError(f"{where}: not UTF-8 text; TOML files are") from None
     except RecursionError:
@@ -86,7 +93,7 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     body = "moments" if scene.moments is not None else "coefficients"
     law = scene.torque
     lines = [f"# {line}" for line in comments]
-    lines += [f"name = {json.dumps(scene.name)}", "[body]"]
+    lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
     lines += [f"{body} = {list(scene.moments or scene.coefficients or ())}"]
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
     lines += ["[torque]", f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
@@ -107,53 +114,33 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
             raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
         if table != "torque":
             check_keys(tables[table], keys, f"[{table}]")
-    name = data.get("name", default_name)
-    if not isinstance(name, str):
-        raise InputError(f"name is {kind_of(name)}; it must be text")
     body, initial, run = tables["body"], tables["initial"], tables["run"]
     if "omega" not in initial:
         raise InputError("[initial] omega is missing; give three numbers in rad/s")
-    steps = run.get("steps", 100)
-    if isinstance(steps, bool) or not isinstance(steps, int):
-        raise InputError(f"[run] steps is {kind_of(steps)}; it must be a whole number")
     return Scene(
-        name=printable(" ".join(name.split())[:60]),
-        omega=_numbers("[initial] omega", initial["omega"]),
-        moments=_optional("[body] moments", body.get("moments")),
-        coefficients=_optional("[body] coefficients", body.get("coefficients")),
-        torque=_torque(tables["torque"], "[torque]"),
-        step_size=number("[run] step_size", run.get("step_size", 0.01)),
-        steps=steps,
+        name=data.get("name", default_name),
+        omega=initial["omega"],
+        torque=_torque(tables["torque"]),
+        **body,
+        **run,
     )
 
 
-def _torque(table: dict[str, Any], where: str) -> TorqueLaw:
-    check_keys(table, _TABLES["torque"], where)
-    zero = [0.0, 0.0, 0.0]
-    return TorqueLaw(
-        constant=_numbers(f"{where} constant", table.get("constant", zero)),
-        rate=_numbers(f"{where} rate", table.get("rate", zero)),
-        sines=_waves(f"{where} sines", table.get("sines", [])),
-        cosines=_waves(f"{where} cosines", table.get("cosines", [])),
-    )
+def _torque(table: dict[str, Any]) -> TorqueLaw:
+    check_keys(table, _TABLES["torque"], "[torque]")
+    waves = {key: _waves(f"[torque] {key}", table[key]) for key in _WAVES if key in table}
+    return TorqueLaw(**{**table, **waves})
 
 
-def _waves(where: str, entries: object) -> tuple[Wave, ...]:
+def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise InputError(f"{where} must be a list of {{ amplitude = [..], frequency = .. }}")
-    waves = []
     for entry in entries:
         check_keys(entry, ("amplitude", "frequency"), where)
         for key in ("amplitude", "frequency"):
             if key not in entry:
                 raise InputError(f"{where}: {key} is missing")
-        waves.append(
-            (
-                _numbers(f"{where} amplitude", entry["amplitude"]),
-                number(f"{where} frequency", entry["frequency"]),
-            )
-        )
-    return tuple(waves)
+    return [(entry["amplitude"], entry["frequency"]) for entry in entries]
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
@@ -161,33 +148,3 @@ def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> Non
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)
-
-
-def _optional(where: str, value: object) -> Triple | None:
-    return None if value is None else _numbers(where, value)
-
-
-def _numbers(where: str, value: object) -> Triple:
-    if not isinstance(value, list) or len(value) != 3:
-        raise InputError(f"{where} must be a list of three numbers")
-    first, second, third = (number(where, each) for each in value)
-    return first, second, third
-
-
-def number(where: str, value: object) -> float:
-    """Return a TOML value that must be a number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"{where}: {kind_of(value)} where a number belongs")
-    try:
-        return float(value)
-    except OverflowError:
-        raise InputError(f"{where}: a number too large for binary64") from None
-
-
-def kind_of(value: object) -> str:
-    """Name the kind of a TOML value for a message."""
-    names = {
-        str: "text", bool: "true or false", int: "a whole number", float: "a number",
-        list: "a list", dict: "a table",
-    }  # fmt: skip
-    return names.get(type(value), f"a {type(value).__name__}")

@@ -4,11 +4,7 @@
 three arguments and enters the kernel. `solve` is the same for one use, with rows at many times.
 """
 
-import math
 import reprlib
-from collections.abc import Mapping, Sequence, Set
-from contextlib import suppress
-from itertools import islice
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -16,12 +12,13 @@ import numpy as np
 from pyharness.effort import checked_effort
 from pyharness.errors import InputError, unknown
 from pyharness.kernels import ENDS, extension, normalized
-from pyharness.plan import EITHER, Plan, plan
-from pyharness.scene import Scene, Triple
+from pyharness.plan import EITHER, FINEST, Plan, plan
+from pyharness.scene import Scene, checked_scene
 from pyharness.trajectory import Array, Trajectory
+from pyharness.values import Number, Numbers, Triple, number, three, three_floats, tolerance_of
 
 if TYPE_CHECKING:
-    from pyharness._solver import BoundKernel, Numbers
+    from pyharness._solver import BoundKernel
 else:
     try:
         from pyharness._solver import BoundKernel
@@ -118,15 +115,15 @@ class Solver(BoundKernel):
         """
         return self._ending[1]
 
-    def trajectory(self, omega0: "Numbers", times: Sequence[float]) -> Trajectory:
+    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return rows at `times` from another start.
 
         Parameters
         ----------
         omega0 : sequence of three floats
             rad/s.
-        times : sequence of float, shape (n,)
-            s; strictly monotonic, on one side of 0.
+        times : float or iterable of float, shape (n,)
+            s; strictly monotonic, also on both sides of 0.
 
         Raises
         ------
@@ -137,13 +134,13 @@ class Solver(BoundKernel):
 
         from pyharness.methods import solve as solve_by_name
 
-        scene = replace(self._scene, omega=_three("omega0", omega0))
+        scene = replace(self._scene, omega=three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
         return solve_by_name(scene, times, method, self._tolerance, self._effort)
 
 
 def prepare(
-    scene: Scene, method: str = "auto", tolerance: float = 1e-12, effort: float = 1.0
+    scene: Scene, method: str = "auto", tolerance: Number = 1e-12, effort: float = 1.0
 ) -> Solver:
     """Prepare a solver.
 
@@ -181,17 +178,19 @@ def prepare(
     >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
     array([-0.958924,  0.283662, 10.      ])
     """
-    if method not in PREPARED:
+    checked_scene(scene)
+    if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
+    tolerance = tolerance_of(tolerance, FINEST)
     effort = checked_effort(effort)
     return Solver(scene, plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def solve(
     scene: Scene,
-    times: Sequence[float],
+    times: Number | Numbers,
     method: str = "auto",
-    tolerance: float = 1e-12,
+    tolerance: Number = 1e-12,
     effort: float = 1.0,
 ) -> Trajectory:
     """Solve a scene.
@@ -200,8 +199,9 @@ def solve(
     ----------
     scene : Scene
         What to solve.
-    times : sequence of float, shape (n,)
-        Where the result is wanted (s): strictly monotonic, on one side of 0.
+    times : float or iterable of float, shape (n,)
+        Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
+        twice, from 0 backward and from 0 forward.
     method : str
         A name in `pyharness.methods.METHODS`.
     tolerance : float
@@ -212,7 +212,8 @@ def solve(
     Returns
     -------
     Trajectory
-        One row per time, fewer where the solution overflows.
+        One row per time, in the order of `times`; fewer where the solution overflows: those between
+        0 and the overflow, on either side. Steps and evaluations are of both sides together.
 
     Raises
     ------
@@ -240,41 +241,10 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
     InputError
         For what is no start, no time or no buffer.
     """
-    start = _three("omega0", omega0)
-    time = _number(t_end)
-    if time is None:
-        raise _refused("t_end", t_end, "one real number, in seconds")
+    start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None:
         _check_buffer(out)
     return start, time
-
-
-def _three(where: str, values: Any) -> Triple:
-    found: list[float | None] = []
-    # An object of the user's may raise anything: then it is no three numbers.
-    with suppress(Exception):
-        if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
-            found = [_number(each) for each in islice(values, 4)]
-    match found:
-        case [float(first), float(second), float(third)]:
-            return first, second, third
-    raise _refused(where, values, "three real numbers, in rad/s")
-
-
-def _number(value: Any) -> float | None:
-    """Return a real number as a float, None for anything else or beyond binary64."""
-    if type(value) is float:
-        return value
-    kind = getattr(getattr(value, "dtype", None), "kind", "f")
-    if kind not in "iuf" or getattr(value, "shape", ()) != ():
-        return None
-    if isinstance(value, (bool, str, bytes, bytearray, complex)):
-        return None
-    with suppress(Exception):
-        found = float(value)
-        # What has more range than binary64 may become infinite.
-        return found if math.isfinite(found) or found == value or math.isnan(found) else None
-    return None
 
 
 def _check_buffer(out: Any) -> None:

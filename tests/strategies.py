@@ -152,7 +152,7 @@ def tolerance(random: Random) -> float:
 
 
 def times(random: Random) -> tuple[float, ...]:
-    """Return times, most often in order and on one side of 0."""
+    """Return times, most often in order, on one side of 0 or on both."""
     violence = random.choice((0.0, 0.0, 0.2, 1.0))
     values = [abs(number(random, violence)) for _ in range(random.choice((1, 1, 2, 5)))]
     if random.random() < 0.05:
@@ -160,7 +160,10 @@ def times(random: Random) -> tuple[float, ...]:
             ((), (1.0, 1.0), (-1.0, 1.0), (float("nan"),), (float("inf"),), (1.0, 3.0, 2.0))
         )
     sign = _sign(random)
-    return tuple(sign * t for t in sorted(set(values), reverse=random.random() < 0.1))
+    turned = random.random() < 0.1
+    if random.random() < 0.2:
+        values = [_sign(random) * t for t in values]
+    return tuple(sign * t for t in sorted(set(values), reverse=turned))
 
 
 def method_input(random: Random) -> MethodInput:

@@ -243,7 +243,7 @@ def test_nothing_is_left_where_writing_fails(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pyharness.output.os.chmod", full)
+    monkeypatch.setattr("pyharness.output.os.replace", full)
     assert main(["figures", "--out", str(tmp_path / "new")]) == 2
     assert "No space left on device" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

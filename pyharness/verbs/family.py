@@ -1,7 +1,6 @@
 """`family`: what limits the weighted residual methods; orders derived against orders measured."""
 
 import argparse
-import sys
 
 from pyharness import family_tables as views
 from pyharness import options as shared
@@ -34,9 +33,8 @@ def run(options: argparse.Namespace) -> int:
     one = any(getattr(options, name) is not None for name in _OF_A_MEMBER)
     members = [_member(options)] if one else None
     shared.check_outputs(options)
-    found = order_table(scene, members, shared.progress if sys.stderr.isatty() else None)
-    if sys.stderr.isatty():
-        shared.progress("")
+    found = order_table(scene, members, shared.progress)
+    shared.progress("")
 
     if form == "json":
         from pyharness.build import build

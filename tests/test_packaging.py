@@ -1,0 +1,141 @@
+"""The package for others: types that accept what runs, what it shows, how it is cited."""
+
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import venv
+from pathlib import Path
+
+import pytest
+import yaml
+
+import pyharness
+
+ROOT = Path(__file__).parent.parent
+SCRIPT = ROOT / "tests/user_script.py"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+# Each line is refused when it runs, and has a type that says so before.
+MISTAKES = """
+Scene("x", "abc", (3, 2, 1))
+Scene("x", 3.0, (3, 2, 1))
+Scene("x", [1, 2, "3"], (3, 2, 1))
+Scene("x", [1j, 2, 3], (3, 2, 1))
+Scene("x", None, (3, 2, 1))
+Scene(3, (1, 2, 3), (3, 2, 1))
+Scene("x", (1, 2, 3), (3, 2, 1), steps=2.5)
+Scene("x", (1, 2, 3), (3, 2, 1), steps="3")
+Scene("x", (1, 2, 3), (3, 2, 1), step_size="0.1")
+Scene("x", (1, 2, 3), (3, 2, 1), torque=(1, 2, 3))
+Scene("x", (1, 2, 3), (3, 2, 1), stpes=3)
+TorqueLaw((1, 2, "3"))
+TorqueLaw(sines=[(1, 2, 3)])
+TorqueLaw(sines=3.0)
+solve(case_scene(3), "1")
+solve(case_scene(3), None)
+solve(case_scene(3), 1j)
+solve("case 3", [1.0])
+solve(case_scene(3), [1.0], method=3)
+solve(case_scene(3), [1.0], tolerance="1e-9")
+prepare(3)
+prepare(case_scene(3), tolerance=None)
+prepare(case_scene(3)).trajectory("abc", 1.0)
+case_scene("3")
+case_scene(3.0)
+read_scene(3)
+subset(3)
+subset("two-term", fix=3)
+Listing("two-term", None)
+pyharness.sovle
+"""
+
+
+def _mypy(folder: Path, *scripts: Path) -> tuple[set[tuple[str, int]], str]:
+    """Check scripts as a user does for whom the package is installed; return where errors are."""
+    venv.create(folder / "env", with_pip=False, symlinks=True)
+    # The environment holds what this one does, and the package as a wheel would lay it out.
+    (folder / "lib").mkdir()
+    (folder / "lib/pyharness").symlink_to(ROOT / "pyharness")
+    paths = {"base": str(folder / "env"), "platbase": str(folder / "env")}
+    packages = Path(sysconfig.get_path("purelib", vars=paths))
+    (packages / "here.pth").write_text(f"{folder / 'lib'}\n{sysconfig.get_path('purelib')}\n")
+    python = str(folder / "env/bin/python")
+    done = subprocess.run(
+        [
+            sys.executable, "-m", "mypy", "--strict", "--config-file=",
+            "--python-executable", python, "--cache-dir", str(folder / "cache"), *map(str, scripts),
+        ],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stderr == ""
+    found = re.findall(r"^([^:\n]+):(\d+): error", done.stdout, re.MULTILINE)
+    return {(Path(name).name, int(line)) for name, line in found}, done.stdout
+
+
+def test_types_accept_what_runs_and_refuse_what_does_not(tmp_path: Path) -> None:
+    mistakes = tmp_path / "mistakes.py"
+    names = "Listing, Scene, TorqueLaw, case_scene, prepare, read_scene, solve, subset"
+    mistakes.write_text(f"import pyharness; from pyharness import {names}{MISTAKES}")
+    script = tmp_path / "user_script.py"
+    script.write_text(SCRIPT.read_text())
+    found, text = _mypy(tmp_path, script, mistakes)
+    lines = mistakes.read_text().splitlines()
+    assert found == {("mistakes.py", n) for n in range(2, len(lines) + 1)}, text
+
+
+@pytest.mark.parametrize("mistake", MISTAKES.split("\n")[1:-1])
+def test_what_has_a_wrong_type_is_refused_when_it_runs(mistake: str) -> None:
+    names = {name: getattr(pyharness, name) for name in pyharness.__all__}
+    wrong = TypeError if "stpes" in mistake else AttributeError if "sovle" in mistake else None
+    with pytest.raises(wrong or pyharness.InputError):
+        eval(mistake, {"pyharness": pyharness, **names})
+
+
+def test_the_script_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(SCRIPT.read_text(), str(SCRIPT), "exec"), {})
+    assert "complete complete custom" in capsys.readouterr().out
+
+
+def test_what_the_package_shows() -> None:
+    assert dir(pyharness) == sorted([*pyharness.__all__, "__version__"])
+    for name in dir(pyharness):
+        assert getattr(pyharness, name) is not None
+
+
+def test_lower_bounds_are_what_the_landing_script_installs() -> None:
+    """Each dependency has one bound, and `.ci/run` makes of it the version that it tests."""
+    bounds = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["plots"]]
+    script = (ROOT / ".ci/run").read_text()
+    lowest = script[script.index("lowest() {") : script.index("# run_wheel")]
+    python = sys.executable if sys.version_info[:2] == (3, 11) else "python3.11"
+    if PROJECT["requires-python"] != ">=3.11" or shutil.which(python) is None:
+        pytest.skip("no Python of the lowest version here")
+    done = subprocess.run(
+        ["sh", "-c", f"python={python}\n{lowest}\nlowest"],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == [each.replace(">=", "==") for each in bounds]
+    assert all(re.fullmatch(r"\w+==[\d.]+", each) for each in done.stdout.split())
+    assert not re.search(r"(numpy|scipy|mpmath|matplotlib)[=><]", script)
+
+
+def test_the_citation_is_that_of_the_project() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    version = re.search(r"^  version: '(.*)'", (ROOT / "meson.build").read_text(), re.MULTILINE)
+    assert version is not None
+    assert citation["cff-version"] == "1.2.0"
+    assert citation["title"] == PROJECT["name"]
+    assert citation["version"] == version.group(1)
+    assert citation["license"] == PROJECT["license"]
+    assert citation["abstract"].split() == PROJECT["description"].split()
+    assert citation["keywords"] == PROJECT["keywords"]
+    assert [each["name"] for each in citation["authors"]] == [
+        each["name"] for each in PROJECT["authors"]
+    ]
+    (thesis,) = citation["references"]
+    readme = " ".join((ROOT / "README.md").read_text().split())
+    assert f"*{thesis['title']}*" in readme
+    assert thesis["year"] == 1982

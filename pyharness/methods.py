@@ -11,7 +11,7 @@ import numpy as np
 from pyharness.effort import Solver, check_steps, checked_effort
 from pyharness.errors import InputError, TimedError, unknown
 from pyharness.listing import PROGRAMS, Listing
-from pyharness.scaling import factor_near_one, scaled, unscaled
+from pyharness.scaling import factor_near_one, is_ordinary, scaled, unscaled
 from pyharness.scene import Scene, checked_scene, most_steps
 from pyharness.scipy_methods import FINEST, finest_tolerance, rows_trajectory, scipy_method
 from pyharness.trajectory import Trajectory
@@ -207,6 +207,9 @@ def _march(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
     """Solve at times away from 0, in units in which the method can form its products."""
+    if chosen.finest < 1.0 and not is_ordinary(scene):
+        # The step plays no part; in other units it might be no number.
+        scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
     factor = 1.0 if chosen.name in _ANY_SCALE else factor_near_one(scene, times[-1])
     if factor == 1.0:
         return chosen.solve(scene, times, tolerance, effort)

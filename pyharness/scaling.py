@@ -47,11 +47,16 @@ def scaled(scene: Scene, factor: float) -> Scene:
     )
 
 
+def is_ordinary(scene: Scene) -> bool:
+    """Whether products of the first omega are far from the ends of binary64."""
+    return 1.0 / _LARGE <= max(map(abs, scene.omega)) <= _LARGE
+
+
 def factor_near_one(scene: Scene, time: float) -> float:
     """Return the power of 2 by which a scene is scaled; 1 for every ordinary one."""
-    largest = max(map(abs, scene.omega))
-    if 1.0 / _LARGE <= largest <= _LARGE:
+    if is_ordinary(scene):
         return 1.0
+    largest = max(map(abs, scene.omega))
     law = scene.torque
     moments = scene.moments or (1.0, 1.0, 1.0)
     for axis, moment in enumerate(moments):

@@ -98,7 +98,8 @@ contains
     f = upper_half(frequency)
     s = upper_half(t)
     angle = frequency*t
-    turn = frequency*t_low + ((f*s - angle) + (f*(t - s) + (frequency - f)*s) &
+    ! Dekker's order: exact, however large the angle.
+    turn = frequency*t_low + ((((f*s - angle) + f*(t - s)) + (frequency - f)*s) &
                               + (frequency - f)*(t - s))
     unturned = sin(angle)
     cosine = cos(angle)

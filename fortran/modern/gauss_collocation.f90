@@ -57,6 +57,8 @@ contains
     real(dp) :: n_steps
     real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
+    real(dp) :: span                 ! from time to time, s
+    real(dp) :: span_low
     real(dp) :: walked               ! since `begin`, s
     real(dp) :: walked_low
     real(dp) :: time                 ! of the step's beginning, s
@@ -93,9 +95,10 @@ contains
         status = GAVE_UP
         return
       end if
-      h = (times(i) - begin)/n_steps
+      call two_sum(times(i), -begin, span, span_low)
+      h = span/n_steps
       call two_product(n_steps, h, walked, walked_low)
-      h_low = (((times(i) - begin) - walked) - walked_low)/n_steps
+      h_low = (((span - walked) - walked_low) + span_low)/n_steps
       ! The step is new: what the rates of the last one say about it is of no use.
       f = 0.0_dp
       done = 0.0_dp

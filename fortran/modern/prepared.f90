@@ -103,7 +103,8 @@ contains
     power = max(-MOST_POWER, min(MOST_POWER, power))
     time = scale(t_end, power)
     copy = packed
-    copy(STEP) = scale(packed(STEP), power)
+    ! Where the step plays no part it may be no number in the new unit.
+    if (in_steps(int(packed(METHOD)))) copy(STEP) = scale(packed(STEP), power)
     do i = 0, 2
       copy(M_CONSTANT + i) = scale(scale(packed(M_CONSTANT + i), -power), -power)
       copy(M_RATE + i) = scale(scale(scale(packed(M_RATE + i), -power), -power), -power)
@@ -202,6 +203,13 @@ contains
     ! A start that is not finite may come back as it is, at time 0 for one.
     if (ended == COMPLETE .and. .not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
   end subroutine solve_as_given
+
+  pure logical function in_steps(code)
+    !! Whether the method of a value of METHOD goes in steps that are given.
+    integer, intent(in) :: code
+
+    in_steps = code > GAUSS .or. (code >= EULER_STEPS .and. code <= RUNGE_KUTTA_STEPS)
+  end function in_steps
 
   pure integer function fixed_method(code)
     !! The fixed-step method of a value of METHOD.

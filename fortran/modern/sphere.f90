@@ -10,6 +10,8 @@ module sphere
   real(dp), parameter :: MOST_TERMS = 2e8_dp ! at all times together, some ten seconds
   integer, parameter :: BETWEEN_LOOKS = 300000 ! at the user; terms
 
+  real(dp), parameter :: SMALL = 1e-280_dp
+
   public :: sphere_rows
 
 contains
@@ -64,11 +66,11 @@ contains
       call add(total, rest, m_rate, 0.5_dp*t*t)
       do k = 1, n_sines
         call half_angle(sines(4, k), t, sine, cosine, quotient)
-        call add(total, rest, sines(1:3, k), t*(sine*quotient))
+        call add_wave(total, rest, sines(1:3, k), t, sine*quotient)
       end do
       do k = 1, n_cosines
         call half_angle(cosines(4, k), t, sine, cosine, quotient)
-        call add(total, rest, cosines(1:3, k), t*(cosine*quotient))
+        call add_wave(total, rest, cosines(1:3, k), t, cosine*quotient)
       end do
       total = total + rest
       if (.not. all(abs(total) <= huge(t))) then
@@ -79,6 +81,22 @@ contains
       n_rows = i
     end do
   end subroutine sphere_rows
+
+  pure subroutine add_wave(total, rest, amplitude, t, part)
+    !! Add amplitude times t times part; where the factors alone would leave the range of numbers,
+    !! in another order.
+    real(dp), intent(inout) :: total(3)
+    real(dp), intent(inout) :: rest(3)
+    real(dp), intent(in) :: amplitude(3)
+    real(dp), intent(in) :: t
+    real(dp), intent(in) :: part
+
+    if (abs(t*part) >= SMALL) then
+      call add(total, rest, amplitude, t*part)
+    else
+      call add(total, rest, amplitude*t, part)
+    end if
+  end subroutine add_wave
 
   pure subroutine add(total, rest, amplitude, factor)
     !! Add amplitude times factor to total + rest.

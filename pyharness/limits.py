@@ -16,6 +16,7 @@ from pyharness.listing import PROGRAMS, names_of, original, subset
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.reference import Reference, reference
 from pyharness.scene import Scene
+from pyharness.scipy_methods import first_scale
 from pyharness.trajectory import Array
 
 _TOLERANCE = 1e-11
@@ -133,7 +134,7 @@ def _extrapolated(scene: Scene, times: Sequence[float]) -> Array:
         quadratic = (a * f[1] * f[2], b * f[0] * f[2], c * f[0] * f[1])
         return [x - 2.0 / 9.0 * t * t * q for x, q in zip(f, quadratic, strict=True)]
 
-    return _solved(rate, list(scene.omega), times)
+    return _solved(scene, rate, list(scene.omega), times)
 
 
 def _slow_slopes(scene: Scene, times: Sequence[float]) -> Array:
@@ -148,10 +149,11 @@ def _slow_slopes(scene: Scene, times: Sequence[float]) -> Array:
         f = right_hand_side(t, state[:3])
         return [x / 2.0 for x in f] + f
 
-    return _solved(rate, [*scene.omega, *scene.omega], times)[:, 3:]
+    return _solved(scene, rate, [*scene.omega, *scene.omega], times)[:, 3:]
 
 
 def _solved(
+    scene: Scene,
     rate: Callable[[float, Sequence[float]], list[float]],
     start: list[float],
     times: Sequence[float],
@@ -159,7 +161,7 @@ def _solved(
     """Return the solution at `times`; NaN from where it leaves every bound."""
     from scipy.integrate import solve_ivp
 
-    scale = max(map(abs, start)) or 1.0
+    scale = first_scale(scene, times[-1]) or 1.0
     evaluations = 0
 
     def counted(time: float, state: Sequence[float]) -> list[float]:

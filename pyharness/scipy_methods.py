@@ -206,7 +206,7 @@ class _Run:
 
         Where omega leaves every bound the start is the scale, and nothing is known of the rest.
         """
-        scale = _first_scale(self.scene, self.end)
+        scale = first_scale(self.scene, self.end)
         if scale == 0.0:
             return Ahead(0.0, 0.0, 1.0)
         for _ in range(_MOST_GUESSES):
@@ -217,7 +217,7 @@ class _Run:
             scale = largest
         if coarse.status != 0 or not math.isfinite(largest):
             # It leaves every bound, or loses its phase: no tolerance is met to the end.
-            return Ahead(_first_scale(self.scene, self.end), 0.0, 1.0)
+            return Ahead(first_scale(self.scene, self.end), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
         times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))
@@ -234,7 +234,7 @@ def _largest(omega: Array) -> float:
     return float(np.nan_to_num(np.abs(omega), nan=0.0, posinf=0.0).max(initial=0.0))
 
 
-def _first_scale(scene: Scene, time: float) -> float:
+def first_scale(scene: Scene, time: float) -> float:
     """Return the largest omega at the start, or where that is 0 what torque alone may give it."""
     if any(scene.omega):
         return max(map(abs, scene.omega))

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from fractions import Fraction
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -214,31 +215,39 @@ def test_refused_call_is_not_counted() -> None:
     assert (solver.status, solver.steps) == before != ("complete", 0)
 
 
+def _growth(work: Callable[[], None]) -> int:
+    """Return the bytes that are left behind; the least of four times, as others leave some too."""
+    tracemalloc.start()
+    try:
+        left = []
+        for _ in range(5):
+            work()
+            left.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    return min(after - before for before, after in pairwise(left))
+
+
 def test_call_leaks_no_reference() -> None:
     scene = case_scene(2)
     solver, start, out = prepare(scene), _omega(scene), np.empty(3)
+    single = start.astype("f4")
 
     def work() -> None:
-        for _ in range(600):
+        for _ in range(100):
             solver(start, 1.0)
             solver(start, 1.0, out=out)
-            solver([0.0, 1.0, 1.0], 1, out=None)
+            solver([0.0, 1.0, Fraction(1)], 1, out=None)
+            solver(single, 1.0)
             with suppress(InputError):
                 solver(start, None)  # type: ignore[arg-type]
-            copy.copy(solver)
+            copy.copy(solver)(start, 1.0)
         gc.collect()
 
     work()
     watched = solver, start, out, room._check, solver.plan, scene, Solver
     counts = [sys.getrefcount(each) for each in watched]
-    tracemalloc.start()
-    try:
-        work()
-        before = tracemalloc.get_traced_memory()[0]
-        work()
-        assert tracemalloc.get_traced_memory()[0] - before < 20000
-    finally:
-        tracemalloc.stop()
+    assert _growth(work) < 2000
     assert [sys.getrefcount(each) for each in watched] == counts
 
 
@@ -322,19 +331,15 @@ def test_status_is_of_the_threads_own_last_call() -> None:
 def test_many_threads_leave_nothing_behind() -> None:
     solver, start = prepare(case_scene(2)), np.ones(3)
 
-    def memory(threads: int) -> int:
-        for _ in range(threads):
-            thread = threading.Thread(target=solver, args=(start, 1.0))
-            thread.start()
-            thread.join()
-        return tracemalloc.get_traced_memory()[0]
-
-    tracemalloc.start()
-    try:
-        before = memory(100)
-        assert memory(1500) - before < 8000
-    finally:
-        tracemalloc.stop()
+    solver(start, 1.0)
+    size = sys.getsizeof(solver)
+    for _ in range(1000):
+        thread = threading.Thread(target=solver, args=(start, 1.0))
+        thread.start()
+        thread.join()
+    assert sys.getsizeof(solver) < size + 100
+    _in_threads(50, lambda number: solver(start, 1.0))
+    assert size + 500 < sys.getsizeof(solver) < size + 5000
 
 
 @pytest.mark.parametrize("method", ["auto", "quick", "gauss-3"])
@@ -416,9 +421,7 @@ def test_preparation_checks_once(arguments: dict[str, object], words: str) -> No
             solve(case_scene(5), [1.0], **arguments)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    "times", [[], [1.0, 1.0], [-1.0, 1.0, 0.0], [float("inf")], [2.0, 1.0, 3.0]]
-)
+@pytest.mark.parametrize("times", [[], [1.0, 1.0], [-1.0, 1.0], [float("inf")], [2.0, 1.0, 3.0]])
 def test_times_are_checked(times: list[float]) -> None:
     with pytest.raises(InputError, match="times"):
         solve(case_scene(5), times)

@@ -402,7 +402,14 @@ static void dealloc(PyObject *object)
   Py_TYPE(object)->tp_free(object);
 }
 
+static PyObject *size_of(PyObject *object, PyObject *Py_UNUSED(unused))
+{
+  const size_t places = (size_t)((bound_kernel *)object)->room * sizeof(ending);
+  return PyLong_FromSize_t((size_t)Py_TYPE(object)->tp_basicsize + places);
+}
+
 static PyMethodDef methods[] = {
+  {"__sizeof__", size_of, METH_NOARGS, NULL},
   {"__init_subclass__", init_subclass, METH_CLASS | METH_NOARGS, NULL},
   {NULL, NULL, 0, NULL},
 };

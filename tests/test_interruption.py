@@ -81,14 +81,6 @@ LONG: dict[str, Callable[[], object]] = {
 WITHOUT_A_DOOR = (
     "dop853", "lsoda", "radau", "reference", "quick", "quick-waves", "prepared-series",
 )  # fmt: skip
-    "dop853",
-    "lsoda",
-    "radau",
-    "reference",
-    "quick",
-    "quick-waves",
-    "prepared-series",
-)
 
 
 class _Keyboard:

@@ -154,7 +154,10 @@ def test_what_is_no_start_is_refused(omega0: Any) -> None:
         lambda: solver(omega0, 1.0, out=out),
         lambda: solver.trajectory(omega0, [1.0]),
     ):
-        with pytest.raises(InputError, match=r"^omega0: .*(allowed: three numbers|where a number belongs|large for binary64)$") as caught:
+        with pytest.raises(
+            InputError,
+            match=r"^omega0: .*(allowed: three numbers|where a number belongs|large for binary64)$",
+        ) as caught:
             call()
         assert str(caught.value).isprintable()
     assert not out.any()
@@ -165,7 +168,9 @@ def test_what_is_no_time_is_refused(t_end: Any) -> None:
     solver = prepare(case_scene(5))
     out = np.zeros(3)
     for named in ({}, {"out": out}):
-        with pytest.raises(InputError, match=r"^t_end: .*(where a number belongs|large for binary64)$"):
+        with pytest.raises(
+            InputError, match=r"^t_end: .*(where a number belongs|large for binary64)$"
+        ):
             solver(np.ones(3), t_end, **named)
     assert not out.any()
 
@@ -421,7 +426,9 @@ def test_preparation_checks_once(arguments: dict[str, object], words: str) -> No
             solve(case_scene(5), [1.0], **arguments)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("times", [[], [1.0, 1.0], [1.0, -1.0, 2.0], [float("inf")], [2.0, 1.0, 3.0]])
+@pytest.mark.parametrize(
+    "times", [[], [1.0, 1.0], [1.0, -1.0, 2.0], [float("inf")], [2.0, 1.0, 3.0]]
+)
 def test_times_are_checked(times: list[float]) -> None:
     with pytest.raises(InputError, match="times"):
         solve(case_scene(5), times)

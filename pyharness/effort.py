@@ -40,7 +40,7 @@ def checked_effort(effort: float) -> float:
         value = math.nan if isinstance(effort, str) else float(effort)
         shown = repr(effort)
     except (TypeError, ValueError, OverflowError):
-        value, shown = math.nan, f"a {type(effort).__name__} that is no such number"
+        value, shown = math.nan, "no such number"
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {shown}; allowed: a finite number above 0")
     return value
@@ -86,7 +86,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
     """
     cost = 1.0 + _A_WAVE[implementation] * waves(scene)
     needed = scene.steps * cost / _MOST_STEPS[implementation]
-    if needed <= effort * _ROUNDING:
+    if needed <= checked_effort(effort) * _ROUNDING:
         return
     load = f"{scene.steps} steps"
     if waves(scene):

@@ -78,7 +78,7 @@ class Program:
         NotBuiltError
             Where the compiled program is asked for and not built.
         """
-        check_steps(scene, self.name, implementation, checked_effort(effort))
+        check_steps(scene, self.name, implementation, effort)
         if implementation == "fortran":
             from pyharness import kernels
 

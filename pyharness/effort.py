@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from pyharness.errors import InputError
+from pyharness.errors import InputError, unknown
 from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
 
@@ -82,8 +82,10 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
     Raises
     ------
     InputError
-        It names the option that lifts the limit, and how far.
+        It names the option that lifts the limit, and how far; or for an unknown implementation.
     """
+    if implementation not in _MOST_STEPS:
+        raise unknown("implementation", implementation, _MOST_STEPS)
     cost = 1.0 + _A_WAVE[implementation] * waves(scene)
     needed = scene.steps * cost / _MOST_STEPS[implementation]
     if needed <= checked_effort(effort) * _ROUNDING:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from pyharness.errors import InputError
+from pyharness.errors import InputError, unknown
 from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
 
@@ -40,7 +40,7 @@ def checked_effort(effort: float) -> float:
         value = math.nan if isinstance(effort, str) else float(effort)
         shown = repr(effort)
     except (TypeError, ValueError, OverflowError):
-        value, shown = math.nan, f"a {type(effort).__name__} that is no such number"
+        value, shown = math.nan, "no such number"
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {shown}; allowed: a finite number above 0")
     return value
@@ -82,11 +82,13 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
     Raises
     ------
     InputError
-        It names the option that lifts the limit, and how far.
+        It names the option that lifts the limit, and how far; or for an unknown implementation.
     """
+    if implementation not in _MOST_STEPS:
+        raise unknown("implementation", implementation, _MOST_STEPS)
     cost = 1.0 + _A_WAVE[implementation] * waves(scene)
     needed = scene.steps * cost / _MOST_STEPS[implementation]
-    if needed <= effort * _ROUNDING:
+    if needed <= checked_effort(effort) * _ROUNDING:
         return
     load = f"{scene.steps} steps"
     if waves(scene):

@@ -91,7 +91,7 @@ class Program:
             raise InputError(f"program {self.name}: the listing is that of {listing.program}")
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
             raise unknown("implementation", implementation, IMPLEMENTATIONS)
-        check_steps(scene, self.name, implementation, checked_effort(effort))
+        check_steps(scene, self.name, implementation, effort)
         if implementation == "fortran":
             return kernels.run(scene, listing, lipschitz, may_stop, velocity)
         twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")

@@ -16,7 +16,7 @@ from operator import mul
 import numpy as np
 
 from pyharness.decimal_functions import sine_cosine
-from pyharness.effort import advice, waves
+from pyharness.effort import advice, checked_effort, waves
 from pyharness.errors import InputError
 from pyharness.scene import Scene
 from pyharness.trajectory import Array
@@ -240,7 +240,7 @@ class _Limit:
     """How many steps a series may take, and the forecast of how many it needs."""
 
     def __init__(self, scene: Scene, most_steps: int, effort: float | None) -> None:
-        self._effort = effort
+        self._effort = None if effort is None else checked_effort(effort)
         self._ordinary = _ORDINARY_STEPS * 5.0 / (5 + waves(scene))
         self._most = most_steps if effort is None else self._ordinary * effort
         self._next = max(2, _FIRST_STEPS * 5 // (5 + waves(scene)))

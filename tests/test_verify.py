@@ -359,8 +359,8 @@ def test_method_that_fails_in_an_ordinary_scene_is_no_lack_of_a_truth() -> None:
     """Limits follow a path of the method's own: what it makes endless is not excused."""
     known = kernels.taylor
 
-    def wrong(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        found = known(scene, times, tolerance)
+    def wrong(scene: Scene, times: Sequence[float], *rest: float) -> Trajectory:
+        found = known(scene, times, *rest)
         return replace(found, omega=found.omega * 1e9) if scene.name == "plain" else found
 
     chosen = Selection(seed="fixed", only=["random"], draws=40)

@@ -1,5 +1,6 @@
 """A copy of the checkout that may be changed: its files, its build, and the runs in it."""
 
+import contextlib
 import os
 import resource
 import shutil
@@ -65,10 +66,8 @@ class Processes:
 
 
 def _kill(process: subprocess.Popen[str]) -> None:
-    try:
+    with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
 
 
 class Tree:

@@ -69,7 +69,7 @@ def near(row: Row) -> list[str]:
     return [f"tests/{path.name}" for path in found if f"tests/{path.name}" not in NOT_HERE]
 
 
-def tests(tree: Tree, names: list[str], limit: float = OF_ALL) -> str | None:
+def failing(tree: Tree, names: list[str], limit: float) -> str | None:
     """Run tests until one fails; return its name, or None."""
     ignored = [f"--ignore={path}" for path in NOT_HERE]
     command = [sys.executable, "-m", "pytest", "-v", "-x", "--no-header", "--tb=no", "-p",
@@ -100,7 +100,7 @@ def verification(tree: Tree, name: str | None = None, limit: float = OF_ALL) -> 
     if code is None:
         return f"time-out verify {name or ''}".strip()
     try:
-        found = json.loads(said[said.index("{"):])["checks"]
+        found = json.loads(said[said.index("{") :])["checks"]
         return "verify " + next(each["id"] for each in found if not each["passed"])
     except (ValueError, KeyError, StopIteration):
         # A name that is no more; or a fault that let nothing be said.
@@ -116,7 +116,7 @@ def check(tree: Tree, killer: str) -> str | None:
     if kind == "verify":
         found = verification(tree, id or None, limit)
     else:
-        found = tests(tree, [] if name == "tests" else [name], limit)
+        found = failing(tree, [] if name == "tests" else [name], limit)
     return killer if found else None
 
 
@@ -130,9 +130,9 @@ def attempt(tree: Tree, row: Row, reach: str, remember: bool = True) -> str | No
             return found
         steps = []
         if reach in ("near", "all") and (names := near(row)):
-            steps.append(lambda: tests(tree, names))
+            steps.append(lambda: failing(tree, names, OF_ALL))
         if reach == "all":
-            steps += [lambda: tests(tree, []), lambda: verification(tree)]
+            steps += [lambda: failing(tree, [], OF_ALL), lambda: verification(tree)]
         for step in steps:
             if (found := step()) and _is_new(tree, row, found):
                 return found
@@ -158,7 +158,7 @@ def false_killers(tree: Tree, killers: list[str]) -> list[str]:
     nodes = [each for each in names if not each.startswith("verify")]
     ids = [each.partition(" ")[2] for each in names if each.startswith("verify ")]
     found = []
-    while nodes and (failed := tests(tree, nodes)):
+    while nodes and (failed := failing(tree, nodes, OF_ALL)):
         found.append(failed)
         nodes = [each for each in nodes if each != failed and not failed.startswith(f"{each}[")]
     if ids and (failed := verification(tree, ",".join(ids))):

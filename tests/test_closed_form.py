@@ -325,7 +325,7 @@ def test_small_components_beside_the_separatrix_keep_their_digits(time: float) -
 @pytest.mark.parametrize("disturbance", [1e-20, 1e-50, 1e-100, 1e-119])
 @pytest.mark.parametrize("time", [0.5, -7.0])
 def test_faint_disturbances_grow_as_they_should(disturbance: float, time: float) -> None:
-    """d cosh and d sinh: what is left out is of third order."""
+    """D cosh and d sinh: what is left out is of third order."""
     a, c = 1.0, 0.5
     rate = math.sqrt(a * c)
     found = _at((a, -1.0, c), (disturbance, 1.0, 0.0), time)

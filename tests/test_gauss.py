@@ -241,7 +241,7 @@ def test_more_than_anyone_waits_for_is_refused_before_it_is_begun() -> None:
 
 
 def test_time_that_was_reached_is_told() -> None:
-    """omega = 1/(1 - t): after a first result at 0.5 the steps go on until near 1."""
+    """Omega = 1/(1 - t): after a first result at 0.5 the steps go on until near 1."""
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
     reached, status, _ = _counted(scene, [0.5, 2.0], 4, 0.01)
     assert status != 0

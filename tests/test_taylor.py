@@ -30,6 +30,12 @@ WAVES = TorqueLaw(
 SCENES = {
     **{f"case {case}": case_scene(case) for case in range(1, 8)},
     "waves": Scene("", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0), torque=WAVES),
+    "sine and cosine of two speeds": Scene(
+        "", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0),
+        torque=TorqueLaw(
+            sines=(((20.0, 0.0, 5.0), 2.0),), cosines=(((5.0, 30.0, -5.0), 5.0),)
+        ),
+    ),
     "from rest": Scene(
         "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((5.0, 3.0, 1.0))
     ),

@@ -129,6 +129,14 @@ def test_accuracy_against_known_numbers() -> None:
     stretched = accuracy(scene, _trajectory(truth.omega * 1.01), truth)
     assert stretched.energy == pytest.approx(0.0201)
     assert stretched.momentum == pytest.approx(0.0201)
+    # Along axis 3 alone: the drifts are its shares of I w**2 and of I**2 w**2.
+    along = accuracy(scene, _trajectory(truth.omega * [1.0, 1.0, 1.01]), truth)
+    for drift, weights in (
+        (along.energy, np.array(scene.moments)),
+        (along.momentum, np.array(scene.moments) ** 2),
+    ):
+        parts = weights * np.square(truth.omega[-1])
+        assert drift == pytest.approx(0.0201 * parts[2] / parts.sum(), rel=1e-3)
 
 
 def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ from pyharness import case_scene, kernels
 from pyharness.cli import main
 from pyharness.errors import NotBuiltError
 from pyharness.listing import original
+from pyharness.tables import short
 
 Capture = pytest.CaptureFixture[str]
 
@@ -320,3 +321,36 @@ def test_rooms_are_entered_only_when_needed(tmp_path: Path) -> None:
         " if m in sys.modules])"
     )
     assert _python("-c", code, str(tmp_path / "x")).stdout == "[]\n"
+
+
+def test_rows_that_are_shown_are_the_first_and_the_last(capsys: Capture) -> None:
+    assert main([*RUN, "--program", "two-term", "--steps", "300"]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    steps = [int(line[0]) for line in lines if line and line[0].isdigit()]
+    assert steps == [*range(1, 11), *range(291, 301)]
+
+
+@pytest.mark.parametrize(("method", "tolerance"), [("taylor", "1e-09"), ("gauss-1", "1e-08")])
+def test_tolerance_is_a_billionth_where_none_is_given(
+    method: str, tolerance: str, capsys: Capture
+) -> None:
+    assert main([*RUN, "--method", method, "--times", "0.1"]) == 0
+    assert f"tolerance {tolerance}" in capsys.readouterr().out
+
+
+def test_constant_of_the_stop_test_reaches_compare(capsys: Capture) -> None:
+    options = ["--case", "2", "--program", "runge-kutta", "--format", "json"]
+    for constant, steps in ((500.0, 25), (1e9, 100)):
+        assert main(["compare", *options, "--lipschitz", str(constant)]) == 0
+        record = json.loads(capsys.readouterr().out)
+        assert record["lipschitz"] == constant
+        assert record["programs"][0]["steps"] == steps
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(1.25e-3, "1.2e-3"), (-9.96e12, "-1.0e13"), (1.0, "1.0e0"), (0.0, "0"), (None, "-"),
+     (float("inf"), "inf"), (float("-inf"), "-inf"), (float("nan"), "nan")],
+)  # fmt: skip
+def test_two_digits_of_a_number(number: float | None, text: str) -> None:
+    assert short(number) == text

@@ -289,3 +289,8 @@ def test_step_that_divides_the_time_but_for_rounding_is_not_cut_once_more(parts:
     for time in (0.1 * parts, sum([0.1] * parts)):
         one = _counted(sphere, [time], 1, time)[2]
         assert _counted(sphere, [time], 1, 0.1)[2] <= one * parts
+    # Nor is a step longer than it may be.
+    scene = case_scene(3)
+    for whole, count in ((0.35, 4), (0.301, 4), (0.3, 3)):
+        found = _end(scene, [whole], 3, 0.1)
+        np.testing.assert_array_equal(found, _end(scene, [whole], 3, whole / count))

@@ -349,7 +349,7 @@ def test_constant_of_the_stop_test_reaches_compare(capsys: Capture) -> None:
 
 @pytest.mark.parametrize(
     ("number", "text"),
-    [(1.25e-3, "1.2e-3"), (-9.96e12, "-1.0e13"), (1.0, "1.0e0"), (0.0, "0"), (None, "-"),
+    [(1.23e-3, "1.2e-3"), (-9.96e12, "-1.0e13"), (1.0, "1.0e0"), (0.0, "0"), (None, "-"),
      (float("inf"), "inf"), (float("-inf"), "-inf"), (float("nan"), "nan")],
 )  # fmt: skip
 def test_two_digits_of_a_number(number: float | None, text: str) -> None:

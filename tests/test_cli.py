@@ -354,3 +354,8 @@ def test_constant_of_the_stop_test_reaches_compare(capsys: Capture) -> None:
 )  # fmt: skip
 def test_two_digits_of_a_number(number: float | None, text: str) -> None:
     assert short(number) == text
+
+
+def test_quotient_that_stopped_a_run_is_told(capsys: Capture) -> None:
+    assert main(["run", "--case", "2", "--program", "runge-kutta"]) == 0
+    assert "stopped at step 25 by V2: Lipschitz quotient 3.3e3 (" in capsys.readouterr().out

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from pyharness.errors import TimedError
 from pyharness.methods import METHODS, SCIPY_METHODS, solve
 from pyharness.reference import reference
 from pyharness.scaling import scaled
+from pyharness.scipy_methods import RightHandSide
 
 
 @pytest.mark.parametrize("case", range(1, 8))
@@ -157,3 +159,39 @@ def test_waves_leave_fewer_right_hand_sides(monkeypatch: pytest.MonkeyPatch) -> 
     scene = Scene("", (1.0, 1.0, 2.0), moments=(3.0, 2.0, 1.0), torque=law)
     with pytest.raises(InputError, match="after 2000 right-hand sides"):
         solve(scene, [1000.0], "rk45", 1e-9)
+
+
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_every_call_of_the_right_hand_side_is_counted(
+    method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = 0
+    plain = Scene.right_hand_side
+
+    def counted(scene: Scene) -> RightHandSide:
+        slope = plain(scene)
+
+        def call(time: float, omega: Sequence[float]) -> list[float]:
+            nonlocal calls
+            calls += 1
+            return slope(time, omega)
+
+        return call
+
+    monkeypatch.setattr(Scene, "right_hand_side", counted)
+    found = solve(case_scene(5), [0.5, 1.0], method, 1e-6)
+    # LSODA's own count leaves out those of its last step; Radau's leaves out its Jacobians'.
+    assert found.evaluations <= calls
+    if method in ("dop853", "rk45"):
+        assert found.evaluations == calls
+
+
+def test_time_of_a_refusal_in_a_span_whose_square_is_no_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("pyharness.scipy_methods._MOST_EVALUATIONS", 2000)
+    law = TorqueLaw(sines=(((1e105, 2e105, 3e105), 1e104),))
+    scene = Scene("", (1.0, 2.0, -1.0), moments=(3.0, 2.0, 1.0), torque=law)
+    with pytest.raises(TimedError) as refusal:
+        solve(scene, [1e-100], "rk45", 1e-9)
+    assert 0.0 < refusal.value.time < 1e-100

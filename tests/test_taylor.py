@@ -46,6 +46,10 @@ SCENES = {
         "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
         torque=TorqueLaw(sines=(((50.0, 30.0, 10.0), 2.0),)),
     ),
+    "about one axis from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
+        torque=TorqueLaw(sines=(((0.0, 0.0, 10.0), 2.0),)),
+    ),
     "two zeros": Scene("", (1.0, 2.0, 3.0), coefficients=(0.0, -1.0, 0.0)),
     "not a body": Scene("", (0.1, 0.2, -0.3), coefficients=(1.0, 1.0, 0.5)),
 }  # fmt: skip
@@ -245,3 +249,19 @@ def _address(array: Array) -> ctypes.Array[ctypes.c_double]:
     if not array.size:
         return (ctypes.c_double * 1)()
     return (ctypes.c_double * array.size).from_buffer(array.T.reshape(-1).data)
+
+
+def test_start_alone_is_a_row() -> None:
+    scene = case_scene(5)
+    found = solve(scene, [0.0], "taylor", 1e-9)
+    np.testing.assert_array_equal(found.omega, [scene.omega])
+    assert (found.ended, found.steps) == ("complete", 0)
+
+
+def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
+    law = TorqueLaw((1e308, 0.0, 0.0))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    for times in ([1.0, 3.0, 4.0], [3.0], [1.0, 1.5, 3.0]):
+        found = solve(scene, times, "taylor", 1e-9)
+        assert found.ended == "overflow"
+        np.testing.assert_allclose(found.omega[:, 0], [1e308 * t for t in times if t < 1.7])

@@ -95,6 +95,8 @@ class Tree:
             "PYTHONPATH": str(folder),
             "MESONPY_EDITABLE_SKIP": os.pathsep.join(editable),
             "COLUMNS": "300",
+            # What was said before a crash is not lost.
+            "PYTHONUNBUFFERED": "1",
         }
 
     def run(self, command: list[str], limit: float) -> tuple[int | None, str]:

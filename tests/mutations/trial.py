@@ -23,7 +23,7 @@ NEAR = {
     "fortran/modern/levels.f90": ("taylor", "quick", "solver"),
     "fortran/modern/scaled_motion.f90": ("quick", "solver"),
     "fortran/modern/scaled_runge_kutta.f90": ("quick", "solver"),
-    "fortran/modern/prepared.f90": ("solver", "quick", "scaling"),
+    "fortran/modern/prepared.f90": ("solver", "quick", "scaling", "fixed_step"),
     "fortran/modern/torque_free.f90": ("closed_form", "solver"),
     "fortran/modern/two_words.f90": ("closed_form", "scaling"),
     "fortran/modern/sphere.f90": ("closed_form", "solver"),
@@ -118,9 +118,10 @@ def failing(tree: Tree, names: list[str], limit: float) -> str | None:
     code, said = tree.run(command, limit)
     if code == 0:
         return None
-    if code is None:
+    if code is None or code < 0:
         begun = re.findall(r"^(tests/\S+::.*?)(?: (?:PASSED|SKIPPED|XFAIL).*)?$", said, re.M)
-        return f"time-out {begun[-1].strip()}" if begun else "time-out"
+        last = begun[-1].partition(" Fatal Python error")[0].strip() if begun else "tests"
+        return f"time-out {last}" if code is None else last
     failed = re.search(r"^(?:FAILED|ERROR) (tests/\S.*?)(?: - .*)?$", said, re.M)
     if failed:
         return failed[1].strip()

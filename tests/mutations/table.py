@@ -55,9 +55,10 @@ def rows(folder: Path = FOLDER) -> list[Row]:
     found = []
     for path in sorted(folder.glob("table-*.toml")):
         for file, changes in tomllib.loads(path.read_text()).items():
-            for name, (old, new, *lives) in changes.items():
+            for name, (old, new, *reason) in changes.items():
                 id = f"{PurePosixPath(file).with_suffix('')}/{name}"
-                found.append(Row(id, file, old, new, *lives or [None], caught.get(id)))
+                lives = reason[0] if reason else None
+                found.append(Row(id, file, old, new, lives, caught.get(id)))
     return found
 
 

@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
@@ -113,15 +114,18 @@ def near(row: Row) -> list[str]:
 def failing(tree: Tree, names: list[str], limit: float) -> str | None:
     """Run tests until one fails; return its name, or None."""
     ignored = [f"--ignore={path}" for path in NOT_HERE]
+    endless = ["-o", f"faulthandler_timeout={OF_ONE_CHECK}",
+               "-o", "faulthandler_exit_on_timeout=true"]  # fmt: skip
     command = [sys.executable, "-m", "pytest", "-v", "-x", "--no-header", "--tb=no", "-p",
-               "no:cacheprovider", *ignored, *names]  # fmt: skip
+               "no:cacheprovider", *endless, *ignored, *names]  # fmt: skip
     code, said = tree.run(command, limit)
     if code == 0:
         return None
-    if code is None or code < 0:
+    late = code is None or "Timeout (" in said
+    if late or (code is not None and code < 0):
         begun = re.findall(r"^(tests/\S+::.*?)(?: (?:PASSED|SKIPPED|XFAIL).*)?$", said, re.M)
-        last = begun[-1].partition(" Fatal Python error")[0].strip() if begun else "tests"
-        return f"time-out {last}" if code is None else last
+        last = re.split(r" (?=Fatal|Timeout|$)", begun[-1])[0].strip() if begun else "tests"
+        return f"time-out {last}" if late else last
     failed = re.search(r"^(?:FAILED|ERROR) (tests/\S.*?)(?: - .*)?$", said, re.M)
     if failed:
         return failed[1].strip()
@@ -143,7 +147,8 @@ def verification(tree: Tree, name: str | None = None, limit: float = OF_ALL) -> 
         return f"time-out verify {name or ''}".strip()
     try:
         found = json.loads(said[said.index("{") :])["checks"]
-        return "verify " + next(each["id"] for each in found if not each["passed"])
+        first: str = next(each["id"] for each in found if not each["passed"])
+        return f"verify {first}"
     except (ValueError, KeyError, StopIteration):
         # A name that is no more; or a fault that let nothing be said.
         return None if name and code == 2 else f"verify {name or ''}".strip()
@@ -170,7 +175,7 @@ def attempt(tree: Tree, row: Row, reach: str, remember: bool = True) -> str | No
             return "build"
         if row.killer and remember and row.killer != "build" and (found := check(tree, row.killer)):
             return found
-        steps = []
+        steps: list[Callable[[], str | None]] = []
         if reach in ("near", "all") and (names := near(row)):
             steps.append(lambda: failing(tree, names, OF_ALL))
         if reach == "all":

@@ -465,3 +465,41 @@ def test_method_that_answers_what_it_was_not_asked_fails() -> None:
     assert [check.note for check in solved] == ["solved what has no closed form"] * len(solved)
     assert solved
     assert not any(check.passed for check in solved)
+
+
+def _altered(change: Callable[[Trajectory], Trajectory]) -> AbstractContextManager[Any]:
+    run = Program.run
+
+    def altered(self: Program, *rest: Any, **named: Any) -> Trajectory:
+        return change(run(self, *rest, **named))
+
+    return patch.object(Program, "run", altered)
+
+
+def test_step_and_component_that_are_off_the_scheme_are_named() -> None:
+    def off(run: Trajectory) -> Trajectory:
+        omega = run.omega.copy()
+        omega[-1, 1] *= 1.0 + 1e-9
+        return replace(run, omega=omega)
+
+    with _altered(off):
+        (check,) = verify(Selection(only=["schemes/runge-kutta/case-3"]))
+    assert not check.passed
+    assert check.note == "most at step 100, U2"
+
+
+def test_stop_by_another_variable_or_at_another_step_fails() -> None:
+    def renamed(run: Trajectory) -> Trajectory:
+        return run if run.stop is None else replace(run, stop=replace(run.stop, variable="V3"))
+
+    def later(run: Trajectory) -> Trajectory:
+        stop = run.stop and replace(run.stop, step=run.stop.step + 1)
+        return replace(run, stop=stop)
+
+    asked = Selection(only=["stops/case-3"])
+    assert all(check.passed for check in verify(asked))
+    for change in (renamed, later):
+        with _altered(change):
+            checks = list(verify(asked))
+        assert checks
+        assert not any(check.passed for check in checks)

@@ -359,3 +359,43 @@ def test_two_digits_of_a_number(number: float | None, text: str) -> None:
 def test_quotient_that_stopped_a_run_is_told(capsys: Capture) -> None:
     assert main(["run", "--case", "2", "--program", "runge-kutta"]) == 0
     assert "stopped at step 25 by V2: Lipschitz quotient 3.3e3 (" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (MemoryError(), 2, "not enough memory; take fewer steps"),
+        (NotBuiltError("not built"), 3, "not built"),
+    ],
+)
+def test_what_ends_a_run_has_an_exit_code(
+    error: BaseException, code: int, words: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def raises(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("pyharness.verbs.run.methods.solve", raises)
+    assert main([*RUN, "--method", "taylor"]) == code
+    assert capsys.readouterr().err == f"pyharness: {words}\n"
+
+
+def test_json_of_a_scene_and_of_drifts_is_that_of_the_findings(
+    capsys: Capture, tmp_path: Path
+) -> None:
+    path = tmp_path / "x.toml"
+    path.write_text(
+        "[body]\nmoments = [4, 3, 2]\n[initial]\nomega = [1, 2, 3]\n[torque]\n"
+        "sines = [{ amplitude = [1, 2, 3], frequency = 4 }]\n"
+        "cosines = [{ amplitude = [5, 6, 7], frequency = 8 }]\n"
+    )
+    assert main(["run", "--scene", str(path), "--program", "two-term", "--format", "json"]) == 0
+    torque = json.loads(capsys.readouterr().out)["scene"]["torque"]
+    assert torque["sines"] == [{"amplitude": [1, 2, 3], "frequency": 4}]
+    assert torque["cosines"] == [{"amplitude": [5, 6, 7], "frequency": 8}]
+    assert main([*COMPARE, "--program", "two-term", "--format", "json"]) == 0
+    for each in json.loads(capsys.readouterr().out)["programs"]:
+        # Energy is a square's mean by moments, momentum by their squares: no run keeps both alike.
+        assert each["energy_drift"] != each["momentum_drift"]
+        if each["listing"]["label"] == "corrected":
+            assert (each["order_state"], round(each["order"])) == ("as due", 2)

@@ -9,7 +9,7 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
 from pyharness.errors import TimedError
-from pyharness.methods import METHODS, SCIPY_METHODS, solve
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
 from pyharness.reference import reference
 from pyharness.scaling import scaled
 from pyharness.scipy_methods import RightHandSide
@@ -195,3 +195,31 @@ def test_time_of_a_refusal_in_a_span_whose_square_is_no_number(
     with pytest.raises(TimedError) as refusal:
         solve(scene, [1e-100], "rk45", 1e-9)
     assert 0.0 < refusal.value.time < 1e-100
+
+
+@pytest.mark.parametrize("power", [-700, 700])
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_solve_ivp_in_units_far_from_one(method: str, power: int) -> None:
+    """Products of such omegas are no numbers, or nothing."""
+    factor = math.ldexp(1.0, power)
+    scene = case_scene(4)
+    found = solve(scaled(scene, factor), [1.0 / factor], method, 1e-6).omega / factor
+    np.testing.assert_allclose(found, reference(scene, [1.0]).omega, rtol=0, atol=1e-5)
+
+
+def test_reference_has_steps_enough_for_some_turns() -> None:
+    scene = case_scene(3)
+    found = solve(scene, [40.0], "reference", 1e-15).omega[0]
+    closed = solve(scene, [40.0], "closed-form", 1e-14).omega[0]
+    np.testing.assert_allclose(found, closed, rtol=0, atol=1e-12)
+
+
+def test_orders_of_the_programs_are_those_of_their_schemes() -> None:
+    """Two points, or four, and one correction: order 2; eq. 31: order 4."""
+    orders = {name: program.order for name, program in PROGRAM_REGISTRY.items()}
+    assert orders == {"two-term": 2, "four-term": 2, "runge-kutta": 4}
+
+
+def test_steps_that_are_too_many_are_those_to_the_last_time() -> None:
+    with pytest.raises(InputError, match=r"rk4: 1e\+10 steps of 0\.01 s are too many"):
+        solve(case_scene(3), [1.0, 1e8], "rk4", 1.0)

@@ -503,3 +503,15 @@ def test_stop_by_another_variable_or_at_another_step_fails() -> None:
             checks = list(verify(asked))
         assert checks
         assert not any(check.passed for check in checks)
+
+
+@pytest.mark.parametrize("kind", ["schemes", "stops"])
+def test_run_without_its_last_row_fails(kind: str) -> None:
+    def shorter(run: Trajectory) -> Trajectory:
+        velocity = None if run.velocity is None else run.velocity[:-1]
+        return replace(run, omega=run.omega[:-1], velocity=velocity)
+
+    with _altered(shorter):
+        checks = list(verify(Selection(only=[f"{kind}/runge-kutta/case-3", f"{kind}/case-3"])))
+    assert checks
+    assert not any(check.passed for check in checks)

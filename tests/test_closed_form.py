@@ -351,3 +351,11 @@ def test_component_that_hardly_moves_is_rounded_once() -> None:
         time = 10 ** source.uniform(-1, 3)
         exact = exact_top(a, w, time)[2]
         assert abs(float((_at(a, w, time)[2] - exact) / exact)) <= 1.5 * _UNIT
+
+
+def test_what_the_sum_of_a_sphere_can_not_hold_is_added_at_the_end() -> None:
+    """Sixteen pushes, each a twentieth of a unit in the last place: two thirds of one."""
+    pushes = tuple(((0.0, 1e-17, 0.0), 0.0) for _ in range(16))
+    scene = Scene("", (0.0, 1.0, 0.0), moments=(1.0,) * 3, torque=TorqueLaw(cosines=pushes))
+    found = solve(scene, [1.0], "closed-form", 1e-9)
+    assert found.omega[0, 1] == 1.0 + 2.0**-52

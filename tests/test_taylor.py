@@ -265,3 +265,19 @@ def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
         found = solve(scene, times, "taylor", 1e-9)
         assert found.ended == "overflow"
         np.testing.assert_allclose(found.omega[:, 0], [1e308 * t for t in times if t < 1.7])
+
+
+@pytest.mark.parametrize(
+    ("kind", "number"), [("near the separatrix", 127), ("other units", 190), ("resonant", 153)]
+)
+def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number: int) -> None:
+    """Of 1500 draws those where a difference that is carried wrongly would have cost the most."""
+    generator = np.random.default_rng([11, list(NASTY).index(kind)])
+    for _ in range(number + 1):
+        scene, time = NASTY[kind](generator)
+    times = np.linspace(0.0, time, 33)[1:]
+    truth, *_ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-15)
+    scale = max(np.abs(truth).max(), *map(abs, scene.omega))
+    found, status, _ = _end(scene, time, 1e-3)
+    assert status == 0
+    assert np.abs(found - truth[:, -1]).max() <= 0.4e-3 * scale

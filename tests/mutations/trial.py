@@ -17,7 +17,7 @@ NOT_HERE = ("tests/test_mutations.py",)
 OF_ONE_CHECK = 180.0  # s
 OF_ALL = 2400.0  # s
 NEAR = {
-    "fortran/modern/taylor.f90": ("taylor", "solver", "methods"),
+    "fortran/modern/taylor.f90": ("taylor", "solver", "methods", "stress_motions"),
     "fortran/modern/taylor_plan.f90": ("taylor", "solver", "methods"),
     "fortran/modern/euler_equations.f90": ("taylor", "solver", "methods"),
     "fortran/modern/levels.c": ("taylor", "quick", "solver", "build"),

@@ -15,13 +15,16 @@ FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
 # What the tests and the linters need beyond what the project itself does.
 TEST_PACKAGES := $(shell sed -n '/^test = \[/,/^\]/s/^ *"\(.*\)",/\1/p' pyproject.toml)
 
-.PHONY: compare test cross-check wheel lint format clean FORCE
+.PHONY: compare test mutate cross-check wheel lint format clean FORCE
 
 compare: .venv/ready
 	@$(BIN)/python -m pyharness compare --case $(CASE) $(ARGS)
 
 test: .venv/ready-to-test
 	@$(BIN)/python -m pytest -q $(ARGS)
+
+mutate: .venv/ready-to-test
+	@$(BIN)/python -m tests.mutations $(ARGS)
 
 cross-check: .venv/ready-to-test
 	@FC=$(FC) $(BIN)/python -m tests.cross $(ARGS)

@@ -2,16 +2,18 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pyharness import InputError, case_scene
-from pyharness.ablation import effects_of, entries, entry, lattice
+from pyharness import InputError, Scene, case_scene
+from pyharness.ablation import Effect, effects_of, entries, entry, lattice
 from pyharness.apparatus_tables import lattice_table
 from pyharness.cli import main
+from pyharness.listing import Listing, names_of, original
 from pyharness.listing import entries as flagged
-from pyharness.listing import names_of
+from pyharness.reference import Reference
 
 Capture = pytest.CaptureFixture[str]
 KINDS = {"defect", "reading", "misreading", "dialect", "dead code", "missing text"}
@@ -163,3 +165,19 @@ def test_limits_on_the_command_line(capsys: Capture) -> None:
 
 def test_flagged_entries_are_those_of_the_listing() -> None:
     assert {each["id"] for each in flagged()} == {e["id"] for e in entries() if "flag" in e}
+
+
+def test_overflow_near_the_truth_is_worse_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the rows before it are near the truth."""
+    scene = replace(case_scene(3), steps=2)
+    sizes = iter([(0.5, "complete"), (0.1, "overflow"), (0.7, "complete"), (0.6, "stopped")])
+
+    def effect(scene: Scene, listing: Listing, truth: Reference) -> Effect:
+        size, ended = next(sizes)
+        return Effect(listing, size, 0.0, 2, ended, None)
+
+    monkeypatch.setattr("pyharness.ablation.effect", effect)
+    monkeypatch.setattr("pyharness.ablation.names_of", lambda kind, program: ("a", "b"))
+    monkeypatch.setattr("pyharness.ablation.Listing", lambda *_: original("two-term"))
+    found = lattice(scene, "two-term")
+    assert [each.omega for each in found] == [0.1, 0.7, 0.6, 0.5]

@@ -15,6 +15,7 @@ from pyharness import case_scene, kernels
 from pyharness.cli import main
 from pyharness.errors import NotBuiltError
 from pyharness.listing import original
+from pyharness.tables import short
 
 Capture = pytest.CaptureFixture[str]
 
@@ -320,3 +321,81 @@ def test_rooms_are_entered_only_when_needed(tmp_path: Path) -> None:
         " if m in sys.modules])"
     )
     assert _python("-c", code, str(tmp_path / "x")).stdout == "[]\n"
+
+
+def test_rows_that_are_shown_are_the_first_and_the_last(capsys: Capture) -> None:
+    assert main([*RUN, "--program", "two-term", "--steps", "300"]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    steps = [int(line[0]) for line in lines if line and line[0].isdigit()]
+    assert steps == [*range(1, 11), *range(291, 301)]
+
+
+@pytest.mark.parametrize(("method", "tolerance"), [("taylor", "1e-09"), ("gauss-1", "1e-08")])
+def test_tolerance_is_a_billionth_where_none_is_given(
+    method: str, tolerance: str, capsys: Capture
+) -> None:
+    assert main([*RUN, "--method", method, "--times", "0.1"]) == 0
+    assert f"tolerance {tolerance}" in capsys.readouterr().out
+
+
+def test_constant_of_the_stop_test_reaches_compare(capsys: Capture) -> None:
+    options = ["--case", "2", "--program", "runge-kutta", "--format", "json"]
+    for constant, steps in ((500.0, 25), (1e9, 100)):
+        assert main(["compare", *options, "--lipschitz", str(constant)]) == 0
+        record = json.loads(capsys.readouterr().out)
+        assert record["lipschitz"] == constant
+        assert record["programs"][0]["steps"] == steps
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(1.23e-3, "1.2e-3"), (-9.96e12, "-1.0e13"), (1.0, "1.0e0"), (0.0, "0"), (None, "-"),
+     (float("inf"), "inf"), (float("-inf"), "-inf"), (float("nan"), "nan")],
+)  # fmt: skip
+def test_two_digits_of_a_number(number: float | None, text: str) -> None:
+    assert short(number) == text
+
+
+def test_quotient_that_stopped_a_run_is_told(capsys: Capture) -> None:
+    assert main(["run", "--case", "2", "--program", "runge-kutta"]) == 0
+    assert "stopped at step 25 by V2: Lipschitz quotient 3.3e3 (" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (MemoryError(), 2, "not enough memory; take fewer steps"),
+        (NotBuiltError("not built"), 3, "not built"),
+    ],
+)
+def test_what_ends_a_run_has_an_exit_code(
+    error: BaseException, code: int, words: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def raises(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("pyharness.verbs.run.methods.solve", raises)
+    assert main([*RUN, "--method", "taylor"]) == code
+    assert capsys.readouterr().err == f"pyharness: {words}\n"
+
+
+def test_json_of_a_scene_and_of_drifts_is_that_of_the_findings(
+    capsys: Capture, tmp_path: Path
+) -> None:
+    path = tmp_path / "x.toml"
+    path.write_text(
+        "[body]\nmoments = [4, 3, 2]\n[initial]\nomega = [1, 2, 3]\n[torque]\n"
+        "sines = [{ amplitude = [1, 2, 3], frequency = 4 }]\n"
+        "cosines = [{ amplitude = [5, 6, 7], frequency = 8 }]\n"
+    )
+    assert main(["run", "--scene", str(path), "--program", "two-term", "--format", "json"]) == 0
+    torque = json.loads(capsys.readouterr().out)["scene"]["torque"]
+    assert torque["sines"] == [{"amplitude": [1, 2, 3], "frequency": 4}]
+    assert torque["cosines"] == [{"amplitude": [5, 6, 7], "frequency": 8}]
+    assert main([*COMPARE, "--program", "two-term", "--format", "json"]) == 0
+    for each in json.loads(capsys.readouterr().out)["programs"]:
+        # Energy is a square's mean by moments, momentum by their squares: no run keeps both alike.
+        assert each["energy_drift"] != each["momentum_drift"]
+        if each["listing"]["label"] == "corrected":
+            assert (each["order_state"], round(each["order"])) == ("as due", 2)

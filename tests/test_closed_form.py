@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
+from pyharness.errors import TimedError
 from pyharness.kernels import extension
 from pyharness.methods import METHODS, solve
 from pyharness.reference import reference
@@ -291,3 +292,70 @@ def test_end_alone_and_rows_give_the_same_bits_in_any_thread() -> None:
     count = len(tops)
     np.testing.assert_array_equal(rows[:count], rows[count : 2 * count])
     np.testing.assert_array_equal(rows[:count], rows[2 * count :][::-1])
+
+
+@pytest.mark.parametrize("radians", [1e9, 1e11, 1e12, 1e13, 1e14, 4e14])
+def test_error_does_not_depend_on_the_phase(radians: float) -> None:
+    """Up to 1e15 radians, where the phase itself has no digit left: frequencies have two words."""
+    source = random.Random(str(radians))
+    for _ in range(8):
+        a = (source.uniform(0.1, 1.0), -source.uniform(0.1, 1.0), source.uniform(0.1, 1.0))
+        w = (source.uniform(0.5, 2.0), source.uniform(-2.0, 2.0), source.uniform(0.5, 2.0))
+        time = source.choice((-1.0, 1.0)) * radians
+        exact = exact_top(a, w, time)
+        assert _error(_at(a, w, time), exact, w) <= _BOUND, (a, w, time)
+    # Further on it is refused, and not before.
+    scene = Scene("", w, coefficients=a)
+    with pytest.raises(TimedError, match=r"at t = 1e\+16 s the phase"):
+        solve(scene, [radians, 1e16, 1e17], "closed-form", 1e-9)
+
+
+@pytest.mark.parametrize("time", [0.5, 2.0, 10.0, 30.0, 300.0, -1000.0])
+def test_small_components_beside_the_separatrix_keep_their_digits(time: float) -> None:
+    """A = C, omega1 = omega3: they fall by exp(-phase), whose rounding they would multiply."""
+    omega = (1.0, 0.3, 1.0)
+    with mpmath.workdps(DIGITS):
+        size = mpmath.sqrt(mpmath.mpf(1) / 2 + mpmath.mpf(0.3) ** 2 / 4)
+        phase = mpmath.atanh(mpmath.mpf(0.3) / 2 / size) - size / 2 * mpmath.mpf(time)
+        exact = size * mpmath.sqrt(2) / mpmath.cosh(phase)
+        found = _at((0.25, -0.5, 0.25), omega, time)
+        assert abs(float((found[0] - exact) / exact)) <= 4 * _UNIT
+
+
+@pytest.mark.parametrize("disturbance", [1e-20, 1e-50, 1e-100, 1e-119])
+@pytest.mark.parametrize("time", [0.5, -7.0])
+def test_faint_disturbances_grow_as_they_should(disturbance: float, time: float) -> None:
+    """D cosh and d sinh: what is left out is of third order."""
+    a, c = 1.0, 0.5
+    rate = math.sqrt(a * c)
+    found = _at((a, -1.0, c), (disturbance, 1.0, 0.0), time)
+    np.testing.assert_allclose(
+        found,
+        [
+            disturbance * math.cosh(rate * time),
+            1.0,
+            disturbance * math.sqrt(c / a) * math.sinh(rate * time),
+        ],
+        rtol=2e-15,
+        atol=0.0,
+    )
+
+
+def test_component_that_hardly_moves_is_rounded_once() -> None:
+    """Of a nearly round body only what omega3 has fallen by is reckoned, not 1 less a little."""
+    source = random.Random(9)
+    for _ in range(200):
+        difference = 10 ** source.uniform(-12, -1)
+        a = (0.5, -0.5 * (1.0 + difference), 0.5 * difference)
+        w = (source.uniform(0.1, 1.0), source.uniform(0.1, 1.0), source.uniform(1.0, 3.0))
+        time = 10 ** source.uniform(-1, 3)
+        exact = exact_top(a, w, time)[2]
+        assert abs(float((_at(a, w, time)[2] - exact) / exact)) <= 1.5 * _UNIT
+
+
+def test_what_the_sum_of_a_sphere_can_not_hold_is_added_at_the_end() -> None:
+    """Sixteen pushes, each a twentieth of a unit in the last place: two thirds of one."""
+    pushes = tuple(((0.0, 1e-17, 0.0), 0.0) for _ in range(16))
+    scene = Scene("", (0.0, 1.0, 0.0), moments=(1.0,) * 3, torque=TorqueLaw(cosines=pushes))
+    found = solve(scene, [1.0], "closed-form", 1e-9)
+    assert found.omega[0, 1] == 1.0 + 2.0**-52

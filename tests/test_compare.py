@@ -12,7 +12,7 @@ import pytest
 
 from pyharness import InputError, case_scene
 from pyharness import compare as room
-from pyharness.agreement import accuracy, ulps
+from pyharness.agreement import accuracy, differences, distance, ulps
 from pyharness.build import build
 from pyharness.compare import compare, listings_for
 from pyharness.comparison_tables import (
@@ -21,7 +21,7 @@ from pyharness.comparison_tables import (
     comparison_table,
     verdict,
 )
-from pyharness.listing import corrected
+from pyharness.listing import corrected, original, subset
 from pyharness.methods import PROGRAM_REGISTRY, SCIPY_METHODS
 from pyharness.plots import comparison_picture
 from pyharness.records import comparison_record, json_text
@@ -129,6 +129,14 @@ def test_accuracy_against_known_numbers() -> None:
     stretched = accuracy(scene, _trajectory(truth.omega * 1.01), truth)
     assert stretched.energy == pytest.approx(0.0201)
     assert stretched.momentum == pytest.approx(0.0201)
+    # Along axis 3 alone: the drifts are its shares of I w**2 and of I**2 w**2.
+    along = accuracy(scene, _trajectory(truth.omega * [1.0, 1.0, 1.01]), truth)
+    for drift, weights in (
+        (along.energy, np.array(scene.moments)),
+        (along.momentum, np.array(scene.moments) ** 2),
+    ):
+        parts = weights * np.square(truth.omega[-1])
+        assert drift == pytest.approx(0.0201 * parts[2] / parts.sum(), rel=1e-3)
 
 
 def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -198,3 +206,48 @@ def test_diverging_program_leaves_the_picture_whole(tmp_path: Path) -> None:
     """Case 6 reaches 1e111; no warning, no empty frame."""
     found = compare(case_scene(6), listings_for())
     assert len(comparison_picture(found, str(tmp_path / "x.png"))) == 2
+
+
+def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its order is nobody's due, and its steps are those that were run."""
+    monkeypatch.setattr(room, "_seconds", lambda run: 1.0)
+    listings = [corrected("two-term", ["c1-for-c"]), original("runge-kutta")]
+    reading, punched = compare(case_scene(2), listings).programs
+    assert reading.listing.label == "corrected"
+    assert reading.order is None
+    assert reading.seconds_per_step == 1.0 / 100.0
+    assert (punched.trajectory.steps, punched.seconds_per_step) == (25, 1.0 / 25.0)
+    with pytest.raises(InputError, match="'dt-accumulates' is given to both"):
+        subset("two-term", None, ["dt-accumulates"], ["dt-accumulates"])
+
+
+def test_bits_of_all_that_a_program_returns_are_held() -> None:
+    run = PROGRAM_REGISTRY["runge-kutta"].run(case_scene(2), original("runge-kutta"))
+    assert run.velocity is not None
+    assert run.stop is not None
+    assert differences(run, run) == []
+    assert distance(run, run) == 0.0
+    velocity = run.velocity.copy()
+    velocity[3, 1] = np.nextafter(velocity[3, 1], math.inf)
+    stop = replace(run.stop, quotient=np.nextafter(run.stop.quotient, math.inf))
+    for changed, name, ulp in (
+        (replace(run, velocity=velocity), "velocity", 1.0),
+        (replace(run, stop=stop), "stop", 0.0),
+        (replace(run, recorded_time=np.nextafter(run.recorded_time, 9.0)), "TIME", 1.0),
+        (replace(run, time=np.nextafter(run.time, 9.0)), "time", 0.0),
+    ):
+        assert differences(run, changed) == [name]
+        assert distance(run, changed) == ulp
+    shorter = _trajectory(np.ones((3, 3)))
+    assert distance(shorter, _trajectory(np.ones((2, 3)))) == math.inf
+    printed = PROGRAM_REGISTRY["two-term"].run(case_scene(2), corrected("two-term"))
+    assert printed.ier is not None
+    assert differences(printed, replace(printed, ier=printed.ier + 129)) == ["IER"]
+
+
+def test_largest_error_of_a_row_is_that_of_its_worst_component() -> None:
+    scene = replace(case_scene(4), steps=2)
+    truth = reference(scene, scene.times())
+    off = np.array([[1e-3, 0.0, 0.0], [0.0, -2e-3, 1e-4]])
+    found = accuracy(scene, _trajectory(truth.omega + off), truth)
+    np.testing.assert_allclose(found.error, [1e-3, 2e-3], rtol=1e-9)

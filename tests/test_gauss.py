@@ -1,10 +1,12 @@
 """Gauss collocation: its table, its order, what it conserves, and the steps it chooses."""
 
 import importlib.util
+import math
 from concurrent.futures import ThreadPoolExecutor
 from decimal import Decimal, localcontext
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -186,3 +188,109 @@ def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
         found = solve(scene, [t_end], "gauss-8", 1e-10).omega[0]
         scale = max(np.abs(truth).max(), *map(abs, scene.omega))
         assert np.abs(found - truth).max() <= 1e-10 * scale
+
+
+@pytest.mark.parametrize("stages", [4, 5])
+def test_what_rounding_takes_off_is_carried_in_long_steps(stages: int) -> None:
+    """60 000 steps of a third of a radian: without any of the second words energy drifts."""
+    scene = case_scene(4)
+    moments = np.array(scene.moments)
+    rows = _end(scene, [300.0 * k for k in range(1, 61)], stages, 0.3)
+    for weight in (moments, moments**2):
+        start = weight @ np.array(scene.omega) ** 2
+        # Truncation of 8 stages' half the order is conserved too; what is left is rounding.
+        assert np.abs(rows**2 @ weight / start - 1.0).max() <= 6e-15
+
+
+def _counted(scene: Scene, times: list[float], stages: int, step: float) -> tuple[Array, int, int]:
+    """Return omega after the last good step with its time, the status, and the evaluations."""
+    _, reached, _, status, evaluations = extension().gauss_solution(
+        scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
+    )
+    return reached, status, evaluations
+
+
+@pytest.mark.parametrize("stages", _STAGES)
+def test_right_hand_sides_are_counted_at_every_node(stages: int) -> None:
+    """A rate that does not change is found, given its second word, and seen to stand."""
+    law = TorqueLaw((1.0, 2.0, 3.0))
+    sphere = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), torque=law)
+    _, status, evaluations = _counted(sphere, [0.5], stages, 0.5)
+    assert status == 0
+    assert evaluations in (2 * stages, 3 * stages)
+
+
+@pytest.mark.parametrize(("stages", "step"), [(1, 2.5), (2, 3.0), (3, 4.0), (4, 4.5), (5, 5.0)])
+def test_iterations_that_do_not_end_are_counted_and_no_more(stages: int, step: float) -> None:
+    scene = Scene("", (1.0, 1.0, 1.0), moments=(3.0, 2.0, 1.5))
+    assert _counted(scene, [step], stages, step)[1:] == (4, 60 * stages)
+
+
+def test_rates_of_the_last_step_spare_iterations() -> None:
+    scene = case_scene(5)
+    _, _, together = _counted(scene, [1.0], 4, 0.01)
+    # Every time asked for begins with a step of its own.
+    _, _, apart = _counted(scene, [0.01 * k for k in range(1, 101)], 4, 0.01)
+    assert together < 0.8 * apart
+
+
+def test_more_than_anyone_waits_for_is_refused_before_it_is_begun() -> None:
+    scene = case_scene(4)
+    _, status, evaluations = _counted(scene, [3e7], 8, 1.0)
+    assert (status, evaluations) == (4, 0)
+
+
+def test_time_that_was_reached_is_told() -> None:
+    """Omega = 1/(1 - t): after a first result at 0.5 the steps go on until near 1."""
+    scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    reached, status, _ = _counted(scene, [0.5, 2.0], 4, 0.01)
+    assert status != 0
+    assert 0.9 < reached[0] < 1.1
+
+
+def _watched(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
+    """Return the step and the evaluations of every call of the kernel, as they come."""
+    solution = extension().gauss_solution
+    calls: list[tuple[float, int]] = []
+
+    def watched(*arguments: Any) -> Any:
+        found = solution(*arguments)
+        calls.append((arguments[-1], found[-1]))
+        return found
+
+    room = SimpleNamespace(gauss_solution=watched)
+    monkeypatch.setattr("pyharness.modern.extension", lambda: room)
+    return calls
+
+
+def test_steps_and_right_hand_sides_of_all_tries_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = _watched(monkeypatch)
+    found = solve(case_scene(5), [0.5, 1.25], "gauss-3", 1e-9)
+    assert len(calls) > 2
+    assert found.evaluations == sum(evaluations for _, evaluations in calls)
+    assert found.steps == sum(math.ceil(length / calls[-1][0]) for length in (0.5, 0.75))
+
+
+def test_time_and_right_hand_sides_of_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = _watched(monkeypatch)
+    monkeypatch.setattr("pyharness.modern._MOST_EVALUATIONS", 50_000)
+    with pytest.raises(InputError) as refusal:
+        solve(case_scene(3), [10.0, 20.0], "gauss-2", 1e-11)
+    spent = sum(evaluations for _, evaluations in calls)
+    assert f"gauss-2 gave up at t = 20 s after {spent} right-hand sides;" in str(refusal.value)
+    assert spent > 25_000
+
+
+@pytest.mark.parametrize("parts", [3, 7, 10])
+def test_step_that_divides_the_time_but_for_rounding_is_not_cut_once_more(parts: int) -> None:
+    """A tenth is no binary fraction: 0.3/0.1 is below 3, and times over steps just above."""
+    law = TorqueLaw((1.0, 2.0, 3.0))
+    sphere = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), torque=law)
+    for time in (0.1 * parts, sum([0.1] * parts)):
+        one = _counted(sphere, [time], 1, time)[2]
+        assert _counted(sphere, [time], 1, 0.1)[2] <= one * parts
+    # Nor is a step longer than it may be.
+    scene = case_scene(3)
+    for whole, count in ((0.35, 4), (0.301, 4), (0.3, 3)):
+        found = _end(scene, [whole], 3, 0.1)
+        np.testing.assert_array_equal(found, _end(scene, [whole], 3, whole / count))

@@ -11,7 +11,7 @@ from pyharness import kernels
 from pyharness.agreement import differences, distance
 from pyharness.cells import all_cells, all_listings, cell_name
 from pyharness.listing import PROGRAMS, corrected, names_of, original, subset
-from pyharness.methods import PROGRAM_REGISTRY
+from pyharness.methods import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.orders import measured_order
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw
@@ -55,6 +55,15 @@ NASTY = {
             (0.0, 3.0, 0.5),
             (((1.0, 2.0, 3.0), 17.3), ((-4.0, 5.0, 6.0), 1e4)),
             (((7.0, -8.0, 9.0), 0.0),),
+        ),
+    ),
+    "more cosines than sines": Scene(
+        "",
+        (0.1, 0.2, 0.3),
+        moments=(41.0, 39.0, 20.0),
+        torque=TorqueLaw(
+            sines=(((1.0, 2.0, 3.0), 17.3),),
+            cosines=(((7.0, -8.0, 9.0), 11.0), ((-4.0, 5.0, 6.0), 3.0)),
         ),
     ),
     "singular matrix": Scene("", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0), step_size=1e-8),
@@ -275,3 +284,33 @@ def test_calls_release_the_gil_and_give_the_same_bits_from_many_threads() -> Non
     with ThreadPoolExecutor(4) as pool:
         runs = list(pool.map(lambda _: kernels.run(scene, listing), range(64)))
     assert all(differences(run, wanted) == [] for run in runs)
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_overflow_of_any_one_component_ends_the_run(program: str, axis: int) -> None:
+    """The other two stand still, and stay finite, until they meet what is no number."""
+    coefficients, omega = [0.0] * 3, [1e160] * 3
+    coefficients[axis], omega[axis] = 1.0, 0.0
+    scene = Scene(
+        "", (omega[0], omega[1], omega[2]), coefficients=tuple(coefficients),  # type: ignore[arg-type]
+        step_size=1.0, steps=3,
+    )  # fmt: skip
+    for listing in (original(program), corrected(program)):
+        compiled, twin = (
+            PROGRAM_REGISTRY[program].run(scene, listing, language, may_stop=False)
+            for language in IMPLEMENTATIONS
+        )
+        assert differences(compiled, twin) == []
+        assert (compiled.ended, compiled.steps) == ("overflow", 0)
+
+
+@pytest.mark.parametrize("program", ["two-term", "four-term"])
+def test_ier_is_printed_where_the_matrix_is_singular(program: str) -> None:
+    scene = replace(case_scene(5), step_size=1e-17, steps=3)
+    compiled, twin = (
+        PROGRAM_REGISTRY[program].run(scene, corrected(program), language)
+        for language in IMPLEMENTATIONS
+    )
+    assert differences(compiled, twin) == []
+    np.testing.assert_array_equal(compiled.ier, [129] * 3)

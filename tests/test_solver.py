@@ -536,3 +536,11 @@ def test_auto_solves_what_the_closed_form_refuses() -> None:
     # And where both refuse, the reason is that of the closed form.
     with pytest.raises(InputError, match="the phase is beyond"):
         solve(case_scene(4), [1e18])
+
+
+def test_what_the_closed_form_gives_up_no_series_is_asked() -> None:
+    """It would need more steps than there may be: only what is refused is worth a series."""
+    scene = case_scene(4)
+    solver = prepare(scene)
+    assert np.isnan(solver(_omega(scene), 1e18)).all()
+    assert (solver.status, solver.steps) == ("gave up", 0)

@@ -4,7 +4,7 @@ import datetime
 import json
 import math
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -18,15 +18,17 @@ import pytest
 from pyharness import facts as facts_room
 from pyharness import kernels, self_test, verify_programs
 from pyharness.cells import all_cells, cell_name
-from pyharness.checks import bounded, selected
+from pyharness.checks import Check, bounded, selected
 from pyharness.cli import main
+from pyharness.errors import InputError
 from pyharness.golden import mathematics, read_record, update
-from pyharness.listing import PROGRAMS
+from pyharness.listing import PROGRAMS, corrected
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
 from pyharness.planted_twins import plant_in_twin
 from pyharness.plants import PLANTS, Plant
 from pyharness.random_scenes import draw, weekly_seed
 from pyharness.scene import Scene
+from pyharness.scene_file import case_scene
 from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.trajectory import Trajectory
 from pyharness.verify import KINDS, verify
@@ -421,3 +423,95 @@ def test_mistakes_are_told_in_one_line(
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert told in captured.err
+
+
+def test_what_both_languages_count_or_time_alike_is_held_to_what_is_due() -> None:
+    scene = case_scene(3)
+    program = PROGRAM_REGISTRY["two-term"]
+    run = program.run(scene, corrected("two-term"))
+
+    def passes(**changes: Any) -> bool:
+        changed = replace(run, **changes)
+        return verify_programs.agreement("x", "y", "two-term", scene, changed, changed).passed
+
+    assert passes()
+    for evaluations in (run.evaluations - 1, run.evaluations + 1):
+        assert not passes(evaluations=evaluations)
+    assert not passes(time=np.arange(1, run.steps + 1) * scene.step_size * (1.0 + 1e-15))
+
+
+def test_method_that_answers_what_it_was_not_asked_fails() -> None:
+    """Refused where it has to answer, other times, and a closed form where there is none."""
+
+    def checks(only: str, change: Callable[..., Trajectory]) -> list[Check]:
+        name = only.split("/")[1]
+        changed = replace(METHODS[name], solve=change)
+        with patch.dict(METHODS, {name: changed}):
+            return list(verify(Selection(only=[only])))
+
+    def refuses(*_: Any) -> Trajectory:
+        raise InputError("not today")
+
+    def other_times(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
+        run = METHODS["taylor"].solve(scene, times, tolerance)
+        return replace(run, time=np.nextafter(run.time, 9.0))
+
+    for change in (refuses, other_times):
+        found = checks("methods/gauss-4/case-3", change)
+        assert found
+        assert not any(check.passed for check in found)
+    assert all(check.passed for check in verify(Selection(only=["methods/closed-form/case-5"])))
+    solved = checks("methods/closed-form/case-5", METHODS["taylor"].solve)
+    assert [check.note for check in solved] == ["solved what has no closed form"] * len(solved)
+    assert solved
+    assert not any(check.passed for check in solved)
+
+
+def _altered(change: Callable[[Trajectory], Trajectory]) -> AbstractContextManager[Any]:
+    run = Program.run
+
+    def altered(self: Program, *rest: Any, **named: Any) -> Trajectory:
+        return change(run(self, *rest, **named))
+
+    return patch.object(Program, "run", altered)
+
+
+def test_step_and_component_that_are_off_the_scheme_are_named() -> None:
+    def off(run: Trajectory) -> Trajectory:
+        omega = run.omega.copy()
+        omega[-1, 1] *= 1.0 + 1e-9
+        return replace(run, omega=omega)
+
+    with _altered(off):
+        (check,) = verify(Selection(only=["schemes/runge-kutta/case-3"]))
+    assert not check.passed
+    assert check.note == "most at step 100, U2"
+
+
+def test_stop_by_another_variable_or_at_another_step_fails() -> None:
+    def renamed(run: Trajectory) -> Trajectory:
+        return run if run.stop is None else replace(run, stop=replace(run.stop, variable="V3"))
+
+    def later(run: Trajectory) -> Trajectory:
+        stop = run.stop and replace(run.stop, step=run.stop.step + 1)
+        return replace(run, stop=stop)
+
+    asked = Selection(only=["stops/case-3"])
+    assert all(check.passed for check in verify(asked))
+    for change in (renamed, later):
+        with _altered(change):
+            checks = list(verify(asked))
+        assert checks
+        assert not any(check.passed for check in checks)
+
+
+@pytest.mark.parametrize("kind", ["schemes", "stops"])
+def test_run_without_its_last_row_fails(kind: str) -> None:
+    def shorter(run: Trajectory) -> Trajectory:
+        velocity = None if run.velocity is None else run.velocity[:-1]
+        return replace(run, omega=run.omega[:-1], velocity=velocity)
+
+    with _altered(shorter):
+        checks = list(verify(Selection(only=[f"{kind}/runge-kutta/case-3", f"{kind}/case-3"])))
+    assert checks
+    assert not any(check.passed for check in checks)

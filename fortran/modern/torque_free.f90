@@ -247,6 +247,8 @@ contains
     end do
     ! What one more level would take off.
     orbit%frequency = mean
+    ! The low words count too: beyond 1e11 radians a square wrong by 1e-25 is seen.
+    half_difference = half_difference + 0.5_dp*(a_low - b_low)
     orbit%frequency_low = 0.5_dp*((b - (total - a)) + (a_low + b_low)) &
                           - half_difference*half_difference/(4.0_dp*mean)
   end subroutine climb

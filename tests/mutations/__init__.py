@@ -1,0 +1,1 @@
+"""Single changes to the sources, and which check catches each: run by `make mutate`."""

@@ -17,7 +17,7 @@ from pyharness.checks import REFUSED, Check, bounded, may_hold, selected
 from pyharness.errors import InputError
 from pyharness.external_file import UNITS, Problem, Value, problems, read_problem
 from pyharness.listing import PROGRAMS, corrected
-from pyharness.methods import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, finest, solve
+from pyharness.methods import METHODS, PROGRAM_REGISTRY, finest, solve
 from pyharness.plan import closed_form
 from pyharness.scene import Scene, TorqueLaw, Triple
 from pyharness.solver import prepare
@@ -91,7 +91,7 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
         ids = [f"external/{problem.name}/{value.time}/{method}" for value in values]
         if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
             continue
-        results, refusal = _as_far_as_solved(_solver(problem, method, rounding), values)
+        results, refusal = _as_far_as_solved(_solver(problem, method), values)
         for row, (id, value) in enumerate(zip(ids, values, strict=True)):
             if not selected(id, only):
                 continue
@@ -134,9 +134,7 @@ def _as_far_as_solved(
     return rows, ""
 
 
-def _solver(
-    problem: Problem, method: str, rounding: dict[str, Array]
-) -> Callable[[Sequence[Value]], list[_Result | None]]:
+def _solver(problem: Problem, method: str) -> Callable[[Sequence[Value]], list[_Result | None]]:
     """Return what solves a problem by a method, to the times of the values that it is given."""
     scene = problem.scene
 
@@ -146,8 +144,7 @@ def _solver(
                 _program(scene, float(value.time), method, _accuracy(problem, value))
                 for value in values
             ]
-        moved = [rounding[value.time] for value in values]
-        return [*_solved(scene, [float(value.time) for value in values], method, moved)]
+        return [*_solved(scene, [float(value.time) for value in values], method)]
 
     return solve
 
@@ -163,9 +160,7 @@ def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
     return method not in PROGRAMS or times[0] > 0.0
 
 
-def _solved(
-    scene: Scene, times: Sequence[float], method: str, rounding: Sequence[Array]
-) -> Iterator[_Result]:
+def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Result]:
     tolerance = _TOLERANCES.get(method, 0.0)
     if method != "quick":
         tolerance = max(tolerance, finest(method, scene, times[-1]))
@@ -179,13 +174,8 @@ def _solved(
         rows = np.array(found)
     else:
         rows = solve(scene, times, method, tolerance).omega
-    for omega, moved in zip(rows, rounding, strict=False):
-        size = np.full(3, _scale(scene, omega))
-        if method in SCIPY_METHODS:
-            # SciPy controls the error of a step; by the end the motion has made of it what it
-            # makes of a change of that size in the numbers of the problem.
-            size = np.maximum(size, moved / _ROUNDING)
-        yield _Result(omega, tolerance * size)
+    for omega in rows:
+        yield _Result(omega, np.full(3, tolerance * _scale(scene, omega)))
 
 
 def _program(scene: Scene, time: float, program: str, accuracy: float) -> _Result | None:

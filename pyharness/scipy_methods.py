@@ -26,6 +26,8 @@ RightHandSide = Callable[[float, Sequence[float]], list[float]]
 # grows. Measured on random scenes other than those that check it, with half as much again.
 _SUM = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 0.4}
+# Growth beyond which a tolerance is left to be multiplied by it, as it is by every method's.
+_SENSITIVE = 1e3
 # Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
 # place takes it for a constant torque, however small the differences that it sees.
 _WAVE_STEP = 2.0
@@ -79,7 +81,7 @@ class Ahead:
 
 def steps_sum(name: str, radians: float, growth: float) -> float:
     """Return what errors of steps of a method of SciPy add up to, in those of one step."""
-    return _SUM[name] + _SUM_A_RADIAN[name] * radians * growth
+    return _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
 
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:

@@ -339,7 +339,7 @@ def test_what_gives_up_later_is_judged_earlier(
 
 @pytest.mark.parametrize("time", ["-5", "20"])
 def test_a_long_motion_gets_the_tolerance_that_is_claimed_for_it(time: str, tmp_path: Path) -> None:
-    """LSODA claims its finest for 8 radians; a symmetric top turns by 5 a second."""
+    """A symmetric top turns by 5 radians a second, and a difference grows as it goes."""
     text = _GOOD.replace("[0.0, 1.0, 1.0]", "[0.0, 1.0, 10.0]").replace("-0.51", "0.0")
     text = text.replace("[1.0, -1.0,", "[0.5, -0.5,").replace('"20"', f'"{time}"')
     phase = 5 * float(time)
@@ -349,7 +349,8 @@ def test_a_long_motion_gets_the_tolerance_that_is_claimed_for_it(time: str, tmp_
     for check in external_checks([_read(tmp_path, text)], only):
         assert check.passed
         assert check.limit is not None
-        assert check.limit < 2e-10
+        # 4e-14 a step, 40 of them for 100 radians that grow as much, of 10 rad/s.
+        assert check.limit < 3e-9
 
 
 def test_a_far_time_leaves_the_excuse_of_a_near_one(

@@ -293,7 +293,7 @@ def test_overflow_of_any_one_component_ends_the_run(program: str, axis: int) -> 
     coefficients, omega = [0.0] * 3, [1e160] * 3
     coefficients[axis], omega[axis] = 1.0, 0.0
     scene = Scene(
-        "", (omega[0], omega[1], omega[2]), coefficients=tuple(coefficients),  # type: ignore[arg-type]
+        "", (omega[0], omega[1], omega[2]), coefficients=tuple(coefficients),
         step_size=1.0, steps=3,
     )  # fmt: skip
     for listing in (original(program), corrected(program)):

@@ -8,8 +8,7 @@ how far the motion goes, over which errors of steps add up; and how it multiplie
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,8 +54,7 @@ _RADAU_SHARE = 2
 _SHORTEST_SPAN = 2.0**-300
 
 
-@dataclass(frozen=True)
-class Ahead:
+class Ahead(NamedTuple):
     """What a scene makes of the errors of steps, as a coarse run sees it.
 
     Attributes
@@ -126,21 +124,15 @@ class _NoNumberError(Exception):
     """Linear algebra met what has left the range of numbers."""
 
 
-@dataclass
 class _Run:
     """Calls of `solve_ivp` for one scene and time; all their right-hand sides are counted."""
 
-    scene: Scene
-    end: float
-    name: str
-    effort: float = 1.0
-    evaluations: int = 0
-    unit: float = field(init=False)
-    rate: float = field(init=False)
-    most: int = field(init=False)
-    slopes: RightHandSide = field(init=False)
-
-    def __post_init__(self) -> None:
+    def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
+        self.scene = scene
+        self.end = end
+        self.name = name
+        self.effort = effort
+        self.evaluations = 0
         self.unit = _unit(self.end)
         self.rate = max(map(abs, self.scene.euler_coefficients))
         self.slopes = _in_units(self.scene.right_hand_side(), self.unit)

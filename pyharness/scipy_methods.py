@@ -109,8 +109,9 @@ def scipy_method(name: str) -> Solver:
             if tolerance < finest * (1.0 - 1e-9):
                 raise InputError(
                     f"tolerance is {tolerance:g}; {run.label} can't meet it over "
-                    f"{ahead.radians:.3g} radians in which small differences grow {ahead.growth:.3g} times; allowed "
-                    f"for this motion: {finest * 1.06:.2g} to 1, or a shorter time"
+                    f"{ahead.radians:.3g} radians in which small differences grow "
+                    f"{ahead.growth:.3g} times; allowed for this motion: {finest * 1.06:.2g} to 1, "
+                    "or a shorter time"
                 )
             total = steps_sum(name, ahead.radians, ahead.growth)
             if len(times) > 1:

@@ -187,7 +187,10 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     """
     law = scene.torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
-    sines, cosines = columns(law.sines), columns(law.cosines)
+    # A wave without amplitude has no effect, and would cost its sine and cosine.
+    sines, cosines = (
+        columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)
+    )
     with np.errstate(over="ignore"):
         sines[:3] /= moments[:, None]
         cosines[:3] /= moments[:, None]

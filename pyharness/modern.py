@@ -14,7 +14,6 @@ from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
 FIXED_STEP = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
-MOST_STAGES = 8
 
 # Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
 # as much as half of one.
@@ -209,8 +208,9 @@ def _first_step(scene: Scene, times: Sequence[float]) -> float:
     lengths = [abs(t1 - t0) for t0, t1 in itertools.pairwise((0.0, *times)) if t1 != t0]
     shortest = min(lengths, default=1.0)
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
-    for _, frequency in scene.torque.sines + scene.torque.cosines:
-        rate = max(rate, abs(frequency))
+    for amplitude, frequency in scene.torque.sines + scene.torque.cosines:
+        if any(amplitude):
+            rate = max(rate, abs(frequency))
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
 
 

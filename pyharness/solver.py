@@ -137,8 +137,8 @@ class Solver(BoundKernel):
 
         scene = replace(self._scene, omega=three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
-        # A method that goes in the scene's steps claims no other.
-        tolerance = 1.0 if METHODS[method].finest == 1.0 else self._tolerance
+        # What was prepared in the scene's steps has no tolerance of its own.
+        tolerance = max(self._tolerance, METHODS[method].finest)
         return solve_by_name(scene, times, method, tolerance, self._effort)
 
 
@@ -284,8 +284,6 @@ def _code(chosen: Plan, asked: str) -> int:
 
 def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
-    # A wave without amplitude has no effect, and would cost its sine and cosine.
-    sines, cosines = (waves[:, waves[:3].any(axis=0)] for waves in (sines, cosines))
     # Four places more than the waves need: the kernel names where the cosines would begin.
     packed = np.zeros(_WAVES_AT + sines.size + cosines.size + 4)
     packed[0] = code

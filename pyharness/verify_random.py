@@ -14,7 +14,7 @@ from pyharness.checks import REFUSED, Check, Sample
 from pyharness.conditioning import along
 from pyharness.errors import InputError
 from pyharness.integer_series import integer_series
-from pyharness.methods import METHODS, SCIPY_METHODS, solve
+from pyharness.methods import METHODS, SCIPY_METHODS, finest, solve
 from pyharness.plan import FINEST_QUICK, closed_form
 from pyharness.random_scenes import Draw, draw
 from pyharness.selection import Selection
@@ -180,5 +180,8 @@ def _may_refuse(method: str, drawn: Draw, truth: Truth) -> bool:
     """
     if method in ("auto", "closed-form"):
         return False
-    hard = drawn.scene.name in _MAY_REFUSE or truth.growth > _CALM
-    return hard or method == "quick" or method in SCIPY_METHODS
+    if drawn.scene.name in _MAY_REFUSE or truth.growth > _CALM or method == "quick":
+        return True
+    if method not in SCIPY_METHODS:
+        return False
+    return finest(method, drawn.scene, truth.times[-1]) > drawn.tolerance(METHODS[method].finest)

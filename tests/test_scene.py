@@ -163,5 +163,5 @@ def test_name_is_short_and_vectors_have_three_numbers(tmp_path: Path) -> None:
     assert read_scene(path).name == ("long " * 12).strip() or len(read_scene(path).name) == 60
     for numbers in ("1, 2", "1, 2, 3, 4", ""):
         path.write_text(text % ("x", numbers))
-        with pytest.raises(InputError, match="omega must be a list of three numbers"):
+        with pytest.raises(InputError, match="omega: 2 numbers; allowed: three numbers"):
             read_scene(path)

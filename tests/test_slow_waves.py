@@ -129,3 +129,32 @@ def test_spin_that_turns_too_often_is_no_overflow(method: str) -> None:
     """A steady spin grows nowhere: it is its phase that has no digit left."""
     with pytest.raises(InputError, match=r"gave up at t = .*radians the phase"):
         solve(Scene("steady", (0.0, 0.0, 1.0), BODY), [1e15], method, 1e-6)
+
+
+@pytest.mark.parametrize("method", ["taylor", "gauss-4", "dop853", "auto"])
+@pytest.mark.parametrize("frequency", [1e50, 1e200])
+def test_wave_without_amplitude_is_none(method: str, frequency: float) -> None:
+    still = Scene("still", (0.0, 1.0, 1.0), BODY, torque=TorqueLaw(constant=(1.0, 0.0, 0.0)))
+    waves = TorqueLaw((1.0, 0.0, 0.0), sines=((REST, frequency),), cosines=((REST, frequency),))
+    found = solve(Scene("still", still.omega, BODY, torque=waves), [1.0], method, 1e-9)
+    assert _errs(found.omega[0], still, 1.0) <= 1e-9
+
+
+@pytest.mark.parametrize("method", ["dop853", "lsoda"])
+def test_long_spin_up_from_a_faint_start_is_no_overflow(method: str) -> None:
+    scene = Scene("spin", (0.0, 0.0, 1e-9), BODY, torque=TorqueLaw((0.0, 0.0, 1.0)))
+    with pytest.raises(InputError, match="gave up"):
+        solve(scene, [1e8], method, 1e-6)
+
+
+def test_rows_on_the_way_keep_the_tolerance_too() -> None:
+    """They are read off a polynomial in a step, which errs more than the step's end."""
+    generator = np.random.default_rng(7)
+    for _ in range(6):
+        law = TorqueLaw(tuple(generator.normal(size=3) * 60.0))
+        scene = Scene("rows", tuple(generator.normal(size=3) * 3.0), BODY, torque=law)
+        times = np.linspace(0.0, 1.1, 31)[1:].tolist()
+        path = integer_series(scene, times)
+        for method in ("dop853", "rk45"):
+            found = solve(scene, times, method, 5e-4).omega
+            assert np.abs(found - path.omega).max() <= 5e-4 * np.abs(path.way).max()

@@ -18,7 +18,7 @@ Waves = Iterable[tuple[Numbers, Number]]
 
 # A result row in binary64 with IER, once in the kernel and once in the trajectory.
 _BYTES_PER_STEP = 2 * (8 * 8 + 4)
-# The kernels count steps and right-hand sides, five a step at the most, in 32 bits.
+# The compiled programs count steps and right-hand sides, five a step at the most, in 32 bits.
 _COUNTABLE_STEPS = 400_000_000
 _LONGEST_NAME = 60
 

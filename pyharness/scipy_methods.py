@@ -116,8 +116,8 @@ def scipy_method(name: str) -> Solver:
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
         ended = "complete" if count == len(times) else "overflow"
-        # The result does not carry the steps taken; right-hand sides are what it counts.
-        return rows_trajectory(times[:count], rows[:count], int(result.nfev), len(times), ended)
+        # The result does not carry the steps taken; right-hand sides are what is counted.
+        return rows_trajectory(times[:count], rows[:count], run.evaluations, len(times), ended)
 
     return solve
 

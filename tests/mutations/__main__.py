@@ -85,12 +85,13 @@ def _all(
     # In an order that has nothing to do with the outcome: those tried first are a fair sample.
     queue = deque(sorted(asked, key=lambda row: (not row.compiled, zlib.crc32(row.id.encode()))))
     known = [] if options.all_checks else [row.killer for row in asked if row.killer]
+    unchanged = Tree(folder / "unchanged", processes)
     lock = Lock()
     verdicts: list[Verdict] = []
 
     def work(job: int) -> None:
         tree = Tree(folder / str(job), processes)
-        if job == 0 and (false := false_killers(tree, known)):
+        if job == 0 and (false := false_killers(unchanged, known)):
             raise SystemExit(f"fails though nothing is changed: {', '.join(false)}")
         while True:
             with lock:
@@ -99,7 +100,7 @@ def _all(
                 row = queue.popleft() if job % 2 == 0 else queue.pop()
             begin = time.perf_counter()
             reach = options.survivors if row.lives and options.reach == "all" else options.reach
-            killer = attempt(tree, row, reach, not options.all_checks)
+            killer = attempt(tree, unchanged, row, reach, not options.all_checks)
             verdict = Verdict(row, killer, time.perf_counter() - begin)
             with lock:
                 verdicts.append(verdict)

@@ -182,8 +182,13 @@ def check(tree: Tree, killer: str) -> str | None:
     return killer if found else None
 
 
-def attempt(tree: Tree, row: Row, reach: str, remember: bool = True) -> str | None:
-    """Return what catches a row; `reach` is "killer", "near" or "all"."""
+def attempt(
+    tree: Tree, unchanged: Tree, row: Row, reach: str, remember: bool = True
+) -> str | None:
+    """Return what catches a row; `reach` is "killer", "near" or "all".
+
+    What fails in a copy that is `unchanged` too says nothing.
+    """
     said = tree.change(row)
     try:
         if said is not None:
@@ -198,21 +203,18 @@ def attempt(tree: Tree, row: Row, reach: str, remember: bool = True) -> str | No
         if reach == "all":
             steps += [lambda: failing(tree, [], OF_ALL), lambda: verification(tree)]
         for step in steps:
-            if (found := step()) and _is_new(tree, row, found):
+            if (found := step()) and _is_new(unchanged, row, found):
                 return found
         return None
     finally:
         tree.restore(row)
 
 
-def _is_new(tree: Tree, row: Row, found: str) -> bool:
+def _is_new(unchanged: Tree, row: Row, found: str) -> bool:
     """Whether what failed passes without the change: else it says nothing."""
-    tree.restore(row)
-    tree.ready()
-    if check(tree, found) is None:
+    if check(unchanged, found) is None:
         return True
     print(f"{row.id}: {found} fails without the change too", file=sys.stderr)
-    tree.change(row)
     return False
 
 

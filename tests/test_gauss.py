@@ -253,8 +253,8 @@ def _watched(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
     solution = extension().gauss_solution
     calls: list[tuple[float, int]] = []
 
-    def watched(*arguments: Any) -> Any:
-        found = solution(*arguments)
+    def watched(*arguments: Any, **named: Any) -> Any:
+        found = solution(*arguments, **named)
         calls.append((arguments[-1], found[-1]))
         return found
 

@@ -27,6 +27,7 @@ CI = (
     "pyharness/agreement/tolerance-sense",
     "pyharness/scene_file/inertia-order",
 )
+FEW = 4
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -95,7 +96,8 @@ def _all(
             raise SystemExit(f"fails though nothing is changed: {', '.join(false)}")
         while True:
             with lock:
-                if not queue:
+                # For the last few a build of its own does not pay.
+                if not queue or (job and queue[-1].compiled and len(queue) <= FEW):
                     return
                 row = queue.popleft() if job % 2 == 0 else queue.pop()
             begin = time.perf_counter()

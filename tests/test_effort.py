@@ -1,5 +1,6 @@
 """Limits count the work, and each names the one option that lifts it, and how far."""
 
+import copy
 import re
 import time
 from collections.abc import Callable
@@ -110,6 +111,9 @@ def test_prepared_solver_has_the_limit_too(name: str) -> None:
     short = prepare(DRIVEN, name, tolerance, effort=1e-8)
     assert np.isnan(short(omega, 20.0)).all()
     assert short.status == "gave up"
+    other = copy.copy(short)
+    other(omega, 20.0)
+    assert other.status == "gave up"
     enough = prepare(DRIVEN, name, tolerance)
     enough(omega, 20.0)
     assert enough.status == "complete"

@@ -303,6 +303,8 @@ def test_overflow_of_any_one_component_ends_the_run(program: str, axis: int) -> 
         )
         assert differences(compiled, twin) == []
         assert (compiled.ended, compiled.steps) == ("overflow", 0)
+        alone = kernels.run(scene, listing, may_stop=False, velocity=False)
+        assert (alone.ended, alone.steps) == ("overflow", 0)
 
 
 @pytest.mark.parametrize("program", ["two-term", "four-term"])

@@ -89,7 +89,10 @@ NOT_NUMBERS: list[Any] = [
     [1.0], np.ones(1), object(), _Evil(), float("nan"), float("inf"), Decimal("sNaN"), TOO_LARGE,
     Fraction(TOO_LARGE), np.datetime64("2020"), 10**5000,
 ]  # fmt: skip
-NO_VECTORS = NOT_THREE + [(1.0, 2.0, x) for x in NOT_NUMBERS] + [np.zeros((3, 1)), np.zeros((1, 3))]
+NO_VECTORS = [
+    *NOT_THREE, *((1.0, 2.0, x) for x in NOT_NUMBERS), *((x, 2.0, 1.0) for x in NOT_NUMBERS),
+    np.zeros((3, 1)), np.zeros((1, 3)),
+]  # fmt: skip
 NO_WAVES: list[Any] = [
     None, 3.0, "abc", True, [3.0], [None], ["ab"], [()], [((1.0, 2.0, 3.0),)], np.zeros(3),
     [((1.0, 2.0, 3.0), 1.0, 2.0)], [{"amplitude": [1, 2, 3], "frequency": 1}], {(1, 2): 3},

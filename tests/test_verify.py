@@ -24,6 +24,7 @@ from pyharness.errors import InputError
 from pyharness.golden import mathematics, read_record, update
 from pyharness.listing import PROGRAMS, corrected
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
+from pyharness.orders import Order, State
 from pyharness.planted_twins import plant_in_twin
 from pyharness.plants import PLANTS, Plant
 from pyharness.random_scenes import draw, weekly_seed
@@ -32,6 +33,7 @@ from pyharness.scene_file import case_scene
 from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.trajectory import Trajectory
 from pyharness.verify import KINDS, verify
+from pyharness.verify_methods import _order
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
 
@@ -504,6 +506,11 @@ def test_stop_by_another_variable_or_at_another_step_fails() -> None:
             checks = list(verify(asked))
         assert checks
         assert not any(check.passed for check in checks)
+
+
+@pytest.mark.parametrize("state", ["misses", "unsettled", "singular", "sensitive", "unbounded"])
+def test_order_of_a_case_that_can_not_be_told_fails(state: State) -> None:
+    assert not _order("orders/x", Order(4, state, None, 0.01)).passed
 
 
 @pytest.mark.parametrize("kind", ["schemes", "stops"])

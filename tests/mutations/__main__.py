@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Lock
 
-from tests.mutations.table import Row, chosen, rows, update
+from tests.mutations.table import Row, chosen, page, rows, update
 from tests.mutations.tree import Processes, Stopped, Tree
 from tests.mutations.trial import Verdict, attempt, false_killers
 
@@ -40,6 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not asked:
         print(f"{' '.join(options.rows)}: no such row", file=sys.stderr)
         return 2
+    if options.page:
+        print(page(table), end="")
+        return 0
     if options.list:
         for row in asked:
             print(f"{row.id:60} {row.killer or row.lives or 'not yet tried'}")
@@ -73,6 +76,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--untried", action="store_true", help="only rows that nothing caught yet")
     parser.add_argument("--update", action="store_true", help="write down what caught each")
     parser.add_argument("--list", action="store_true", help="show the table and end")
+    parser.add_argument("--page", action="store_true", help="show the score of the record and end")
     parser.add_argument("--ci", action="store_true", help="four rows, for the gate")
     return parser.parse_args(arguments)
 

@@ -69,6 +69,21 @@ def chosen(table: list[Row], patterns: list[str]) -> list[Row]:
     return [row for row in table if any(fnmatchcase(row.id, f"*{each}*") for each in patterns)]
 
 
+def page(table: list[Row]) -> str:
+    """Return the score and all that nothing catches, as Markdown."""
+    alive = [row for row in table if row.killer is None]
+    lines = [
+        f"{len(table)} changes, {sum(row.compiled for row in table)} of them in compiled sources: "
+        f"{len(table) - len(alive)} are caught",
+        f"({100.0 * (1.0 - len(alive) / len(table)):.1f} %), {len(alive)} are not.",
+        "",
+        "| not caught | why |",
+        "|---|---|",
+    ]
+    lines += [f"| {row.id} | {row.lives or '-'} |" for row in alive]
+    return "\n".join(lines) + "\n"
+
+
 def update(news: dict[str, str | None], path: Path = CAUGHT) -> None:
     """Write what caught these rows, None where nothing did, into the record."""
     caught = tomllib.loads(path.read_text()) if path.exists() else {}

@@ -250,3 +250,10 @@ def test_precise_series_agrees_with_extrapolation_to_25_digits() -> None:
                     for i in range(len(column) - 1)
                 ]
             assert abs(column[0] - value) < mpmath.mpf("1e-25")
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_series_for_the_velocity_is_estimated_where_omega_is_known(number: int) -> None:
+    found = reference(case_scene(number), [1.0], velocity=True)
+    assert found.source == "known solution"
+    assert 0.0 < found.estimate < 1e-18

@@ -1,5 +1,6 @@
 """The methods of III.2: order, the formulas written out, steps that do not divide the time."""
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -84,6 +85,15 @@ def test_formulas_and_the_shortened_step(method: str, torque: TorqueLaw) -> None
     np.testing.assert_allclose(found.omega, wanted, rtol=0, atol=1e-12)
     assert found.steps == 6
     assert found.evaluations == 6 * (4 if method == "rk4" else 2)
+
+
+@pytest.mark.parametrize("method", FIXED_STEP)
+def test_torque_goes_on_where_many_steps_pause(method: str) -> None:
+    """A kernel looks now and then whether Ctrl-C came; the torque is then that of its time."""
+    law = TorqueLaw(cosines=(((0.0, 0.0, 1.0), 1.0),))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law, step_size=1e-5)
+    found = solve(scene, [5.0], method, 1.0)
+    assert abs(found.omega[0, 2] - math.sin(5.0)) < 1e-9
 
 
 @pytest.mark.parametrize("case", range(1, 8))

@@ -9,6 +9,7 @@ import pytest
 from pyharness import reference as room
 from pyharness.decimal_functions import sine_cosine
 from pyharness.errors import InputError
+from pyharness.integer_series import integer_series
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
@@ -257,3 +258,11 @@ def test_series_for_the_velocity_is_estimated_where_omega_is_known(number: int) 
     found = reference(case_scene(number), [1.0], velocity=True)
     assert found.source == "known solution"
     assert 0.0 < found.estimate < 1e-18
+
+
+def test_every_second_term_may_be_zero() -> None:
+    """From rest a constant torque makes omega odd in time."""
+    law = TorqueLaw((1.0, 2.0, 3.0))
+    scene = Scene("odd", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), torque=law)
+    wanted = integer_series(scene, [3.0]).omega
+    np.testing.assert_allclose(reference(scene, [3.0]).omega, wanted, rtol=1e-15)

@@ -165,3 +165,11 @@ def test_name_is_short_and_vectors_have_three_numbers(tmp_path: Path) -> None:
         path.write_text(text % ("x", numbers))
         with pytest.raises(InputError, match="omega must be a list of three numbers"):
             read_scene(path)
+
+
+def test_rate_alone_makes_a_torque_vary() -> None:
+    law = TorqueLaw(rate=(0.0, 0.0, 3.0))
+    scene = Scene("ramp", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    assert law.varies
+    assert not law.is_zero
+    assert scene.right_hand_side()(2.0, scene.omega) == [0.0, 0.0, 6.0]

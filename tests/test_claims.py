@@ -210,3 +210,10 @@ def test_weightings_within_ten_times_the_error_of_collocation_are_as_good(
         punched=False, truth=lambda case: SimpleNamespace(omega=np.ones((2, 3)))
     )
     assert others_failed(lab, {"cases": [3], "terms": [2]}).verdict == verdict
+
+
+def test_overflow_is_an_infinite_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    lab = Laboratory(False)
+    cut = SimpleNamespace(ended="overflow", omega=lab.truth(3).omega)
+    monkeypatch.setattr(Laboratory, "run", lambda *_: cut)
+    assert lab.error("two-term", 3) == float("inf")

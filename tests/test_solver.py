@@ -462,6 +462,7 @@ def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -
     assert not {"torque of time", "sines", "torque"} & plan(case_scene(7)).skipped
     assert "velocity" not in plan(case_scene(7), velocity=True).skipped
     assert "dense output" not in plan(case_scene(7), rows=True).skipped
+    assert "dense output" in plan(case_scene(3), rows=True).skipped
     assert plan(case_scene(7), tolerance=1e-6).method == "quick or taylor"
     assert plan(case_scene(7), tolerance=1e-6, rows=True).method == "taylor"
     for form in ("table", "json", "csv", "markdown"):

@@ -15,6 +15,7 @@ from pyharness.effort import suggested
 from pyharness.errors import InputError
 from pyharness.listing import corrected
 from pyharness.methods import PROGRAM_REGISTRY
+from pyharness.modern import FIXED_STEP
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw, Wave
 from pyharness.solver import PREPARED, prepare, solve
@@ -111,6 +112,9 @@ def test_prepared_solver_has_the_limit_too(name: str) -> None:
     short = prepare(DRIVEN, name, tolerance, effort=1e-8)
     assert np.isnan(short(omega, 20.0)).all()
     assert short.status == "gave up"
+    if name not in FIXED_STEP:
+        with pytest.raises(InputError, match="allow more work"):
+            short.trajectory(omega, [20.0])
     other = copy.copy(short)
     other(omega, 20.0)
     assert other.status == "gave up"

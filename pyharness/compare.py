@@ -104,7 +104,7 @@ def compare(
     may_stop : bool
         Whether the stop test may end a run.
     tolerance : float
-        What `solve_ivp` is asked for, relative to the largest angular velocity.
+        What `solve_ivp` is asked for, relative to the largest component of omega.
     effort : float
         Factor on the work of each of them after which it gives up.
 

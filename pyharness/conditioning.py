@@ -157,7 +157,8 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     return Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
-        storing=ROUNDING * float(gathered(np.abs(omega)).max()) / (span * largest),
+        # Not over their product, which may be too small a number.
+        storing=ROUNDING * float(gathered(np.abs(omega)).max()) / span / largest,
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
     )

@@ -11,6 +11,7 @@ from typing import Protocol
 from pyharness.errors import InputError, unknown
 from pyharness.scene import Scene
 from pyharness.trajectory import Trajectory
+from pyharness.values import Number, number
 
 # Of a forecast: the pace so far is not that of the rest.
 _SLACK = 2.0
@@ -34,15 +35,11 @@ class Solver(Protocol):
         """Solve, or raise InputError."""
 
 
-def checked_effort(effort: float) -> float:
+def checked_effort(effort: Number) -> float:
     """Return the factor; InputError where it is no finite number above 0."""
-    try:
-        value = math.nan if isinstance(effort, str) else float(effort)
-        shown = repr(effort)
-    except (TypeError, ValueError, OverflowError):
-        value, shown = math.nan, "no such number"
+    value = number("effort", effort)
     if not 0.0 < value < math.inf:
-        raise InputError(f"effort: {shown}; allowed: a finite number above 0")
+        raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
     return value
 
 

@@ -35,6 +35,10 @@ class TimedError(InputError):
         self.time = time
         self._message = message
 
+    def __reduce__(self) -> tuple[type["TimedError"], tuple[str, float]]:
+        """Let it cross to another process, as multiprocessing hands it back."""
+        return type(self), (self._message, self.time)
+
     def slower(self, factor: float) -> "TimedError":
         """Return the error of a motion whose times are `factor` as long."""
         return TimedError(self._message, self.time * factor)

@@ -137,7 +137,8 @@ def taylor(
     times : sequence of float, shape (n,)
         Strictly monotonic away from 0, on one side of it (s); not checked.
     tolerance : float
-        Largest error at `times`, relative to the largest angular velocity.
+        Largest error of any component at `times`, relative to the largest from 0 to the last of
+        them.
     effort : float
         Factor on the work after which it gives up.
 

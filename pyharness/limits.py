@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pyharness.effort import advice
 from pyharness.errors import InputError
 from pyharness.listing import PROGRAMS, names_of, original, subset
 from pyharness.methods import PROGRAM_REGISTRY
 from pyharness.reference import Reference, reference
 from pyharness.scene import Scene
-from pyharness.scipy_methods import first_scale
 from pyharness.trajectory import Array
 
 _TOLERANCE = 1e-11
@@ -70,7 +70,7 @@ class Limit:
     order: float
 
 
-def limit(program: str, scene: Scene, halvings: int = 6) -> Limit:
+def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Hold a program as punched, without its stop test, against its limit.
 
     Parameters
@@ -82,15 +82,22 @@ def limit(program: str, scene: Scene, halvings: int = 6) -> Limit:
         Runge-Kutta program's is found from its limit equations.
     halvings : int
         How often the step is halved.
+    effort : float
+        Factor on the work that is done before giving up.
+
+    Raises
+    ------
+    InputError
+        Where that is not enough.
     """
     times = scene.times()
-    truth = reference(scene, times)
-    wanted, tends_to = _limit_solution(program, scene, times, truth)
+    truth = reference(scene, times, effort=effort)
+    wanted, tends_to = _limit_solution(program, scene, times, truth, effort)
     found = []
     for parts in (2**k for k in range(halvings + 1)):
         finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
         run = PROGRAM_REGISTRY[program].run(
-            finer, original(program), may_stop=False, velocity=False
+            finer, original(program), may_stop=False, velocity=False, effort=effort
         )
         omega = run.omega[parts - 1 :: parts]
         distances = []
@@ -104,22 +111,25 @@ def limit(program: str, scene: Scene, halvings: int = 6) -> Limit:
 
 
 def _limit_solution(
-    program: str, scene: Scene, times: Sequence[float], truth: Reference
+    program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
 ) -> tuple[Array, str]:
     """Return the limit at `times`, NaN where there is none, and its name."""
+    scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     if program == "runge-kutta":
         if not scene.torque.varies:
-            half = reference(scene, [t / 2.0 for t in times])
+            half = reference(scene, [t / 2.0 for t in times], effort=effort)
             return 2.0 * half.omega - np.array(scene.omega), TENDS_TO[program]
-        return _slow_slopes(scene, times), "w' = F(p, t) with p' = F(p, t) / 2, p(0) = w(0)"
+        return _slow_slopes(
+            scene, times, scale, effort
+        ), "w' = F(p, t) with p' = F(p, t) / 2, p(0) = w(0)"
     if scene.torque.varies:
         return np.full((len(times), 3), math.nan), NOTHING
     if program == "four-term":
         return truth.omega, TENDS_TO[program]
-    return _extrapolated(scene, times), TENDS_TO[program]
+    return _extrapolated(scene, times, scale, effort), TENDS_TO[program]
 
 
-def _extrapolated(scene: Scene, times: Sequence[float]) -> Array:
+def _extrapolated(scene: Scene, times: Sequence[float], scale: float, effort: float) -> Array:
     """Solve the limit equation of the two-term program.
 
     In step n the points are t/3 and 2t/3, t = n h, beyond the step's beginning. The slope there
@@ -134,10 +144,10 @@ def _extrapolated(scene: Scene, times: Sequence[float]) -> Array:
         quadratic = (a * f[1] * f[2], b * f[0] * f[2], c * f[0] * f[1])
         return [x - 2.0 / 9.0 * t * t * q for x, q in zip(f, quadratic, strict=True)]
 
-    return _solved(scene, rate, list(scene.omega), times)
+    return _solved(rate, list(scene.omega), times, scale, effort)
 
 
-def _slow_slopes(scene: Scene, times: Sequence[float]) -> Array:
+def _slow_slopes(scene: Scene, times: Sequence[float], scale: float, effort: float) -> Array:
     """Solve the limit equations of the Runge-Kutta program where the torque varies.
 
     U(1) = p gains h/2 F(p) a step, and the result gains h F(p): slopes are taken at a point that
@@ -149,28 +159,30 @@ def _slow_slopes(scene: Scene, times: Sequence[float]) -> Array:
         f = right_hand_side(t, state[:3])
         return [x / 2.0 for x in f] + f
 
-    return _solved(scene, rate, [*scene.omega, *scene.omega], times)[:, 3:]
+    return _solved(rate, [*scene.omega, *scene.omega], times, scale, effort)[:, 3:]
 
 
 def _solved(
-    scene: Scene,
     rate: Callable[[float, Sequence[float]], list[float]],
     start: list[float],
     times: Sequence[float],
+    scale: float,
+    effort: float,
 ) -> Array:
     """Return the solution at `times`; NaN from where it leaves every bound."""
     from scipy.integrate import solve_ivp
 
-    scale = first_scale(scene, times[-1]) or 1.0
     evaluations = 0
+    most = effort * _MOST_EVALUATIONS
 
     def counted(time: float, state: Sequence[float]) -> list[float]:
         nonlocal evaluations
         evaluations += 1
-        if evaluations > _MOST_EVALUATIONS:
+        if evaluations > most:
+            needed = effort * times[-1] / time if time else None
             raise InputError(
-                f"limits: no limit found beyond t = {time:.6g} s after {_MOST_EVALUATIONS} "
-                "right-hand sides; take fewer or smaller steps"
+                f"limits: no limit found beyond t = {time:.6g} s after {most:.0f} right-hand "
+                "sides; " + advice("take fewer or smaller steps", effort, needed)
             )
         return rate(time, state)
 

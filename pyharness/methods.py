@@ -140,7 +140,8 @@ def solve(
     method : str
         A name in `METHODS`.
     tolerance : float
-        Largest error at `times`, relative to the largest initial angular velocity.
+        Largest error of any component at `times`, relative to the largest from 0 to the last of
+        them.
     effort : float
         Factor on the work after which the method gives up.
 

@@ -56,6 +56,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"scene file: {kind_of(path)}; allowed: a path, as text or a Path")
+    path = os.fsdecode(path)
     where = f"scene file '{path}'"
     data = read_toml(path, where)
     try:

@@ -8,8 +8,7 @@ how far the motion goes, over which errors of steps add up; and how it multiplie
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +27,8 @@ _SUM = {"DOP853": 30.0, "RK45": 30.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 0.4}
 # Growth beyond which a tolerance is left to be multiplied by it, as it is by every method's.
 _SENSITIVE = 1e3
+# Rows on the way are read off a polynomial in each step, whose error is not controlled.
+_ROWS = 4.0
 # Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
 # place takes it for a constant torque, however small the differences that it sees.
 _WAVE_STEP = 2.0
@@ -47,6 +48,7 @@ _FEWEST_NODES, _MOST_NODES = 30, 20_000
 # A phase of so many radians has hardly a digit left in binary64. What still grows there is on
 # its way to infinity in finite time, and LSODA would never come back from it.
 _LARGEST_PHASE = 1e13
+_GROWN = 1e3  # times the first omega: it leaves every bound
 # Five to ten seconds of Python; each wave of a torque adds an eighth to what a right-hand side
 # costs, and Radau solves linear systems besides.
 _MOST_EVALUATIONS = 500_000
@@ -55,8 +57,7 @@ _RADAU_SHARE = 2
 _SHORTEST_SPAN = 2.0**-300
 
 
-@dataclass(frozen=True)
-class Ahead:
+class Ahead(NamedTuple):
     """What a scene makes of the errors of steps, as a coarse run sees it.
 
     Attributes
@@ -100,23 +101,39 @@ def scipy_method(name: str) -> Solver:
         run = _Run(scene, times[-1], name, effort)
         try:
             ahead = run.ahead()
+            if ahead.largest == 0.0:
+                # At rest, and nothing that would move it.
+                rest = np.zeros((len(times), 3))
+                return rows_trajectory(times, rest, run.evaluations, len(times), "complete")
             finest = ahead.finest(name)
             if tolerance < finest * (1.0 - 1e-9):
                 raise InputError(
-                    f"tolerance is {tolerance:g}; {name} can't meet it over {ahead.radians:.3g} "
-                    f"radians in which small differences grow {ahead.growth:.3g} times; allowed "
-                    f"for this motion: {finest * 1.06:.2g} to 1, or a shorter time"
+                    f"tolerance is {tolerance:g}; {run.label} can't meet it over "
+                    f"{ahead.radians:.3g} radians in which small differences grow "
+                    f"{ahead.growth:.3g} times; allowed for this motion: {finest * 1.06:.2g} to 1, "
+                    "or a shorter time"
                 )
-            step = max(_FINEST_STEP, tolerance / steps_sum(name, ahead.radians, ahead.growth))
+            total = steps_sum(name, ahead.radians, ahead.growth)
+            if len(times) > 1:
+                total *= _ROWS
+            step = max(_FINEST_STEP, tolerance / total)
             longest = _longest_step(scene, times[-1], step * ahead.largest)
             result = run.solved(name, step, step * ahead.largest, times, longest)
+            if result.status == 1 and _largest(result.y_events[0]) <= _GROWN * ahead.largest:
+                # No motion on its way to infinity: it turns, and no one can tell how far.
+                raise TimedError(
+                    f"{run.label} gave up at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
+                    "the phase has hardly a digit left; take a shorter time",
+                    float(result.t_events[0][0]) * run.unit,
+                )
         except _NoNumberError:
             return rows_trajectory([], np.empty((0, 3)), run.evaluations, len(times), "overflow")
         rows = result.y.T if len(result.t) else np.empty((0, 3))
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
         ended = "complete" if count == len(times) else "overflow"
-        # The result does not carry the steps taken; right-hand sides are what is counted.
+        # The result does not carry the steps taken; right-hand sides are what is counted, those of
+        # the coarse run too.
         return rows_trajectory(times[:count], rows[:count], run.evaluations, len(times), ended)
 
     return solve
@@ -126,26 +143,20 @@ class _NoNumberError(Exception):
     """Linear algebra met what has left the range of numbers."""
 
 
-@dataclass
 class _Run:
     """Calls of `solve_ivp` for one scene and time; all their right-hand sides are counted."""
 
-    scene: Scene
-    end: float
-    name: str
-    effort: float = 1.0
-    evaluations: int = 0
-    unit: float = field(init=False)
-    rate: float = field(init=False)
-    most: int = field(init=False)
-    slopes: RightHandSide = field(init=False)
-
-    def __post_init__(self) -> None:
+    def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
+        self.scene = scene
+        self.end = end
+        self.label = name.lower()
+        self.effort = effort
+        self.evaluations = 0
         self.unit = _unit(self.end)
         self.rate = max(map(abs, self.scene.euler_coefficients))
         self.slopes = _in_units(self.scene.right_hand_side(), self.unit)
         self.most = int(self.effort * _MOST_EVALUATIONS * 8 / (8 + waves(self.scene)))
-        if self.name == "Radau":
+        if name == "Radau":
             self.most //= _RADAU_SHARE
 
     def solved(
@@ -185,7 +196,7 @@ class _Run:
                 if "infs or NaNs" in str(error):
                     raise _NoNumberError from None
                 raise InputError(
-                    f"{self.name} gave up: {error}; take a shorter time, slower motion or smaller "
+                    f"{self.label} gave up: {error}; take a shorter time, slower motion or smaller "
                     "torques"
                 ) from None
 
@@ -193,7 +204,7 @@ class _Run:
         self.evaluations += 1
         if self.evaluations > self.most:
             raise TimedError(
-                f"{self.name} gave up at t = {{time}} s after {self.most} right-hand sides; "
+                f"{self.label} gave up at t = {{time}} s after {self.most} right-hand sides; "
                 + advice(
                     "take a shorter time or a larger tolerance",
                     self.effort,

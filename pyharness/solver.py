@@ -132,11 +132,14 @@ class Solver(BoundKernel):
         """
         from dataclasses import replace
 
+        from pyharness.methods import METHODS
         from pyharness.methods import solve as solve_by_name
 
         scene = replace(self._scene, omega=three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
-        return solve_by_name(scene, times, method, self._tolerance, self._effort)
+        # A method that goes in the scene's steps claims no other.
+        tolerance = 1.0 if METHODS[method].finest == 1.0 else self._tolerance
+        return solve_by_name(scene, times, method, tolerance, self._effort)
 
 
 def prepare(
@@ -151,7 +154,7 @@ def prepare(
     method : str
         A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
     tolerance : float
-        Largest error at the end over the largest angular velocity on the way; the methods with
+        Largest error of any component at the end, relative to the largest on the way; methods with
         a fixed step do not look at it. Where small differences grow by a factor K on the way, no
         method keeps less than some 1e-15 K.
     effort : float
@@ -205,7 +208,8 @@ def solve(
     method : str
         A name in `pyharness.methods.METHODS`.
     tolerance : float
-        Largest error at `times`, relative to the largest angular velocity.
+        Largest error of any component at `times`, relative to the largest from 0 to the last of
+        them.
     effort : float
         Factor on the work after which the method gives up: 1 is some ten seconds.
 

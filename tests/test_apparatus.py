@@ -172,7 +172,7 @@ def test_overflow_near_the_truth_is_worse_too(monkeypatch: pytest.MonkeyPatch) -
     scene = replace(case_scene(3), steps=2)
     sizes = iter([(0.5, "complete"), (0.1, "overflow"), (0.7, "complete"), (0.6, "stopped")])
 
-    def effect(scene: Scene, listing: Listing, truth: Reference) -> Effect:
+    def effect(scene: Scene, listing: Listing, truth: Reference, **_: object) -> Effect:
         size, ended = next(sizes)
         return Effect(listing, size, 0.0, 2, ended, None)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.integrate  # noqa: F401  (what Ctrl-C meets within its import may be lost)
 
 from pyharness import kernels
 from pyharness.kernels import extension, run

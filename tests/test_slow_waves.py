@@ -116,3 +116,16 @@ def test_rest_far_below_the_root_of_the_smallest_number(method: str) -> None:
     sine = ((120.0 * push, -60.0 * push, 80.0 * push), 2.0 * w / (push * time * time))
     scene = _driven(sines=(sine,))
     assert _errs(solve(scene, [time], method, 1e-9).omega[0], scene, time) <= 1e-9
+
+
+@pytest.mark.parametrize("method", [*SCIPY_METHODS, "taylor", "gauss-2", "auto", "reference"])
+def test_rest_that_nothing_moves_stays(method: str) -> None:
+    run = solve(Scene("rest", REST, BODY), [1.0, 2.0], method, 1e-6)
+    assert (run.ended, run.omega.tolist()) == ("complete", [[0.0, 0.0, 0.0]] * 2)
+
+
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_spin_that_turns_too_often_is_no_overflow(method: str) -> None:
+    """A steady spin grows nowhere: it is its phase that has no digit left."""
+    with pytest.raises(InputError, match=r"gave up at t = .*radians the phase"):
+        solve(Scene("steady", (0.0, 0.0, 1.0), BODY), [1e15], method, 1e-6)

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     tolerance = shared.positive(options.tolerance, "--tolerance", 1e-8)
     finest = max(METHODS[name].finest for name in SCIPY_METHODS)
     if not finest <= tolerance <= 1.0:
-        raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:g} to 1")
+        raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:.2g} to 1")
     if options.ablate:
         return _ablate(options, scene, form)
     if options.program not in (None, "runge-kutta"):

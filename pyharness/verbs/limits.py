@@ -17,6 +17,7 @@ def declare(parser: shared.Parser) -> None:
     shared.add_scene_options(parser)
     parser.add_argument("--program", metavar="P", help="this program only")
     parser.add_argument("--halvings", metavar="K", help="how often the step is halved (default 6)")
+    shared.add_effort_option(parser)
     parser.add_argument("--format", metavar="F", help=", ".join(shared.FORMATS))
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
 
@@ -32,7 +33,8 @@ def run(options: argparse.Namespace) -> int:
     if not 1 <= halvings <= 12:
         raise InputError(f"--halvings: {halvings}; allowed: 1 to 12")
     shared.check_outputs(options)
-    found = [limit(program, scene, halvings) for program in programs]
+    effort = shared.chosen_effort(options)
+    found = [limit(program, scene, halvings, effort) for program in programs]
     if form == "json":
         from dataclasses import asdict
 

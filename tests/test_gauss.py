@@ -265,10 +265,10 @@ def _watched(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
 
 def test_steps_and_right_hand_sides_of_all_tries_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = _watched(monkeypatch)
-    found = solve(case_scene(5), [0.5, 1.25], "gauss-3", 1e-9)
+    found = solve(case_scene(5), [0.5, 1.2], "gauss-3", 1e-9)
     assert len(calls) > 2
     assert found.evaluations == sum(evaluations for _, evaluations in calls)
-    assert found.steps == sum(math.ceil(length / calls[-1][0]) for length in (0.5, 0.75))
+    assert found.steps == sum(math.ceil(length / calls[-1][0]) for length in (0.5, 1.2 - 0.5))
 
 
 def test_time_and_right_hand_sides_of_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -455,8 +455,10 @@ def test_method_that_answers_what_it_was_not_asked_fails() -> None:
     def refuses(*_: Any) -> Trajectory:
         raise InputError("not today")
 
-    def other_times(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        run = METHODS["taylor"].solve(scene, times, tolerance)
+    def other_times(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        run = METHODS["taylor"].solve(scene, times, tolerance, effort)
         return replace(run, time=np.nextafter(run.time, 9.0))
 
     for change in (refuses, other_times):

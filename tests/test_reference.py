@@ -156,7 +156,7 @@ def test_solution_that_blows_up_ends_before(direction: float) -> None:
     np.testing.assert_allclose(found.omega, np.array([[2.0] * 3, [10.0] * 3]) * direction)
 
 
-@pytest.mark.parametrize("times", [[0.2, 0.1], [-1.0, 1.0], [0.5, 0.5]])
+@pytest.mark.parametrize("times", [[0.2, 0.1], [-1.0, 1.0], [-1.0, 2.0], [0.5, 0.5]])
 def test_times_must_lead_away_from_zero(times: list[float]) -> None:
     with pytest.raises(InputError, match="away from 0"):
         reference(case_scene(3), times)

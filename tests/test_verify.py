@@ -34,6 +34,7 @@ from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.trajectory import Trajectory
 from pyharness.verify import KINDS, verify
 from pyharness.verify_methods import _order
+from pyharness.verify_random import Truth, _may_refuse
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
 
@@ -525,3 +526,10 @@ def test_run_without_its_last_row_fails(kind: str) -> None:
         checks = list(verify(Selection(only=[f"{kind}/runge-kutta/case-3", f"{kind}/case-3"])))
     assert checks
     assert not any(check.passed for check in checks)
+
+
+@pytest.mark.parametrize("name", ["auto", "closed-form"])
+def test_choice_of_a_method_may_refuse_nothing(name: str) -> None:
+    sensitive = Truth([1.0], np.ones((1, 3)), 1.0, 1e6)
+    assert not _may_refuse(name, draw("x", 0), sensitive)
+    assert _may_refuse("taylor", draw("x", 0), sensitive)

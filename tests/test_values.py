@@ -353,3 +353,11 @@ def test_a_saved_scene_is_read_back_whatever_its_name(name: str, tmp_path: Path)
     scene = dataclasses.replace(PLAIN, name=name)
     path.write_text(scene_text(scene), encoding="utf-8")
     assert read_scene(path) == scene
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_imaginary_part_is_never_dropped() -> None:
+    """NumPy would drop it with a warning, which not everyone sees."""
+    for given in (np.complex128(3.0 + 1.0j), np.complex64(3.0)):
+        with pytest.raises(InputError):
+            Scene("x", (1.0, 2.0, given), moments=(3.0, 2.0, 1.0))  # type: ignore[arg-type]

@@ -361,3 +361,17 @@ def test_imaginary_part_is_never_dropped() -> None:
     for given in (np.complex128(3.0 + 1.0j), np.complex64(3.0)):
         with pytest.raises(InputError):
             Scene("x", (1.0, 2.0, given), moments=(3.0, 2.0, 1.0))  # type: ignore[arg-type]
+
+
+def test_number_of_more_range_is_too_large() -> None:
+    with pytest.raises(InputError, match="too large for binary64"):
+        Scene("x", (1.0, 2.0, Decimal("1e400")), moments=(3.0, 2.0, 1.0))  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).maxexp == 1024, reason="long double is a double here")
+def test_long_double_of_more_range_is_too_large() -> None:
+    solver = prepare(PLAIN)
+    with pytest.raises(InputError, match="too large for binary64"):
+        solver((1.0, 2.0, np.longdouble("1e400")), 1.0)
+    with pytest.raises(InputError, match="too large for binary64"):
+        solver((1.0, 2.0, 3.0), np.longdouble("1e400"))

@@ -129,3 +129,10 @@ def test_spin_that_turns_too_often_is_no_overflow(method: str) -> None:
     """A steady spin grows nowhere: it is its phase that has no digit left."""
     with pytest.raises(InputError, match=r"gave up at t = .*radians the phase"):
         solve(Scene("steady", (0.0, 0.0, 1.0), BODY), [1e15], method, 1e-6)
+
+
+@pytest.mark.parametrize("method", ["auto", "quick", "taylor"])
+def test_slow_cosine_is_a_constant_torque(method: str) -> None:
+    scene = _driven(cosines=(((0.0, 0.0, 20.0), 1e-10),))
+    found = prepare(scene, method, 1e-6)(np.zeros(3), 3.0)
+    np.testing.assert_allclose(found, (0.0, 0.0, 3.0), rtol=1e-6)

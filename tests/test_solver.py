@@ -454,6 +454,7 @@ def test_closed_forms_are_recognised() -> None:
     assert closed_form(scene(0.5, -0.4, 0.1)) == "elliptic"
     assert closed_form(scene(0.5, -0.4, 0.1, 1.0)) is None
     assert closed_form(scene(1.0, 1.0, 1.0)) is None
+    assert closed_form(scene(-1.0, -1.0, -1.0)) is None
 
 
 def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError
-from pyharness.claim_tests_cases import dynamic
+from pyharness.claim_tests_cases import dynamic, error_size
 from pyharness.claim_tests_methods import others_failed
 from pyharness.claims import assignments, claim, claims, judge, outcome, starts
 from pyharness.claims_tables import explanation
@@ -217,3 +217,13 @@ def test_overflow_is_an_infinite_error(monkeypatch: pytest.MonkeyPatch) -> None:
     cut = SimpleNamespace(ended="overflow", omega=lab.truth(3).omega)
     monkeypatch.setattr(Laboratory, "run", lambda *_: cut)
     assert lab.error("two-term", 3) == float("inf")
+
+
+def test_error_is_a_part_of_the_amplitude() -> None:
+    lab: Any = SimpleNamespace(
+        error=lambda program, case: 0.1,
+        truth=lambda case: SimpleNamespace(omega=np.array([[0.0] * 3, [8.0] * 3])),
+    )
+    found = error_size(lab, {"case": 3, "low": 0.02, "high": 0.03})
+    assert found.verdict == REPRODUCED
+    assert set(found.numbers.values()) == {0.025}

@@ -1,6 +1,7 @@
 """Scenes and scene files: what is read, and what is refused with what words."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -174,3 +175,7 @@ def test_rate_alone_makes_a_torque_vary() -> None:
     assert law.varies
     assert not law.is_zero
     assert scene.right_hand_side()(2.0, scene.omega) == [0.0, 0.0, 6.0]
+
+
+def test_times_are_the_ends_of_steps() -> None:
+    assert replace(case_scene(3), step_size=0.5, steps=3).times() == [0.5, 1.0, 1.5]

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 from xml.etree import ElementTree
@@ -28,13 +29,13 @@ from pyharness.orders import Order, State
 from pyharness.planted_twins import plant_in_twin
 from pyharness.plants import PLANTS, Plant
 from pyharness.random_scenes import draw, weekly_seed
-from pyharness.scene import Scene
+from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
 from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.trajectory import Trajectory
 from pyharness.verify import KINDS, verify
 from pyharness.verify_methods import _order
-from pyharness.verify_random import Truth, _may_refuse
+from pyharness.verify_random import Truth, _may_refuse, truth_of
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
 
@@ -533,3 +534,10 @@ def test_choice_of_a_method_may_refuse_nothing(name: str) -> None:
     sensitive = Truth([1.0], np.ones((1, 3)), 1.0, 1e6)
     assert not _may_refuse(name, draw("x", 0), sensitive)
     assert _may_refuse("taylor", draw("x", 0), sensitive)
+
+
+def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:
+    law = TorqueLaw((-1.0, 0.0, 0.0))
+    slowing = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    drawn: Any = SimpleNamespace(scene=slowing, time=1.0)
+    assert truth_of(drawn).largest == pytest.approx(1.0)

@@ -165,7 +165,7 @@ def test_name_is_short_and_vectors_have_three_numbers(tmp_path: Path) -> None:
         assert read_scene(path).name == kept
     for numbers in ("1, 2", "1, 2, 3, 4", ""):
         path.write_text(text % ("x", numbers))
-        with pytest.raises(InputError, match="omega: .* numbers; allowed: three numbers"):
+        with pytest.raises(InputError, match=r"omega: .* numbers; allowed: three numbers"):
             read_scene(path)
 
 

@@ -360,12 +360,12 @@ def test_imaginary_part_is_never_dropped() -> None:
     """NumPy would drop it with a warning, which not everyone sees."""
     for given in (np.complex128(3.0 + 1.0j), np.complex64(3.0)):
         with pytest.raises(InputError):
-            Scene("x", (1.0, 2.0, given), moments=(3.0, 2.0, 1.0))  # type: ignore[arg-type]
+            Scene("x", (1.0, 2.0, given), moments=(3.0, 2.0, 1.0))
 
 
 def test_number_of_more_range_is_too_large() -> None:
     with pytest.raises(InputError, match="too large for binary64"):
-        Scene("x", (1.0, 2.0, Decimal("1e400")), moments=(3.0, 2.0, 1.0))  # type: ignore[arg-type]
+        Scene("x", (1.0, 2.0, Decimal("1e400")), moments=(3.0, 2.0, 1.0))
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).maxexp == 1024, reason="long double is a double here")

@@ -182,9 +182,7 @@ def check(tree: Tree, killer: str) -> str | None:
     return killer if found else None
 
 
-def attempt(
-    tree: Tree, unchanged: Tree, row: Row, reach: str, remember: bool = True
-) -> str | None:
+def attempt(tree: Tree, unchanged: Tree, row: Row, reach: str, remember: bool = True) -> str | None:
     """Return what catches a row; `reach` is "killer", "near" or "all".
 
     What fails in a copy that is `unchanged` too says nothing.

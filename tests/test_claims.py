@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError
-from pyharness.claim_tests_cases import dynamic, error_size
+from pyharness.claim_tests_cases import dynamic, error_size, no_error
 from pyharness.claim_tests_methods import others_failed
 from pyharness.claims import assignments, claim, claims, judge, outcome, starts
 from pyharness.claims_tables import explanation
@@ -227,3 +227,17 @@ def test_error_is_a_part_of_the_amplitude() -> None:
     found = error_size(lab, {"case": 3, "low": 0.02, "high": 0.03})
     assert found.verdict == REPRODUCED
     assert set(found.numbers.values()) == {0.025}
+
+
+def test_what_mending_gains_tenfold_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(error: float) -> Any:
+        return lambda *_: SimpleNamespace(steps=2, omega=np.full((2, 3), error))
+
+    monkeypatch.setattr(Laboratory, "run", run(1e-3))
+    for error, is_false in ((1.1e-2, True), (9e-3, False)):
+        lab: Any = SimpleNamespace(
+            run=run(error),
+            truth=lambda case: SimpleNamespace(omega=np.zeros((2, 3))),
+            assumptions=Assumptions(),
+        )
+        assert (no_error(lab, {"case": 3}).verdict == FALSE) == is_false

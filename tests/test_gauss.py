@@ -300,3 +300,12 @@ def test_step_that_divides_the_time_but_for_rounding_is_not_cut_once_more(parts:
 def test_torque_drives_the_axis_that_it_acts_on() -> None:
     none = np.empty((4, 0))
     assert _driven((np.array([0.0, 0.0, 3.0]), np.zeros(3), none, none), -2.0) == 6.0
+
+
+def test_waves_count_among_right_hand_sides_before_any_is_taken() -> None:
+    waves = tuple(((1e-3, 0.0, 0.0), float(k)) for k in range(1, 21))
+    scene = Scene("", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.0), torque=TorqueLaw(sines=waves))
+    for effort, count in ((1.0, 1), (0.5e-6, 0)):
+        work = (*normalized(scene), scene.omega, [0.1], 1, 0.01)
+        found = extension().gauss_solution(*work, effort=effort)
+        assert found[2] == count

@@ -3,6 +3,7 @@
 import datetime
 import json
 import math
+import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -280,10 +281,14 @@ def test_record_that_was_changed_fails_and_is_mended(
         capsys.readouterr()
         assert main(only) == 1
         assert told in " ".join(capsys.readouterr().out.split())
-    path.write_text(good.replace(value, moved, 1))
+    last = good.rpartition("[[trajectory]]")[2]
+    surplus = "[[trajectory]]" + re.sub(r"--case \d", "--case 8", last)
+    path.write_text(good.replace(value, moved, 1) + "\n" + surplus)
     capsys.readouterr()
     assert main(["verify", "--update", "--record", str(tmp_path)]) == 0
-    assert "omega by 1 ulp" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "omega by 1 ulp" in told
+    assert "gone: " in told
     assert path.read_text() == good
 
 

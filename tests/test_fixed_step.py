@@ -139,3 +139,9 @@ def test_too_many_steps_are_refused() -> None:
     times: Sequence[float] = [1e8]
     with pytest.raises(InputError, match=r"rk4: 1e\+10 steps of 0\.01 s are too many"):
         solve(case_scene(3), times, "rk4", 1.0)
+
+
+def test_steps_to_all_times_count_together() -> None:
+    times = [0.1 * k for k in range(1, 21)]
+    with pytest.raises(InputError, match="too many"):
+        solve(case_scene(3), times, "rk4", 1.0, effort=100.0 / 4e8)

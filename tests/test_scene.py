@@ -179,3 +179,9 @@ def test_rate_alone_makes_a_torque_vary() -> None:
 
 def test_times_are_the_ends_of_steps() -> None:
     assert replace(case_scene(3), step_size=0.5, steps=3).times() == [0.5, 1.0, 1.5]
+
+
+def test_wave_beyond_every_angle_is_no_number() -> None:
+    law = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e308),))
+    scene = Scene("fast", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    assert np.isnan(scene.right_hand_side()(1e10, scene.omega)[0])

@@ -3,6 +3,7 @@
 import datetime
 import json
 import math
+import random
 import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
@@ -29,7 +30,7 @@ from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
 from pyharness.orders import Order, State
 from pyharness.planted_twins import plant_in_twin
 from pyharness.plants import PLANTS, Plant
-from pyharness.random_scenes import draw, weekly_seed
+from pyharness.random_scenes import _far_scale, draw, weekly_seed
 from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
 from pyharness.selection import DRAWS, RECORD, Selection
@@ -546,3 +547,9 @@ def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:
     slowing = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
     drawn: Any = SimpleNamespace(scene=slowing, time=1.0)
     assert truth_of(drawn).largest == pytest.approx(1.0)
+
+
+def test_far_scales_are_far() -> None:
+    for number in range(20):
+        scene = _far_scale(random.Random(number))
+        assert not 1e-4 < max(map(abs, scene.omega)) < 1e4

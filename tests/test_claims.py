@@ -3,15 +3,20 @@
 import csv
 import json
 import re
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pyharness import InputError
+from pyharness.claim_tests_cases import dynamic, error_size, no_error
+from pyharness.claim_tests_methods import others_failed
 from pyharness.claims import assignments, claim, claims, judge, outcome, starts
 from pyharness.claims_tables import explanation
 from pyharness.cli import main
-from pyharness.counting import operations_per_step
+from pyharness.counting import _operations, operations_per_step
+from pyharness.family import Member
 from pyharness.laboratory import Assumptions, Laboratory, required_constant
 from pyharness.listing import corrected, names_of, original
 from pyharness.verdicts import FALSE, IN_PART, NOT_REPRODUCED, REPRODUCED, VERDICTS
@@ -116,6 +121,12 @@ def test_constant_of_the_mended_program_is_that_of_the_flow() -> None:
     assert required_constant(Laboratory(True), 2) > 3000.0
 
 
+def test_operations_that_are_done_once_are_not_those_of_a_step() -> None:
+    for program in ("two-term", "four-term", "runge-kutta"):
+        short, long = (_operations(corrected(program), steps) for steps in (1, 11))
+        assert operations_per_step(corrected(program)) == (long - short) / 10 < short
+
+
 def test_operations_counted_by_hand() -> None:
     """Runge-Kutta as mended: 4 stages of 27, 3 of 12 to store, 6 x 7 to combine, and the rest."""
     stage = 3 * 3 + 6 * 2 + 6  # F, G, H: M + a*u*v; X, Y, Z: a + u*v - w*z, counted one by one
@@ -174,3 +185,59 @@ def test_claims_in_every_form(capsys: Capture) -> None:
     assert main(["claims", "--assignments"]) == 0
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 100
+
+
+def test_liveliest_case_is_held_against_the_others() -> None:
+    lab: Any = SimpleNamespace(
+        run=lambda program, case: SimpleNamespace(omega=np.array([[0.0] * 3, [case, 0.0, 0.0]])),
+        scene=lambda case: SimpleNamespace(step_size=1.0),
+    )
+    for case, factor, verdict in (
+        (7, 1.1, REPRODUCED), (7, 1.2, NOT_REPRODUCED), (6, 0.9, NOT_REPRODUCED),
+    ):  # fmt: skip
+        assert dynamic(lab, {"case": case, "factor": factor}).verdict == verdict
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(9.0, NOT_REPRODUCED), (11.0, IN_PART)])
+def test_weightings_within_ten_times_the_error_of_collocation_are_as_good(
+    factor: float, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def error(lab: Laboratory, case: int, member: Member) -> float:
+        return 1e-6 * (1.0 if member.weighting == "collocation" else factor)
+
+    monkeypatch.setattr("pyharness.claim_tests_methods._error", error)
+    lab: Any = SimpleNamespace(
+        punched=False, truth=lambda case: SimpleNamespace(omega=np.ones((2, 3)))
+    )
+    assert others_failed(lab, {"cases": [3], "terms": [2]}).verdict == verdict
+
+
+def test_overflow_is_an_infinite_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    lab = Laboratory(False)
+    cut = SimpleNamespace(ended="overflow", omega=lab.truth(3).omega)
+    monkeypatch.setattr(Laboratory, "run", lambda *_: cut)
+    assert lab.error("two-term", 3) == float("inf")
+
+
+def test_error_is_a_part_of_the_amplitude() -> None:
+    lab: Any = SimpleNamespace(
+        error=lambda program, case: 0.1,
+        truth=lambda case: SimpleNamespace(omega=np.array([[0.0] * 3, [8.0] * 3])),
+    )
+    found = error_size(lab, {"case": 3, "low": 0.02, "high": 0.03})
+    assert found.verdict == REPRODUCED
+    assert set(found.numbers.values()) == {0.025}
+
+
+def test_what_mending_gains_tenfold_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(error: float) -> Any:
+        return lambda *_: SimpleNamespace(steps=2, omega=np.full((2, 3), error))
+
+    monkeypatch.setattr(Laboratory, "run", run(1e-3))
+    for error, is_false in ((1.1e-2, True), (9e-3, False)):
+        lab: Any = SimpleNamespace(
+            run=run(error),
+            truth=lambda case: SimpleNamespace(omega=np.zeros((2, 3))),
+            assumptions=Assumptions(),
+        )
+        assert (no_error(lab, {"case": 3}).verdict == FALSE) == is_false

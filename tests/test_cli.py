@@ -51,6 +51,7 @@ MISTAKES = [
     ([*COMPARE, "--step-size", "small"], "'small' where a number belongs"),
     ([*COMPARE, "--step-size", "nan"], "not finite"),
     ([*COMPARE, "--omega0", "1,2"], "2 numbers; allowed: three"),
+    ([*COMPARE, "--omega0", "1,2,3,4"], "4 numbers; allowed: three"),
     ([*COMPARE, "--omega0", "1,2,inf"], "not finite"),
     ([*COMPARE, "--omega0", "1,2,"], "where a number belongs"),
     ([*COMPARE, "--lipschitz", "0"], "allowed: a number above 0"),

@@ -24,7 +24,7 @@ from pyharness.comparison_tables import (
 from pyharness.listing import corrected, original, subset
 from pyharness.methods import PROGRAM_REGISTRY, SCIPY_METHODS
 from pyharness.plots import comparison_picture
-from pyharness.records import comparison_record, json_text
+from pyharness.records import comparison_record, json_text, run_record
 from pyharness.reference import reference
 from pyharness.tables import csv_text
 from pyharness.trajectory import Trajectory
@@ -251,3 +251,10 @@ def test_largest_error_of_a_row_is_that_of_its_worst_component() -> None:
     off = np.array([[1e-3, 0.0, 0.0], [0.0, -2e-3, 1e-4]])
     found = accuracy(scene, _trajectory(truth.omega + off), truth)
     np.testing.assert_allclose(found.error, [1e-3, 2e-3], rtol=1e-9)
+
+
+def test_record_of_a_run_has_the_time_that_the_program_recorded() -> None:
+    listing = original("two-term")
+    run = PROGRAM_REGISTRY["two-term"].run(case_scene(5), listing)
+    found = run_record(case_scene(5), "two-term", listing, run, build())["trajectory"]
+    assert found["recorded_time"] == run.recorded_time.tolist() != run.time.tolist()

@@ -1,5 +1,6 @@
 """Limits count the work, and each names the one option that lifts it, and how far."""
 
+import copy
 import pickle
 import re
 import time
@@ -15,6 +16,7 @@ from pyharness.effort import suggested
 from pyharness.errors import InputError, TimedError
 from pyharness.listing import corrected
 from pyharness.methods import PROGRAM_REGISTRY
+from pyharness.modern import FIXED_STEP
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw, Wave
 from pyharness.solver import PREPARED, prepare, solve
@@ -111,6 +113,12 @@ def test_prepared_solver_has_the_limit_too(name: str) -> None:
     short = prepare(DRIVEN, name, tolerance, effort=1e-8)
     assert np.isnan(short(omega, 20.0)).all()
     assert short.status == "gave up"
+    if name not in FIXED_STEP:
+        with pytest.raises(InputError, match="allow more work"):
+            short.trajectory(omega, [20.0])
+    other = copy.copy(short)
+    other(omega, 20.0)
+    assert other.status == "gave up"
     enough = prepare(DRIVEN, name, tolerance)
     enough(omega, 20.0)
     assert enough.status == "complete"

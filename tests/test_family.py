@@ -259,6 +259,14 @@ def test_points_out_of_place_do_not_show_in_four_terms(case: int) -> None:
     assert shows == (case > 2)  # in Case 2 f is a straight line, which two terms follow
 
 
+@pytest.mark.parametrize("weighting", WEIGHTINGS)
+def test_multiplied_out_products_give_the_same(weighting: str) -> None:
+    scene, member = case_scene(3), Member(weighting)
+    wanted = run(scene, member).omega
+    found = multiplied_out(scene, member, np.float64)
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-10)
+
+
 def test_multiplied_out_products_are_refused_where_they_can_not_be() -> None:
     with pytest.raises(InputError, match="constant torques"):
         multiplied_out(case_scene(7), Member("galerkin"), np.float64)

@@ -1,5 +1,6 @@
 """The methods of III.2: order, the formulas written out, steps that do not divide the time."""
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -86,6 +87,15 @@ def test_formulas_and_the_shortened_step(method: str, torque: TorqueLaw) -> None
     assert found.evaluations == 6 * (4 if method == "rk4" else 2)
 
 
+@pytest.mark.parametrize("method", FIXED_STEP)
+def test_torque_goes_on_where_many_steps_pause(method: str) -> None:
+    """A kernel looks now and then whether Ctrl-C came; the torque is then that of its time."""
+    law = TorqueLaw(cosines=(((0.0, 0.0, 1.0), 1.0),))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law, step_size=1e-5)
+    found = solve(scene, [5.0], method, 1.0)
+    assert abs(found.omega[0, 2] - math.sin(5.0)) < 1e-9
+
+
 @pytest.mark.parametrize("case", range(1, 8))
 def test_rk4_is_the_mended_program(case: int) -> None:
     """Another order of operations: what differs is rounding, some 1e-16 a step."""
@@ -129,3 +139,9 @@ def test_too_many_steps_are_refused() -> None:
     times: Sequence[float] = [1e8]
     with pytest.raises(InputError, match=r"rk4: 1e\+10 steps of 0\.01 s are too many"):
         solve(case_scene(3), times, "rk4", 1.0)
+
+
+def test_steps_to_all_times_count_together() -> None:
+    times = [0.1 * k for k in range(1, 21)]
+    with pytest.raises(InputError, match="too many"):
+        solve(case_scene(3), times, "rk4", 1.0, effort=100.0 / 4e8)

@@ -15,6 +15,7 @@ import pytest
 from pyharness import InputError, Scene, TorqueLaw, case_scene
 from pyharness.kernels import extension, normalized
 from pyharness.methods import METHODS, solve
+from pyharness.modern import _driven
 from pyharness.reference import reference
 from pyharness.trajectory import Array
 from tests.random_scenes import NASTY
@@ -265,10 +266,10 @@ def _watched(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
 
 def test_steps_and_right_hand_sides_of_all_tries_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = _watched(monkeypatch)
-    found = solve(case_scene(5), [0.5, 1.25], "gauss-3", 1e-9)
+    found = solve(case_scene(5), [0.5, 1.2], "gauss-3", 1e-9)
     assert len(calls) > 2
     assert found.evaluations == sum(evaluations for _, evaluations in calls)
-    assert found.steps == sum(math.ceil(length / calls[-1][0]) for length in (0.5, 0.75))
+    assert found.steps == sum(math.ceil(length / calls[-1][0]) for length in (0.5, 1.2 - 0.5))
 
 
 def test_time_and_right_hand_sides_of_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -294,3 +295,17 @@ def test_step_that_divides_the_time_but_for_rounding_is_not_cut_once_more(parts:
     for whole, count in ((0.35, 4), (0.301, 4), (0.3, 3)):
         found = _end(scene, [whole], 3, 0.1)
         np.testing.assert_array_equal(found, _end(scene, [whole], 3, whole / count))
+
+
+def test_torque_drives_the_axis_that_it_acts_on() -> None:
+    none = np.empty((4, 0))
+    assert _driven((np.array([0.0, 0.0, 3.0]), np.zeros(3), none, none), -2.0) == 6.0
+
+
+def test_waves_count_among_right_hand_sides_before_any_is_taken() -> None:
+    waves = tuple(((1e-3, 0.0, 0.0), float(k)) for k in range(1, 21))
+    scene = Scene("", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.0), torque=TorqueLaw(sines=waves))
+    for effort, count in ((1.0, 1), (0.5e-6, 0)):
+        work = (*normalized(scene), scene.omega, [0.1], 1, 0.01)
+        found = extension().gauss_solution(*work, effort=effort)
+        assert found[2] == count

@@ -92,3 +92,15 @@ def test_way_passes_through_the_largest_omega() -> None:
 def test_what_has_no_truth_is_refused(scene: Scene, time: float, words: str) -> None:
     with pytest.raises(InputError, match=words):
         integer_series(scene, [time], most_steps=20 if time > 10.0 else 300)
+
+
+def test_sine_of_a_negative_speed_is_that_of_the_other_sign() -> None:
+    laws = (
+        TorqueLaw(sines=(((1.0, -2.0, 3.0), -2.0),)),
+        TorqueLaw(sines=(((-1.0, 2.0, -3.0), 2.0),)),
+    )
+    one, other = (
+        integer_series(Scene("", (1.0, 2.0, -1.0), moments=(3.0, 2.0, 1.0), torque=law), [1.5])
+        for law in laws
+    )
+    assert one.omega.tolist() == other.omega.tolist()

@@ -303,6 +303,8 @@ def test_overflow_of_any_one_component_ends_the_run(program: str, axis: int) -> 
         )
         assert differences(compiled, twin) == []
         assert (compiled.ended, compiled.steps) == ("overflow", 0)
+        alone = kernels.run(scene, listing, may_stop=False, velocity=False)
+        assert (alone.ended, alone.steps) == ("overflow", 0)
 
 
 @pytest.mark.parametrize("program", ["two-term", "four-term"])
@@ -314,3 +316,13 @@ def test_ier_is_printed_where_the_matrix_is_singular(program: str) -> None:
     )
     assert differences(compiled, twin) == []
     np.testing.assert_array_equal(compiled.ier, [129] * 3)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_sum_of_stages_may_overflow_where_no_stage_does(axis: int) -> None:
+    constant = [0.0] * 3
+    constant[axis] = 1e308
+    law = TorqueLaw((constant[0], constant[1], constant[2]))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law, step_size=0.5, steps=1)
+    run = kernels.run(scene, corrected("runge-kutta"), may_stop=False, velocity=False)
+    assert (run.ended, run.steps) == ("overflow", 0)

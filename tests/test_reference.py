@@ -9,6 +9,7 @@ import pytest
 from pyharness import reference as room
 from pyharness.decimal_functions import sine_cosine
 from pyharness.errors import InputError
+from pyharness.integer_series import integer_series
 from pyharness.reference import reference
 from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
@@ -155,7 +156,7 @@ def test_solution_that_blows_up_ends_before(direction: float) -> None:
     np.testing.assert_allclose(found.omega, np.array([[2.0] * 3, [10.0] * 3]) * direction)
 
 
-@pytest.mark.parametrize("times", [[0.2, 0.1], [-1.0, 1.0], [0.5, 0.5]])
+@pytest.mark.parametrize("times", [[0.2, 0.1], [-1.0, 1.0], [-1.0, 2.0], [0.5, 0.5]])
 def test_times_must_lead_away_from_zero(times: list[float]) -> None:
     with pytest.raises(InputError, match="away from 0"):
         reference(case_scene(3), times)
@@ -250,3 +251,18 @@ def test_precise_series_agrees_with_extrapolation_to_25_digits() -> None:
                     for i in range(len(column) - 1)
                 ]
             assert abs(column[0] - value) < mpmath.mpf("1e-25")
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_series_for_the_velocity_is_estimated_where_omega_is_known(number: int) -> None:
+    found = reference(case_scene(number), [1.0], velocity=True)
+    assert found.source == "known solution"
+    assert 0.0 < found.estimate < 1e-18
+
+
+def test_every_second_term_may_be_zero() -> None:
+    """From rest a constant torque makes omega odd in time."""
+    law = TorqueLaw((1.0, 2.0, 3.0))
+    scene = Scene("odd", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), torque=law)
+    wanted = integer_series(scene, [3.0]).omega
+    np.testing.assert_allclose(reference(scene, [3.0]).omega, wanted, rtol=1e-15)

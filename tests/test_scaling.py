@@ -158,3 +158,9 @@ def test_a_scale_that_loses_time_or_torque_is_not_taken(
     tolerance = 1.0 if name in ("rk4", "improved-euler", "taylor-3") else 1e-6
     rows = solve(scene, [time], name, tolerance)
     assert rows.omega[0, 0] == pytest.approx(wanted, rel=1e-6, abs=0.0)
+
+
+def test_torque_counts_by_what_it_gives_a_body() -> None:
+    law = TorqueLaw((1e-50, 0.0, 0.0))
+    scene = Scene("heavy", (0.0, 0.0, 0.0), moments=(1e50, 1e50, 1e50), torque=law)
+    assert factor_near_one(scene, 1.0) > 2.0**300

@@ -158,3 +158,18 @@ def test_rows_on_the_way_keep_the_tolerance_too() -> None:
         for method in ("dop853", "rk45"):
             found = solve(scene, times, method, 5e-4).omega
             assert np.abs(found - path.omega).max() <= 5e-4 * np.abs(path.way).max()
+
+
+@pytest.mark.parametrize("method", ["auto", "quick", "taylor"])
+def test_slow_cosine_is_a_constant_torque(method: str) -> None:
+    scene = _driven(cosines=(((0.0, 0.0, 20.0), 1e-10),))
+    found = prepare(scene, method, 1e-6)(np.zeros(3), 3.0)
+    np.testing.assert_allclose(found, (0.0, 0.0, 3.0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("frequency", [1e-7, 1e-6])
+def test_quick_takes_a_slow_sine_itself(frequency: float) -> None:
+    scene = _driven(sines=(((5.0, 7.0, 20.0), frequency),))
+    solver = prepare(scene, "quick", 1e-6)
+    assert _errs(solver(np.zeros(3), 1.0), scene, 1.0) < 1e-6
+    assert solver.status == "complete"

@@ -454,6 +454,7 @@ def test_closed_forms_are_recognised() -> None:
     assert closed_form(scene(0.5, -0.4, 0.1)) == "elliptic"
     assert closed_form(scene(0.5, -0.4, 0.1, 1.0)) is None
     assert closed_form(scene(1.0, 1.0, 1.0)) is None
+    assert closed_form(scene(-1.0, -1.0, -1.0)) is None
 
 
 def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -> None:
@@ -462,7 +463,10 @@ def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -
     assert not {"torque of time", "sines", "torque"} & plan(case_scene(7)).skipped
     assert "velocity" not in plan(case_scene(7), velocity=True).skipped
     assert "dense output" not in plan(case_scene(7), rows=True).skipped
+    assert "dense output" in plan(case_scene(3), rows=True).skipped
     assert plan(case_scene(7), tolerance=1e-6).method == "quick or taylor"
+    assert plan(case_scene(5), tolerance=1.1e-7).method == "quick or taylor"
+    assert plan(case_scene(5), tolerance=0.9e-7).method == "taylor"
     assert plan(case_scene(7), tolerance=1e-6, rows=True).method == "taylor"
     for form in ("table", "json", "csv", "markdown"):
         assert main(["plan", "--case", "7", "--format", form]) == 0

@@ -403,3 +403,8 @@ def test_names_of_kinds_stand_apart(
 
 def _says(artist: Any, text: str) -> bool:
     return hasattr(artist, "get_text") and artist.get_text() == text
+
+
+def test_momentum_is_held_where_energy_does_not_change() -> None:
+    scene = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0))
+    assert truth.conserved(scene, np.array([0.0, math.sqrt(0.5), 0.0]), 1.0) > 0.1

@@ -383,3 +383,11 @@ def test_linear_theory_does_not_see_the_moved_points() -> None:
     assert checks[id.format("original")].value == 0.0
     assert checks[id.format("corrected")].passed
     assert checks[id.format("corrected")].limit is not None
+
+
+def test_slope_of_a_boundary_is_that_of_the_growth_beyond_it() -> None:
+    matrix = amplification(corrected("runge-kutta"))
+    distance, slope = boundary(matrix, -1.0)
+    assert distance == pytest.approx(2.785293563405282, rel=1e-9)
+    z = -distance
+    assert slope == pytest.approx(abs(1.0 + z + z**2 / 2.0 + z**3 / 6.0), rel=1e-3)

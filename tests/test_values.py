@@ -89,7 +89,10 @@ NOT_NUMBERS: list[Any] = [
     [1.0], np.ones(1), object(), _Evil(), float("nan"), float("inf"), Decimal("sNaN"), TOO_LARGE,
     Fraction(TOO_LARGE), np.datetime64("2020"), 10**5000,
 ]  # fmt: skip
-NO_VECTORS = NOT_THREE + [(1.0, 2.0, x) for x in NOT_NUMBERS] + [np.zeros((3, 1)), np.zeros((1, 3))]
+NO_VECTORS = [
+    *NOT_THREE, *((1.0, 2.0, x) for x in NOT_NUMBERS), *((x, 2.0, 1.0) for x in NOT_NUMBERS),
+    np.zeros((3, 1)), np.zeros((1, 3)),
+]  # fmt: skip
 NO_WAVES: list[Any] = [
     None, 3.0, "abc", True, [3.0], [None], ["ab"], [()], [((1.0, 2.0, 3.0),)], np.zeros(3),
     [((1.0, 2.0, 3.0), 1.0, 2.0)], [{"amplitude": [1, 2, 3], "frequency": 1}], {(1, 2): 3},
@@ -350,3 +353,25 @@ def test_a_saved_scene_is_read_back_whatever_its_name(name: str, tmp_path: Path)
     scene = dataclasses.replace(PLAIN, name=name)
     path.write_text(scene_text(scene), encoding="utf-8")
     assert read_scene(path) == scene
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_imaginary_part_is_never_dropped() -> None:
+    """NumPy would drop it with a warning, which not everyone sees."""
+    for given in (np.complex128(3.0 + 1.0j), np.complex64(3.0)):
+        with pytest.raises(InputError):
+            Scene("x", (1.0, 2.0, given), moments=(3.0, 2.0, 1.0))
+
+
+def test_number_of_more_range_is_too_large() -> None:
+    with pytest.raises(InputError, match="too large for binary64"):
+        Scene("x", (1.0, 2.0, Decimal("1e400")), moments=(3.0, 2.0, 1.0))
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).maxexp == 1024, reason="long double is a double here")
+def test_long_double_of_more_range_is_too_large() -> None:
+    solver = prepare(PLAIN)
+    with pytest.raises(InputError, match="too large for binary64"):
+        solver((1.0, 2.0, np.longdouble("1e400")), 1.0)
+    with pytest.raises(InputError, match="too large for binary64"):
+        solver((1.0, 2.0, 3.0), np.longdouble("1e400"))

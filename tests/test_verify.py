@@ -3,11 +3,14 @@
 import datetime
 import json
 import math
+import random
+import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 from xml.etree import ElementTree
@@ -24,14 +27,17 @@ from pyharness.errors import InputError
 from pyharness.golden import mathematics, read_record, update
 from pyharness.listing import PROGRAMS, corrected
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
+from pyharness.orders import Order, State
 from pyharness.planted_twins import plant_in_twin
 from pyharness.plants import PLANTS, Plant
-from pyharness.random_scenes import draw, weekly_seed
-from pyharness.scene import Scene
+from pyharness.random_scenes import _far_scale, draw, weekly_seed
+from pyharness.scene import Scene, TorqueLaw
 from pyharness.scene_file import case_scene
 from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.trajectory import Trajectory
 from pyharness.verify import KINDS, verify
+from pyharness.verify_methods import _order
+from pyharness.verify_random import Truth, _may_refuse, truth_of
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
 
@@ -276,10 +282,14 @@ def test_record_that_was_changed_fails_and_is_mended(
         capsys.readouterr()
         assert main(only) == 1
         assert told in " ".join(capsys.readouterr().out.split())
-    path.write_text(good.replace(value, moved, 1))
+    last = good.rpartition("[[trajectory]]")[2]
+    surplus = "[[trajectory]]" + re.sub(r"--case \d", "--case 8", last)
+    path.write_text(good.replace(value, moved, 1) + "\n" + surplus)
     capsys.readouterr()
     assert main(["verify", "--update", "--record", str(tmp_path)]) == 0
-    assert "omega by 1 ulp" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "omega by 1 ulp" in told
+    assert "gone: " in told
     assert path.read_text() == good
 
 
@@ -453,8 +463,10 @@ def test_method_that_answers_what_it_was_not_asked_fails() -> None:
     def refuses(*_: Any) -> Trajectory:
         raise InputError("not today")
 
-    def other_times(scene: Scene, times: Sequence[float], tolerance: float) -> Trajectory:
-        run = METHODS["taylor"].solve(scene, times, tolerance)
+    def other_times(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        run = METHODS["taylor"].solve(scene, times, tolerance, effort)
         return replace(run, time=np.nextafter(run.time, 9.0))
 
     for change in (refuses, other_times):
@@ -506,6 +518,11 @@ def test_stop_by_another_variable_or_at_another_step_fails() -> None:
         assert not any(check.passed for check in checks)
 
 
+@pytest.mark.parametrize("state", ["misses", "unsettled", "singular", "sensitive", "unbounded"])
+def test_order_of_a_case_that_can_not_be_told_fails(state: State) -> None:
+    assert not _order("orders/x", Order(4, state, None, 0.01)).passed
+
+
 @pytest.mark.parametrize("kind", ["schemes", "stops"])
 def test_run_without_its_last_row_fails(kind: str) -> None:
     def shorter(run: Trajectory) -> Trajectory:
@@ -516,3 +533,23 @@ def test_run_without_its_last_row_fails(kind: str) -> None:
         checks = list(verify(Selection(only=[f"{kind}/runge-kutta/case-3", f"{kind}/case-3"])))
     assert checks
     assert not any(check.passed for check in checks)
+
+
+@pytest.mark.parametrize("name", ["auto", "closed-form"])
+def test_choice_of_a_method_may_refuse_nothing(name: str) -> None:
+    sensitive = Truth([1.0], np.ones((1, 3)), 1.0, 1e6)
+    assert not _may_refuse(name, draw("x", 0), sensitive)
+    assert _may_refuse("taylor", draw("x", 0), sensitive)
+
+
+def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:
+    law = TorqueLaw((-1.0, 0.0, 0.0))
+    slowing = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    drawn: Any = SimpleNamespace(scene=slowing, time=1.0)
+    assert truth_of(drawn).largest == pytest.approx(1.0)
+
+
+def test_far_scales_are_far() -> None:
+    for number in range(20):
+        scene = _far_scale(random.Random(number))
+        assert not 1e-4 < max(map(abs, scene.omega)) < 1e4

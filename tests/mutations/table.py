@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 ROOT = Path(__file__).parent.parent.parent
 FOLDER = Path(__file__).parent
 CAUGHT = FOLDER / "caught.toml"
-REASONS = ("equivalent: ", "harmless: ")
+REASONS = ("equivalent: ", "harmless: ", "open: ")
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,11 @@ class Row:
         """Whether the change asks for a build."""
         return self.file.startswith("fortran/")
 
+    @property
+    def is_equivalent(self) -> bool:
+        """Whether it changes nothing that anyone could see."""
+        return self.killer is None and (self.lives or "").startswith("equivalent: ")
+
     def applied(self, text: str) -> str:
         """Return the file with the change in it; ValueError where it does not apply."""
         if (count := text.count(self.old)) != 1:
@@ -67,6 +72,23 @@ def chosen(table: list[Row], patterns: list[str]) -> list[Row]:
     if not patterns:
         return table
     return [row for row in table if any(fnmatchcase(row.id, f"*{each}*") for each in patterns)]
+
+
+def page(table: list[Row]) -> str:
+    """Return the score and all that nothing catches, as Markdown."""
+    alive = [row for row in table if row.killer is None]
+    caught, faults = len(table) - len(alive), len(table) - sum(row.is_equivalent for row in alive)
+    lines = [
+        f"{len(table)} changes, {sum(row.compiled for row in table)} of them in compiled sources: "
+        f"{caught} are caught,",
+        f"{100.0 * caught / len(table):.1f} % of all, {100.0 * caught / faults:.1f} % of the "
+        f"{faults} that are not equivalent. {len(alive)} are not:",
+        "",
+        "| not caught | why |",
+        "|---|---|",
+    ]
+    lines += [f"| {row.id} | {row.lives or '-'} |" for row in alive]
+    return "\n".join(lines) + "\n"
 
 
 def update(news: dict[str, str | None], path: Path = CAUGHT) -> None:

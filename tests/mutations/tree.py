@@ -82,9 +82,9 @@ class Tree:
         self._build = folder / "build" / "mutated"
         self._stale = False
         shutil.copytree(ROOT, folder, ignore=LEFT_OUT, symlinks=True)
-        from pyharness import _build, _kernels
+        from pyharness import _build, _kernels, _solver
 
-        for module in (_build, _kernels):
+        for module in (_build, _kernels, _solver):
             shutil.copy(str(module.__file__), folder / "pyharness")
         # A limit on memory for whatever is run, and the threads of two jobs don't pay.
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
@@ -146,7 +146,7 @@ class Tree:
         code, said = self.run(["ninja", "-C", str(self._build)], 600)
         if code != 0:
             return said
-        for path in self._build.glob("_kernels*.so"):
+        for path in self._build.glob("_*.so"):
             # Not over a file that may be mapped.
             place = self.folder / "pyharness" / path.name
             place.unlink(missing_ok=True)

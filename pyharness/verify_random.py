@@ -31,6 +31,8 @@ _CALM, _LIVELY = 10.0, 1e3
 _SERIES = ("auto", "taylor")
 # Random scenes that may run away, or be too fast for any truth and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
+_FINE = 1e-9
+_MORE_WORK = "allow more work"
 _EARLIER = 0.4  # of the last time: rows on the way are held to it too
 
 
@@ -166,22 +168,26 @@ def _held(id: str, again: str, drawn: Draw, truth: Truth, answer: Answer) -> Sam
         error, limit = truth.error(answer.omega), truth.limit(answer.method, answer.tolerance)
         passed = error <= limit
     elif answer.why.startswith(REFUSED):
-        passed = _may_refuse(answer.method, drawn, truth)
+        passed = _may_refuse(answer, drawn, truth)
     entrance = id.rpartition("/")[2]
     note = f"{drawn.scene.name}, tolerance {answer.tolerance:.2g}, growth {truth.growth:.3g}"
     note = f"{note}: {answer.why}" if answer.why else note
     return Sample(id, passed, error, limit, again, note, entrance, answer.tolerance, truth.growth)
 
 
-def _may_refuse(method: str, drawn: Draw, truth: Truth) -> bool:
+def _may_refuse(answer: Answer, drawn: Draw, truth: Truth) -> bool:
     """Whether a method may say that such a scene would take too long or leave too few digits.
 
     The choice of a method for a scene, and a closed form, may not.
     """
+    method = answer.method
     if method in ("auto", "closed-form"):
         return False
     if drawn.scene.name in _MAY_REFUSE or truth.growth > _CALM or method == "quick":
         return True
     if method not in SCIPY_METHODS:
         return False
-    return finest(method, drawn.scene, truth.times[-1]) > drawn.tolerance(METHODS[method].finest)
+    # Radau's order is low for its finest tolerances.
+    if answer.tolerance < _FINE and _MORE_WORK in answer.why:
+        return True
+    return finest(method, drawn.scene, truth.times[-1]) > answer.tolerance

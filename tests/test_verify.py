@@ -37,7 +37,7 @@ from pyharness.selection import DRAWS, RECORD, Selection
 from pyharness.trajectory import Trajectory
 from pyharness.verify import KINDS, verify
 from pyharness.verify_methods import _order
-from pyharness.verify_random import Truth, _may_refuse, truth_of
+from pyharness.verify_random import Answer, Truth, _may_refuse, truth_of
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
 
@@ -538,8 +538,27 @@ def test_run_without_its_last_row_fails(kind: str) -> None:
 @pytest.mark.parametrize("name", ["auto", "closed-form"])
 def test_choice_of_a_method_may_refuse_nothing(name: str) -> None:
     sensitive = Truth([1.0], np.ones((1, 3)), 1.0, 1e6)
-    assert not _may_refuse(name, draw("x", 0), sensitive)
-    assert _may_refuse("taylor", draw("x", 0), sensitive)
+    assert not _may_refuse(Answer(name, 1e-6, None), draw("x", 0), sensitive)
+    assert _may_refuse(Answer("taylor", 1e-6, None), draw("x", 0), sensitive)
+
+
+@pytest.mark.parametrize(
+    ("method", "tolerance", "why", "may"),
+    [
+        ("radau", 1e-12, "gave up; allow more work", True),
+        ("radau", 1e-6, "gave up; allow more work", False),
+        ("radau", 1e-12, "gave up", False),
+        ("dop853", 1e-12, "can't meet it", False),
+        ("taylor", 1e-12, "gave up; allow more work", False),
+        ("quick", 1e-6, "gave up", True),
+    ],
+)
+def test_in_a_plain_scene_only_few_may_refuse(
+    method: str, tolerance: float, why: str, may: bool
+) -> None:
+    drawn = draw("x", 0)
+    calm = Truth([drawn.time], np.ones((1, 3)), 1.0, 2.0)
+    assert _may_refuse(Answer(method, tolerance, None, why), drawn, calm) == may
 
 
 def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:

@@ -9,7 +9,8 @@ module torque_law
 
 contains
 
-  pure subroutine torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, time, time_low, m)
+pure subroutine torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, time, &
+                            time_low, m)
     !! Torque at time + time_low.
     real(dp), intent(in) :: m_constant(3)          !! 1/s2
     real(dp), intent(in) :: m_rate(3)              !! 1/s3

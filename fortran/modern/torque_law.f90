@@ -9,7 +9,7 @@ module torque_law
 
 contains
 
-pure subroutine torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, time, &
+  pure subroutine torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, time, &
                             time_low, m)
     !! Torque at time + time_low.
     real(dp), intent(in) :: m_constant(3)          !! 1/s2

@@ -241,3 +241,18 @@ def test_what_mending_gains_tenfold_is_an_error(monkeypatch: pytest.MonkeyPatch)
             assumptions=Assumptions(),
         )
         assert (no_error(lab, {"case": 3}).verdict == FALSE) == is_false
+
+
+@pytest.mark.parametrize("turning", ["punched", "mended"])
+def test_a_verdict_that_turns_on_either_side_does_not_survive(
+    turning: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = next(each for each in claims() if judge(each).survivals)
+
+    def other(entry: dict[str, Any], laboratory: Laboratory) -> Any:
+        turns = laboratory.punched == (turning == "punched")
+        verdict = FALSE if turns and laboratory.assumptions != Assumptions() else REPRODUCED
+        return SimpleNamespace(verdict=verdict)
+
+    monkeypatch.setattr("pyharness.claims.outcome", other)
+    assert not any(each.survives for each in judge(entry).survivals)

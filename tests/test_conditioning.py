@@ -132,3 +132,18 @@ def test_limit_says_nothing_beyond_two() -> None:
     assert flow.limit(1e-9) == pytest.approx(1e-9 * flow.amplification + flow.rounding)
     assert flow.limit(1e-9, 1e6) > flow.limit(1e-9)
     assert flow.limit(1.0) == flow.limit(math.inf) == 2.0
+
+
+def test_flow_between_nodes_is_that_of_the_middle() -> None:
+    """Its error falls with the square of the distance of nodes: with that itself at an end."""
+    scene, time = _SCENES["any body"]
+    errors = []
+    for count in (40, 80):
+        times = np.linspace(0.0, time, count + 1)
+        rows = reference(scene, times[1:].tolist()).omega
+        flow = linearised.propagators(scene, times, np.vstack([scene.omega, rows]))
+        finer = np.linspace(0.0, time, 16 * count + 1)
+        rows = reference(scene, finer[1:].tolist()).omega
+        exact = linearised.propagators(scene, finer, np.vstack([scene.omega, rows]))
+        errors.append(float(np.abs(flow[0] - exact[0]).max()))
+    assert errors[0] > 3.5 * errors[1]

@@ -266,3 +266,16 @@ def test_every_second_term_may_be_zero() -> None:
     scene = Scene("odd", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), torque=law)
     wanted = integer_series(scene, [3.0]).omega
     np.testing.assert_allclose(reference(scene, [3.0]).omega, wanted, rtol=1e-15)
+
+
+def test_velocity_of_a_steady_spin_goes_round_as_it_must() -> None:
+    """V' = F/m - omega x V with F along the first axis: a circle, behind the force."""
+    scene = Scene(
+        "steady", (0.0, 0.0, 2.0), (3.0, 3.0, 3.0), masses=(5.0,) * 3, forces=(7.0, 0.0, 0.0)
+    )
+    found = reference(scene, [0.4, 1.0], velocity=True).velocity
+    assert found is not None
+    for time, row in zip((0.4, 1.0), found, strict=True):
+        size = 7.0 / 5.0 / 2.0
+        wanted = (size * math.sin(2.0 * time), size * (math.cos(2.0 * time) - 1.0), 0.0)
+        assert row == pytest.approx(wanted, abs=1e-15)

@@ -178,11 +178,14 @@ def _held(id: str, again: str, drawn: Draw, truth: Truth, answer: Answer) -> Sam
 def _may_refuse(answer: Answer, drawn: Draw, truth: Truth) -> bool:
     """Whether a method may say that such a scene would take too long or leave too few digits.
 
-    The choice of a method for a scene, and a closed form, may not.
+    The choice of a method for a scene may not, and a closed form but where numbers end.
     """
     method = answer.method
-    if method in ("auto", "closed-form"):
+    if method == "auto":
         return False
+    if method == "closed-form":
+        # A disturbance too faint to square, far from every ordinary number.
+        return drawn.scene.name == "extreme"
     if drawn.scene.name in _MAY_REFUSE or truth.growth > _CALM or method == "quick":
         return True
     if method not in SCIPY_METHODS:

@@ -84,6 +84,7 @@ contains
   pure subroutine sine_cosine(frequency, t, t_low, sine, cosine)
     !! Sine and cosine of frequency (t + t_low), the second part as a small turn, and with it what
     !! the rounding of the product left out: after 1e5 radians that is worth 1e-11.
+    !! As in two_words.f90, which is compiled once and can't be called from every instruction set.
     real(dp), intent(in) :: frequency  !! rad/s
     real(dp), intent(in) :: t          !! s
     real(dp), intent(in) :: t_low      !! s

@@ -177,7 +177,10 @@ def test_handler_that_does_not_raise_runs_on_the_way() -> None:
 
 def test_command_line_says_so_in_a_line(tmp_path: Path) -> None:
     """All of them side by side, each some time after it has begun."""
-    lines = "".join(f"{{ amplitude = {list(a)}, frequency = {f} }},\n" for a, f in _waves(15_000))
+    # In few letters: a scene file has a largest size.
+    lines = "".join(
+        f"{{amplitude=[{a[0]:.1e},{a[1]:.1e},0],frequency={f:.5f}}},\n" for a, f in _waves(15_000)
+    )
     path = tmp_path / "crowded.toml"
     path.write_text(
         "[body]\nmoments = [40.0, 30.0, 20.0]\n[initial]\nomega = [0.3, 1.1, 2.7]\n"

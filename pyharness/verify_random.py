@@ -81,12 +81,17 @@ def truth_of(drawn: Draw) -> Truth:
     return Truth(times, path.omega, largest, growth)
 
 
-def entrances(drawn: Draw, number: int) -> dict[str, Callable[[Draw, Truth], "Answer"]]:
-    """Return the entrances that are tried in a draw, by the name that their check has."""
+def entrances(
+    drawn: Draw, number: int, thin: bool = False
+) -> dict[str, Callable[[Draw, Truth], "Answer"]]:
+    """Return the entrances that are tried in a draw, by the name that their check has.
+
+    Where they are to be `thin`, the compiled ones alone.
+    """
     has_form = closed_form(drawn.scene) is not None
     forms = ["closed-form"] if has_form else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
-    if number // 2 % _EVERY_SLOW == 0:
+    if number // 2 % _EVERY_SLOW == 0 and not thin:
         names += [*SCIPY_METHODS, "reference"]
     found = {f"solve-{name}": _solved(name) for name in names}
     return found | {
@@ -142,7 +147,7 @@ def random_methods(chosen: Selection) -> Iterator[Check]:
         drawn = draw(chosen.seed, number)
         asked = {
             f"random/{number}/{name}": entrance
-            for name, entrance in entrances(drawn, number).items()
+            for name, entrance in entrances(drawn, number, chosen.thin).items()
             if chosen.asks(f"random/{number}/{name}")
         }
         if not asked:

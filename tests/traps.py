@@ -54,9 +54,9 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
     results = (entry.__doc__ or "").partition(" = ")[0].split(",")
     library = _mathematics()
 
-    def call(*args: Any) -> Any:
+    def call(*args: Any, **named: Any) -> Any:
         library.feclearexcept(_TRAPPED)
-        answer = entry(*args)
+        answer = entry(*args, **named)
         raised = library.fetestexcept(_TRAPPED)
         if not raised:
             return answer
@@ -65,7 +65,9 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
             # An attempt with too long steps may overflow; then it is made again with shorter ones,
             # or the series answers.
             found["status"] = OVERFLOW
-        untold = raised & ~_told(found, bool(raised & TOO_LARGE) or not _finite(args))
+        untold = raised & ~_told(
+            found, bool(raised & TOO_LARGE) or not _finite((*args, *named.values()))
+        )
         if not untold or _are_extreme((*args, found.get("rows", 0.0))):
             return answer
         words = ", ".join(word for bit, word in _NAMES.items() if untold & bit)
@@ -75,7 +77,7 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
             library.feclearexcept(_TRAPPED)
             library.feenableexcept(untold)
             try:
-                entry(*args)
+                entry(*args, **named)
             finally:
                 library.fedisableexcept(_TRAPPED)
         raise UntoldException(f"{name}: {words}")

@@ -124,10 +124,13 @@ contains
       start(i) = scale(omega0(i), -power)
     end do
     call solve_as_given(copy, n_packed, start, time, omega, status, steps)
-    do i = 1, 3
-      omega(i) = scale(omega(i), power)
-    end do
-    if (status == COMPLETE .and. .not. all(abs(omega) <= huge(time))) status = OVERFLOW
+    ! Else omega means nothing, and may be no number at all.
+    if (status == COMPLETE) then
+      do i = 1, 3
+        omega(i) = scale(omega(i), power)
+      end do
+      if (.not. all(abs(omega) <= huge(time))) status = OVERFLOW
+    end if
   end subroutine solve_near_one
 
   subroutine solve_as_given(packed, n_packed, omega0, t_end, omega, ended, count)
@@ -201,7 +204,9 @@ contains
       omega = rows(:, 1)
     end select
     ! A start that is not finite may come back as it is, at time 0 for one.
-    if (ended == COMPLETE .and. .not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
+    if (ended == COMPLETE) then
+      if (.not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
+    end if
   end subroutine solve_as_given
 
   pure logical function in_steps(code)

@@ -9,6 +9,7 @@ import tomllib
 import venv
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -61,7 +62,8 @@ def _mypy(folder: Path, *scripts: Path) -> tuple[set[tuple[str, int]], str]:
     (folder / "lib/pyharness").symlink_to(ROOT / "pyharness")
     paths = {"base": str(folder / "env"), "platbase": str(folder / "env")}
     packages = Path(sysconfig.get_path("purelib", vars=paths))
-    (packages / "here.pth").write_text(f"{folder / 'lib'}\n{sysconfig.get_path('purelib')}\n")
+    others = Path(np.__file__).parent.parent
+    (packages / "here.pth").write_text(f"{folder / 'lib'}\n{others}\n")
     python = str(folder / "env/bin/python")
     done = subprocess.run(
         [

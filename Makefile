@@ -21,7 +21,7 @@ compare: .venv/ready
 	@$(BIN)/python -m pyharness compare --case $(CASE) $(ARGS)
 
 test: .venv/ready-to-test
-	@$(BIN)/python -m pytest -q $(ARGS)
+	@$(BIN)/python -m pytest -q -n auto --dist worksteal $(ARGS)
 
 mutate: .venv/ready-to-test
 	@$(BIN)/python -m tests.mutations $(ARGS)

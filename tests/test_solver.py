@@ -178,9 +178,9 @@ def test_what_is_no_time_is_refused(t_end: Any) -> None:
 @pytest.mark.parametrize(
     "out",
     [
-        np.empty(4), np.empty((1, 3)), np.empty(3, "f4"), np.empty(3, ">f8"), np.empty(3, complex),
-        np.empty(6)[::2], np.empty(3)[::-1], np.broadcast_to(1.0, 3), np.frombuffer(bytes(24)),
-        np.empty(25, "u1")[1:].view("f8"), [0.0, 0.0, 0.0], 3,
+        np.zeros(4), np.zeros((1, 3)), np.zeros(3, "f4"), np.zeros(3, ">f8"), np.zeros(3, complex),
+        np.zeros(6)[::2], np.zeros(3)[::-1], np.broadcast_to(1.0, 3), np.frombuffer(bytes(24)),
+        np.zeros(25, "u1")[1:].view("f8"), [0.0, 0.0, 0.0], 3,
     ],
     ids=str,
 )  # fmt: skip

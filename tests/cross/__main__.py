@@ -180,9 +180,9 @@ def _tell(name: str, begin: float, built: float, compared_at: float) -> None:
 def _suite(job: Job, tree: Path) -> Check:
     """Run tests in the tree of a build, with traps where it has run-time checks."""
     name = job.build.name
-    # A test that ends the process is named by the line before, if nothing is held back.
-    shown = "-sv" if job.build.checked else "-q"
-    arguments = ["pytest", shown, "-p", "no:cacheprovider", *(job.tests or ())]
+    # A test that ends its process is named by the one that had the process started.
+    processes = ["-n", "2", "--dist", "worksteal"] if job.build.checked else []
+    arguments = ["pytest", "-q", *processes, "-p", "no:cacheprovider", *(job.tests or ())]
     done = _run(tree, ["-m", *arguments], traps=job.build.checked)
     log = FOLDER / f"{name}.log"
     log.write_text(done.stdout)
@@ -193,8 +193,7 @@ def _suite(job: Job, tree: Path) -> Check:
         lines = done.stdout.splitlines()
         failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
         died = [line for line in lines if "Fortran runtime error" in line or ", untold" in line]
-        last = [line for line in lines if line.startswith("tests/")][-1:]
-        words = failed or [*last, *died] or lines[-3:]
+        words = [*failed, *died] or lines[-3:]
         note = "; ".join([*(each[:300] for each in words), f"see {log.relative_to(ROOT)}"])
     return Check(f"tests/{name}", done.returncode == 0, None, None, replay, note)
 

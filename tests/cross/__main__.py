@@ -180,9 +180,9 @@ def _tell(name: str, begin: float, built: float, compared_at: float) -> None:
 def _suite(job: Job, tree: Path) -> Check:
     """Run tests in the tree of a build, with traps where it has run-time checks."""
     name = job.build.name
-    # A test that ends its process is named by the one that had the process started.
+    # With -s the last words of a process that a test ends are not held back.
     processes = ["-n", "2", "--dist", "worksteal"] if job.build.checked else []
-    arguments = ["pytest", "-q", *processes, "-p", "no:cacheprovider", *(job.tests or ())]
+    arguments = ["pytest", "-sq", *processes, "-p", "no:cacheprovider", *(job.tests or ())]
     done = _run(tree, ["-m", *arguments], traps=job.build.checked)
     log = FOLDER / f"{name}.log"
     log.write_text(done.stdout)

@@ -1,0 +1,136 @@
+"""`python -m tests.outputs FOLDER` records; `python -m tests.outputs BEFORE AFTER` compares.
+
+A record is one file for each command: its exit code, what it prints (JSON wherever a verb has it,
+with sorted keys), and the digests of the files that it writes. What times are, and with what the
+extension was built, is left out. A comparison lists every difference, and those that the renames
+of `renames.toml` explain apart from the rest; 1 where there are others.
+"""
+
+import hashlib
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent.parent
+# Not the same in two runs: seconds, and what follows from them; the build, and where it stands.
+_VARIES = ("seconds", "build", "speed", "preparation", "time_ratio")
+_SCENE = """\
+name = "forced"
+[body]
+moments = [4.0, 3.0, 2.0]
+[initial]
+omega = [0.3, -1.2, 2.0]
+[torque]
+constant = [0.1, 0.0, -0.2]
+sines = [{ amplitude = [0.0, 0.5, 0.0], frequency = 3.0 }]
+[run]
+step_size = 0.01
+steps = 200
+"""
+
+
+def main() -> int:
+    """Record or compare."""
+    folders = [Path(each) for each in sys.argv[1:]]
+    if len(folders) == 1:
+        return _record(folders[0])
+    if len(folders) == 2:
+        return _compare(*folders)
+    print(__doc__, file=sys.stderr)
+    return 2
+
+
+def commands() -> dict[str, str]:
+    """Return the commands by the names of their records."""
+    found: dict[str, str] = tomllib.loads((HERE / "commands.toml").read_text())["commands"]
+    return found
+
+
+def _record(folder: Path) -> int:
+    folder.mkdir(parents=True, exist_ok=True)
+    with ThreadPoolExecutor(2) as pool:
+        texts = pool.map(_run, commands().values())
+        for name, text in zip(commands(), texts, strict=True):
+            (folder / f"{name}.json").write_text(text)
+            print(name, flush=True)
+    return 0
+
+
+def _run(command: str) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "scene.toml").write_text(_SCENE)
+        environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "100", "NO_COLOR": "1"}
+        done = subprocess.run(
+            [sys.executable, "-m", "pyharness", *shlex.split(command)],
+            cwd=folder, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        written = {
+            str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+            for path in sorted(Path(folder).rglob("*"))
+            if path.is_file() and path.name != "scene.toml"
+        }
+    try:
+        printed = _steady(json.loads(done.stdout))
+    except ValueError:
+        printed = re.sub(r"\b[\d.]+ (s|ms|us|µs|min)\b", r"- \1", done.stdout).splitlines()
+    record = {
+        "command": command, "exit": done.returncode, "printed": printed,
+        "said": done.stderr.splitlines(), "written": written,
+    }  # fmt: skip
+    return json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def _steady(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _steady(each) for key, each in value.items() if key not in _VARIES}
+    return [_steady(each) for each in value] if isinstance(value, list) else value
+
+
+def _compare(before: Path, after: Path) -> int:
+    renames = tomllib.loads((HERE / "renames.toml").read_text())["renames"]
+    strange = 0
+    for name in sorted({path.stem for each in (before, after) for path in each.glob("*.json")}):
+        old, new = (_leaves(each / f"{name}.json") for each in (before, after))
+        known = {_renamed(key, renames): _renamed(text, renames) for key, text in old.items()}
+        explained = sum(old.get(key) != text for key, text in known.items())
+        wrong = [key for key in known.keys() | new.keys() if known.get(key) != new.get(key)]
+        for key in sorted(wrong):
+            print(f"{name}: {key}: {known.get(key, 'absent')} -> {new.get(key, 'absent')}")
+        if explained:
+            print(f"{name}: {explained} differences that are renames")
+        strange += len(wrong)
+    print(f"{strange} differences that no rename explains")
+    return 1 if strange else 0
+
+
+def _leaves(path: Path) -> dict[str, str]:
+    return dict(_walk("", json.loads(path.read_text()))) if path.exists() else {}
+
+
+def _walk(place: str, value: Any) -> Iterator[tuple[str, str]]:
+    if isinstance(value, dict | list) and value:
+        pairs = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, each in pairs:
+            yield from _walk(f"{place}/{key}", each)
+    else:
+        yield place, json.dumps(value, ensure_ascii=False)
+
+
+def _renamed(text: str, renames: dict[str, str]) -> str:
+    for old, new in renames.items():
+        text = re.sub(rf"(?<![\w-]){re.escape(old)}(?![\w-])", new, text)
+    return text
+
+
+if __name__ == "__main__":
+    sys.exit(main())

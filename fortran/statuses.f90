@@ -1,5 +1,5 @@
 module statuses
-  !! How a computation ended; pyharness/kernels.py has their names.
+  !! How a computation ended; pyharness/methods/kernels.py has their names.
   implicit none(type, external)
   private
 

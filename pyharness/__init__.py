@@ -4,12 +4,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pyharness.errors import InputError, NotBuiltError
-    from pyharness.listing import Listing, subset
-    from pyharness.scene import Scene, TorqueLaw
-    from pyharness.scene_file import case_scene, read_scene
-    from pyharness.solver import Solver, prepare, solve
-    from pyharness.trajectory import Stop, Trajectory
+    from pyharness.methods.prepared import Solver, prepare, solve
+    from pyharness.model.errors import InputError, NotBuiltError
+    from pyharness.model.listing import Listing, subset
+    from pyharness.model.scene import Scene, TorqueLaw
+    from pyharness.model.scene_file import case_scene, read_scene
+    from pyharness.model.trajectory import Stop, Trajectory
 
     __version__: str
     # What the build makes.
@@ -32,14 +32,14 @@ __all__ = [
     "subset",
 ]
 
-# Names load their room when they are first asked for: a program that needs one pays for one.
+# A name loads its room when it is first asked for: a program that needs one pays for one.
 _ROOMS = {
-    "errors": ("InputError", "NotBuiltError"),
-    "listing": ("Listing", "subset"),
-    "solver": ("Solver", "prepare", "solve"),
-    "scene": ("Scene", "TorqueLaw"),
-    "scene_file": ("case_scene", "read_scene"),
-    "trajectory": ("Stop", "Trajectory"),
+    "model.errors": ("InputError", "NotBuiltError"),
+    "model.listing": ("Listing", "subset"),
+    "model.scene": ("Scene", "TorqueLaw"),
+    "model.scene_file": ("case_scene", "read_scene"),
+    "model.trajectory": ("Stop", "Trajectory"),
+    "methods.prepared": ("Solver", "prepare", "solve"),
 }
 
 

@@ -9,7 +9,7 @@ import sys
 def start() -> None:
     """Run the command line and leave with its exit code, soon where it was interrupted."""
     try:
-        from pyharness.cli import main
+        from pyharness.cli.main import main
 
         code = main()
     except KeyboardInterrupt:

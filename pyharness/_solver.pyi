@@ -1,8 +1,8 @@
 from collections.abc import Callable
 from typing import Self
 
-from pyharness.trajectory import Array
-from pyharness.values import Number, Numbers, Triple
+from pyharness.model.trajectory import Array
+from pyharness.model.values import Number, Numbers, Triple
 
 class BoundKernel:
     def __new__(

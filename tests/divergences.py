@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pyharness.facts import facts
+from pyharness.model.facts import facts
 
 
 def divergences(kind: str | None = None) -> list[dict[str, Any]]:

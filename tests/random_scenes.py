@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness import Scene, TorqueLaw
-from pyharness.scene import Triple, Wave
+from pyharness.model.scene import Triple, Wave
 
 Generator = np.random.Generator
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from pyharness import figures
-from pyharness.cli import main
-from pyharness.figure_plots import numbers
+from pyharness.cli.main import main
+from pyharness.history import figures
+from pyharness.history.figure_pictures import numbers
 
 ROOT = Path(__file__).parent.parent
 DOCS = sorted((ROOT / "docs").glob("*.md"))

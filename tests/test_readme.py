@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pyharness import read_scene
-from pyharness.cli import main
+from pyharness.cli.main import main
 
 README = Path(__file__).parent.parent / "README.md"
 

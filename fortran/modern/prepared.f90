@@ -12,7 +12,7 @@ module prepared
   implicit none(type, external)
   private
 
-  ! Places in the packed array; pyharness/solver.py fills it, and any number of threads read it.
+  ! Places in the packed array; pyharness/methods/prepared.py fills it, and any number of threads read it.
   integer, parameter :: METHOD = 1
   integer, parameter :: TOLERANCE = 2    ! relative, of the series
   integer, parameter :: STEP = 3         ! s, of the methods with a fixed step

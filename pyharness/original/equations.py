@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.scene import Scene
-from pyharness.trajectory import Stop, Trajectory
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Stop, Trajectory
 
 Vector = Sequence[float]
 

@@ -5,7 +5,9 @@ Residual zero at .2, .4, .6 and .8 of the interval.
 
 from collections.abc import Sequence
 
-from pyharness.listing import Listing
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
 from pyharness.original.collocation import interval
 from pyharness.original.equations import (
     Record,
@@ -15,8 +17,6 @@ from pyharness.original.equations import (
     omega_rate,
     velocity_rate,
 )
-from pyharness.scene import Scene
-from pyharness.trajectory import Trajectory
 
 
 def run(

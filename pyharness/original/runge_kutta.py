@@ -7,7 +7,9 @@ right-hand sides change by more than the constant times the change of the unknow
 import math
 from collections.abc import Mapping
 
-from pyharness.listing import Listing
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
 from pyharness.original.equations import (
     Record,
     Vector,
@@ -15,8 +17,6 @@ from pyharness.original.equations import (
     all_finite,
     velocity_rate,
 )
-from pyharness.scene import Scene
-from pyharness.trajectory import STOP_VARIABLES, Stop, Trajectory
 
 
 def run(

@@ -10,9 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from pyharness.check_tables import checks_table
-from pyharness.checks import Check
-from pyharness.facts import facts
+from pyharness.compare.checks import Check
+from pyharness.compare.checks_report import checks_table
+from pyharness.model.facts import facts
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
 from tests.cross.comparison import compared, inside
 from tests.instruction_sets import fuses_here
@@ -20,11 +20,12 @@ from tests.instruction_sets import fuses_here
 FOLDER = ROOT / "build" / "cross"
 # The kernels that answer to the truth, not to bits.
 MODERN = [
-    f"tests/test_{name}.py"
-    for name in (
-        "closed_form", "fixed_step", "gauss", "linear_solver", "quick", "solver", "taylor",
-    )
-]  # fmt: skip
+    "tests/original/test_linear_solver.py",
+    *(
+        f"tests/methods/test_{name}.py"
+        for name in ("closed_form", "fixed_step", "gauss", "quick", "prepared", "taylor")
+    ),
+]
 # Recursion: the entries release the lock, so that two threads may well be in one of them.
 CHECKED = (
     "-fcheck=all,no-recursion", "-finit-real=snan", "-finit-integer=-2147483647",
@@ -202,7 +203,7 @@ def _faults(tree: Path) -> Iterator[Check]:
     """See that each planted fault ends the process, by the message that is due."""
     for name, (program, _, words) in FAULTS.items():
         code = (
-            "import tests.conftest; from pyharness.cli import main; "
+            "import tests.conftest; from pyharness.cli.main import main; "
             f"main(['run', '--case', '3', '--program', '{program}', '--listing', 'original'])"
         )
         done = _run(tree, ["-c", code], traps=True)

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from pyharness import _build, _kernels
-from pyharness.cells import all_cells, all_listings, cell_name, listing_name
-from pyharness.listing import PROGRAMS
-from pyharness.methods import PROGRAM_REGISTRY
-from pyharness.scene_file import case_scene
-from pyharness.trajectory import Trajectory
-from tests.test_programs import NASTY
+from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.original.cells import all_cells, all_listings, cell_name, listing_name
+from tests.original.test_programs import NASTY
 
 
 def digest(run: Trajectory) -> str:
@@ -52,7 +52,7 @@ def replay(cell: str) -> str:
         return f"pyharness verify --only {cell}"
     _, program, name = cell.split("/")[:3]
     return (
-        "pytest -q 'tests/test_programs.py::test_nasty_scenes_agree_to_the_last_bit"
+        "pytest -q 'tests/original/test_programs.py::test_nasty_scenes_agree_to_the_last_bit"
         f"[{program}-{name}]'"
     )
 

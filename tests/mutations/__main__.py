@@ -24,8 +24,8 @@ from tests.mutations.trial import Verdict, attempt, false_killers
 CI = (
     "fortran/modern/taylor/tail-order",
     "fortran/original/runge_kutta/second-stage-base",
-    "pyharness/agreement/tolerance-sense",
-    "pyharness/scene_file/inertia-order",
+    "pyharness/compare/agreement/tolerance-sense",
+    "pyharness/model/scene_file/inertia-order",
 )
 FEW = 4
 

@@ -13,84 +13,134 @@ from tests.mutations.tree import Tree
 # Random draws of `verify` follow a seed; the week's would give another score each week.
 SEED = "mutations"
 # Not these: they look whether the text still stands, or plant faults in the text themselves.
-NOT_HERE = ("tests/test_mutations.py",)
+NOT_HERE = ("tests/mutations/test_mutations.py",)
 OF_ONE_CHECK = 180.0  # s
 OF_ALL = 2400.0  # s
 # By the beginning of a file: the tests that are most likely to see a change, the cheapest first.
 NEAR = {
-    "fortran/modern/taylor.f90": ("taylor", "slow_waves", "solver", "effort", "methods"),
-    "fortran/modern/taylor_plan.f90": ("taylor", "slow_waves", "solver"),
-    "fortran/modern/euler_equations.f90": ("taylor", "slow_waves", "solver"),
-    "fortran/modern/levels.c": ("taylor", "quick", "solver", "build"),
-    "fortran/modern/levels.f90": ("taylor", "quick", "solver"),
-    "fortran/modern/scaled_motion.f90": ("slow_waves", "quick", "solver"),
-    "fortran/modern/scaled_runge_kutta.f90": ("quick", "slow_waves", "solver"),
-    "fortran/modern/prepared.f90": ("scaling", "solver", "fixed_step", "quick"),
-    "fortran/modern/solver.c": ("values", "solver"),
-    "fortran/modern/torque_free.f90": ("closed_form", "solver"),
-    "fortran/modern/two_words.f90": ("closed_form", "scaling"),
-    "fortran/modern/sphere.f90": ("closed_form", "solver"),
-    "fortran/modern/gauss_collocation.f90": ("gauss", "solver", "effort"),
-    "fortran/make_gauss.py": ("gauss", "family"),
-    "fortran/modern/fixed_step.f90": ("fixed_step", "effort", "solver"),
-    "fortran/modern/torque_law.f90": ("fixed_step", "gauss"),
-    "fortran/original/linear_solver.f90": ("linear_solver", "programs"),
-    "fortran/original/": ("programs", "listing", "stress_steps"),
-    "fortran/api.f90": ("programs", "solver", "closed_form", "gauss", "fixed_step", "taylor"),
-    "pyharness/verify_": ("slack", "verify", "plants"),
-    "pyharness/verify": ("verify", "plants"),
-    "pyharness/checks": ("slack", "verify", "stress"),
-    "pyharness/random_scenes": ("integer_series", "verify", "slack"),
-    "pyharness/integer_series": ("integer_series", "slow_waves"),
-    "pyharness/golden": ("slack", "verify"),
-    "pyharness/agreement": ("compare", "programs", "verify"),
-    "pyharness/conditioning": ("conditioning", "slack", "orders"),
-    "pyharness/linearised": ("conditioning", "slow_waves", "methods"),
-    "pyharness/values": ("values", "scene", "solver"),
-    "pyharness/effort": ("effort", "limits", "cli"),
-    "pyharness/claim": ("claims",),
-    "pyharness/laboratory": ("claims",),
-    "pyharness/counting": ("claims",),
-    "pyharness/family": ("family",),
-    "pyharness/stress": ("slack", "stress"),
-    "pyharness/trials/step_size": ("slack", "stress_steps"),
-    "pyharness/trials/matrices": ("slack", "stress_steps"),
-    "pyharness/trials/truth": ("slack", "stress", "stress_motions"),
-    "pyharness/trials/": ("slack", "stress", "stress_motions", "stress_steps"),
-    "pyharness/stability/elliptic": ("elliptic", "stress_motions"),
-    "pyharness/stability/axial_top": ("stress_motions",),
-    "pyharness/stability/brouwer": ("slack", "stress_motions"),
-    "pyharness/stability/turned_scenes": ("stress_motions",),
-    "pyharness/stability/": ("slack", "stress_steps"),
-    "pyharness/growth": ("bench",),
-    "pyharness/original/linear_solver": ("linear_solver",),
-    "pyharness/original/": ("programs",),
-    "pyharness/scipy_methods": ("slow_waves", "effort", "scaling", "methods"),
-    "pyharness/methods": ("methods", "solver", "cli"),
-    "pyharness/modern": ("gauss", "fixed_step", "closed_form", "effort", "methods"),
-    "pyharness/kernels": ("programs", "taylor", "solver"),
-    "pyharness/reference": ("reference", "slow_waves", "effort"),
-    "pyharness/scene.py": ("scene", "values", "programs"),
-    "pyharness/scene_file": ("scene", "fuzz", "cli"),
-    "pyharness/decimal_functions": ("reference",),
-    "pyharness/external": ("external", "slack"),
-    "pyharness/errors": ("scene", "solver", "cli"),
-    "pyharness/records": ("compare", "cli"),
-    "pyharness/tables": ("compare", "cli"),
-    "pyharness/output": ("output", "cli", "figures"),
-    "pyharness/options": ("cli",),
-    "pyharness/verbs/verify": ("verify",),
-    "pyharness/verbs/": ("cli",),
-    "pyharness/trajectory": ("programs",),
-    "pyharness/ablation": ("apparatus",),
-    "pyharness/tape5": ("tape5",),
-}
+    "fortran/modern/taylor.f90": (
+        "methods/taylor",
+        "methods/slow_waves",
+        "methods/prepared",
+        "model/effort",
+        "methods/registry",
+    ),
+    "fortran/modern/taylor_plan.f90": (
+        "methods/taylor", "methods/slow_waves", "methods/prepared",
+    ),
+    "fortran/modern/euler_equations.f90": (
+        "methods/taylor",
+        "methods/slow_waves",
+        "methods/prepared",
+    ),
+    "fortran/modern/levels.c": (
+        "methods/taylor",
+        "methods/quick",
+        "methods/prepared",
+        "model/build",
+    ),
+    "fortran/modern/levels.f90": ("methods/taylor", "methods/quick", "methods/prepared"),
+    "fortran/modern/scaled_motion.f90": (
+        "methods/slow_waves", "methods/quick", "methods/prepared",
+    ),
+    "fortran/modern/scaled_runge_kutta.f90": (
+        "methods/quick",
+        "methods/slow_waves",
+        "methods/prepared",
+    ),
+    "fortran/modern/prepared.f90": (
+        "model/same_motion",
+        "methods/prepared",
+        "methods/fixed_step",
+        "methods/quick",
+    ),
+    "fortran/modern/solver.c": ("model/values", "methods/prepared"),
+    "fortran/modern/torque_free.f90": ("methods/closed_form", "methods/prepared"),
+    "fortran/modern/two_words.f90": ("methods/closed_form", "model/same_motion"),
+    "fortran/modern/sphere.f90": ("methods/closed_form", "methods/prepared"),
+    "fortran/modern/gauss_collocation.f90": ("methods/gauss", "methods/prepared", "model/effort"),
+    "fortran/make_gauss.py": ("methods/gauss", "history/family"),
+    "fortran/modern/fixed_step.f90": ("methods/fixed_step", "model/effort", "methods/prepared"),
+    "fortran/modern/torque_law.f90": ("methods/fixed_step", "methods/gauss"),
+    "fortran/original/linear_solver.f90": ("original/linear_solver", "original/programs"),
+    "fortran/original/": ("original/programs", "model/listing", "stress/steps"),
+    "fortran/api.f90": (
+        "original/programs",
+        "methods/prepared",
+        "methods/closed_form",
+        "methods/gauss",
+        "methods/fixed_step",
+        "methods/taylor",
+    ),
+    "pyharness/verify/kinds": ("verify/kinds", "verify/plants"),
+    "pyharness/compare/checks": ("slack/slack", "verify/kinds", "stress/run"),
+    "pyharness/compare/random_scenes": ("truth/integer_series", "verify/kinds", "slack/slack"),
+    "pyharness/truth/integer_series": ("truth/integer_series", "methods/slow_waves"),
+    "pyharness/verify/golden": ("slack/slack", "verify/kinds"),
+    "pyharness/compare/agreement": ("compare/comparison", "original/programs", "verify/kinds"),
+    "pyharness/theory/conditioning": ("theory/conditioning", "slack/slack", "compare/orders"),
+    "pyharness/methods/linearised": (
+        "theory/conditioning",
+        "methods/slow_waves",
+        "methods/registry",
+    ),
+    "pyharness/model/values": ("model/values", "model/scene", "methods/prepared"),
+    "pyharness/model/effort": ("model/effort", "history/limits", "cli/main"),
+    "pyharness/history/claims/": ("history/claims",),
+    "pyharness/history/claims/laboratory": ("history/claims",),
+    "pyharness/original/counting": ("history/claims",),
+    "pyharness/history/family/members": ("history/family",),
+    "pyharness/stress/run": ("slack/slack", "stress/run"),
+    "pyharness/stress/trials/step_size": ("slack/slack", "stress/steps"),
+    "pyharness/stress/trials/matrices": ("slack/slack", "stress/steps"),
+    "pyharness/stress/hold": ("slack/slack", "stress/run", "stress/motions"),
+    "pyharness/stress/trials/": ("slack/slack", "stress/run", "stress/motions", "stress/steps"),
+    "pyharness/truth/elliptic": ("truth/elliptic", "stress/motions"),
+    "pyharness/truth/axial_top": ("stress/motions",),
+    "pyharness/theory/brouwer": ("slack/slack", "stress/motions"),
+    "pyharness/model/turned_scenes": ("stress/motions",),
+    "pyharness/theory/promises": ("slack/slack", "stress/run"),
+    "pyharness/theory/": ("slack/slack", "stress/steps"),
+    "pyharness/bench/growth": ("bench/measure",),
+    "pyharness/original/linear_solver": ("original/linear_solver",),
+    "pyharness/original/": ("original/programs",),
+    "pyharness/methods/scipy_ivp": (
+        "methods/slow_waves",
+        "model/effort",
+        "model/same_motion",
+        "methods/registry",
+    ),
+    "pyharness/methods/registry": ("methods/registry", "methods/prepared", "cli/main"),
+    "pyharness/methods/gauss": (
+        "methods/gauss",
+        "methods/fixed_step",
+        "methods/closed_form",
+        "model/effort",
+        "methods/registry",
+    ),
+    "pyharness/methods/kernels": ("original/programs", "methods/taylor", "methods/prepared"),
+    "pyharness/truth/reference": ("truth/reference", "methods/slow_waves", "model/effort"),
+    "pyharness/model/scene.py": ("model/scene", "model/values", "original/programs"),
+    "pyharness/model/scene_file": ("model/scene", "fuzz/fuzz", "cli/main"),
+    "pyharness/truth/decimal_functions": ("truth/reference",),
+    "pyharness/verify/external": ("verify/external", "slack/slack"),
+    "pyharness/verify/": ("slack/slack", "verify/kinds", "verify/plants"),
+    "pyharness/model/errors": ("model/scene", "methods/prepared", "cli/main"),
+    "pyharness/views/records": ("compare/comparison", "cli/main"),
+    "pyharness/views/text": ("compare/comparison", "cli/main"),
+    "pyharness/cli/output": ("cli/output", "cli/main", "history/figures"),
+    "pyharness/cli/options": ("cli/main",),
+    "pyharness/cli/verbs/verify": ("verify/kinds",),
+    "pyharness/cli/verbs/": ("cli/main",),
+    "pyharness/model/trajectory": ("original/programs",),
+    "pyharness/history/ablation": ("history/ablation",),
+    "pyharness/history/tape5": ("history/tape5",),
+}  # fmt: skip
 # What `verify` sees of these sooner than the whole suite would.
 SEEN_BY_VERIFY = "random,methods,prepared"
 JUDGES = (
-    "fortran/modern/", "pyharness/verify_", "pyharness/methods", "pyharness/reference",
-    "pyharness/scipy_methods", "pyharness/conditioning", "pyharness/linearised",
-    "pyharness/modern", "pyharness/solver", "pyharness/random_scenes",
+    "fortran/modern/", "pyharness/verify/", "pyharness/methods/", "pyharness/truth/reference",
+    "pyharness/theory/conditioning", "pyharness/compare/random_scenes",
 )  # fmt: skip
 
 
@@ -113,17 +163,19 @@ def near(row: Row) -> list[str]:
     """Return the test files that are most likely to catch a change."""
     for begin, names in NEAR.items():
         if row.file.startswith(begin):
-            paths = [f"tests/test_{name}.py" for name in names]
+            rooms = [name.rpartition("/") for name in names]
+            paths = [f"tests/{room}/test_{name}.py" for room, _, name in rooms]
             return [path for path in paths if (ROOT / path).exists()]
     module = ".".join(PurePosixPath(row.file).with_suffix("").parts)
     package, _, name = module.rpartition(".")
     uses = re.compile(rf"\b(from|import) {re.escape(module)}\b|from {re.escape(package)} import"
                       rf" [^\n]*\b{name}\b|tests\.test_{name}\b")  # fmt: skip
     own = {f"test_{name}", f"test_{package.rpartition('.')[2]}"}
-    found = [path for path in sorted((ROOT / "tests").glob("test_*.py"))
+    found = [path for path in sorted((ROOT / "tests").rglob("test_*.py"))
              if path.stem in own or uses.search(path.read_text())]  # fmt: skip
     found.sort(key=lambda path: path.stem not in own)
-    return [f"tests/{path.name}" for path in found if f"tests/{path.name}" not in NOT_HERE]
+    paths = [str(path.relative_to(ROOT)) for path in found]
+    return [path for path in paths if path not in NOT_HERE]
 
 
 def failing(tree: Tree, names: list[str], limit: float) -> str | None:

@@ -1,0 +1,153 @@
+"""The peers that numba compiles: fixed steps of its own, and the solvers of numbalsoda.
+
+The source of each right-hand side is written out with the numbers of its scene, as one would
+write it by hand for speed; so are the stages of the methods.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pyharness.bench.contenders import Maker, Outcome, Ready, not_finite, plain, refuse_rounding
+from pyharness.model.scene import Scene
+
+_MOST_STEPS = 10_000_000
+# Classical Runge-Kutta: stages below the diagonal, weights, nodes.
+_RK4 = (
+    [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]],
+    [1 / 6, 1 / 3, 1 / 3, 1 / 6],
+    [0.0, 0.5, 0.5, 1.0],
+)
+
+
+def numba_fixed(method: str, scene: Scene) -> Maker:
+    """Equal steps of RK4, or of the formula of order 8 in DOP853."""
+    import numba
+
+    nodes: Sequence[float]
+    if method == "rk4":
+        stages, weights, nodes = _RK4
+    else:
+        from scipy.integrate._ivp import dop853_coefficients as table
+
+        count = table.N_STAGES
+        stages = [table.A[i, :i].tolist() for i in range(count)]
+        weights, nodes = table.B.tolist(), table.C[:count].tolist()
+    kernel = numba.njit(fastmath=False)(_compiled(_steps_source(scene, stages, weights, nodes)))
+    omega0, omega = np.array(scene.omega), np.empty(3)
+
+    def make(horizon: float, setting: float) -> Ready:
+        steps = int(setting)
+
+        def run() -> Any:
+            kernel(omega0, horizon, steps, omega)
+            return omega
+
+        return Ready(run, lambda result: Outcome(plain(result), steps * len(weights)))
+
+    return make
+
+
+def numbalsoda(name: str, scene: Scene) -> Maker:
+    """`dop853` or `lsoda` of numbalsoda with a compiled right-hand side."""
+    import numba
+    import numbalsoda as package
+
+    solver = getattr(package, name)
+    function = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=False)))
+    counting = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=True)))
+    omega0, largest = np.array(scene.omega), max(map(abs, scene.omega)) or 1.0
+
+    def make(horizon: float, setting: float) -> Ready:
+        if name == "lsoda":
+            refuse_rounding("LSODA", setting)
+        times, calls = np.array([0.0, horizon]), np.zeros(1)
+
+        address = function.address
+
+        def run() -> Any:
+            return solver(address, omega0, times, calls, setting, setting * largest, _MOST_STEPS)
+
+        def read(result: Any) -> Outcome:
+            rows, success = result
+            if not success:
+                return not_finite("the solver reports a failure")
+            calls[0] = 0.0
+            solver(counting.address, omega0, times, calls, setting, setting * largest, _MOST_STEPS)
+            return Outcome(plain(rows[-1]), int(calls[0]))
+
+        return Ready(run, read)
+
+    return make
+
+
+def _compiled(source: str) -> Any:
+    """Return the function of a source, in plain Python."""
+    names: dict[str, Any] = {}
+    exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
+    return names["function"]
+
+
+def _rates(scene: Scene, time: str, state: Sequence[str]) -> list[str]:
+    """Return the right-hand sides as text."""
+    x, y, z = state
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    law = scene.torque
+    rates = []
+    for axis, product in enumerate((f"{y} * {z}", f"{x} * {z}", f"{x} * {y}")):
+        terms = []
+        coefficient = scene.euler_coefficients[axis]
+        if coefficient:
+            terms.append(f"{coefficient!r} * {product}")
+        if law.constant[axis]:
+            terms.append(repr(law.constant[axis] / moments[axis]))
+        if law.rate[axis]:
+            terms.append(f"{law.rate[axis] / moments[axis]!r} * ({time})")
+        for waves, function in ((law.sines, "sin"), (law.cosines, "cos")):
+            for amplitude, frequency in waves:
+                if amplitude[axis]:
+                    wave = f"{function}({frequency!r} * ({time}))"
+                    terms.append(f"{amplitude[axis] / moments[axis]!r} * {wave}")
+        rates.append(" + ".join(terms) or "0.0")
+    return rates
+
+
+def _steps_source(
+    scene: Scene,
+    stages: Sequence[Sequence[float]],
+    weights: Sequence[float],
+    nodes: Sequence[float],
+) -> str:
+    """Return a function of equal Runge-Kutta steps without a loop over stages or components."""
+    lines = [
+        "def function(omega0, t_end, steps, omega):",
+        "    h = t_end / steps",
+        "    x, y, z = omega0[0], omega0[1], omega0[2]",
+        "    for step in range(steps):",
+        "        t = step * h",
+    ]
+    for i, row in enumerate(stages):
+        for name in "xyz":
+            lines.append(f"        {name}s = {name}{_increment(row, name)}")
+        time = f"t + {nodes[i]!r} * h" if nodes[i] else "t"
+        for name, rate in zip("xyz", _rates(scene, time, ("xs", "ys", "zs")), strict=True):
+            lines.append(f"        k{name}{i} = {rate}")
+    for name in "xyz":
+        lines.append(f"        {name} = {name}{_increment(weights, name)}")
+    lines.append("    omega[0], omega[1], omega[2] = x, y, z")
+    return "\n".join(lines) + "\n"
+
+
+def _increment(factors: Sequence[float], name: str) -> str:
+    terms = [f"{factor!r} * k{name}{j}" for j, factor in enumerate(factors) if factor]
+    return f" + h * ({' + '.join(terms)})" if terms else ""
+
+
+def _callback_source(scene: Scene, counted: bool) -> str:
+    """Return a right-hand side as numbalsoda calls it; `p` counts the calls if asked to."""
+    lines = ["def function(t, u, du, p):", "    x, y, z = u[0], u[1], u[2]"]
+    lines += [f"    du[{i}] = {rate}" for i, rate in enumerate(_rates(scene, "t", ("x", "y", "z")))]
+    if counted:
+        lines.append("    p[0] += 1.0")
+    return "\n".join(lines) + "\n"

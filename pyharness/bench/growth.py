@@ -1,0 +1,87 @@
+"""How errors grow with time: the Taylor method against the closed form, up to 1e5 s.
+
+The yardstick is the closed form's own conditioning: a relative change of time, or of any rate, by
+one rounding (2**-53) turns the solution by 2**-53 t |omega'|, whatever the method.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.methods.plan import closed_form
+from pyharness.methods.prepared import prepare
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+HORIZONS = tuple(10.0 ** (k / 2.0) for k in range(11))
+_ROUNDING = 2.0**-53
+_STARTS = 8
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Error at one time.
+
+    Attributes
+    ----------
+    time : float
+        s.
+    error : float
+        Largest difference of the Taylor method from the closed form over `_STARTS` starts of the
+        same motion, relative to the largest angular velocity.
+    conditioning : float
+        What one rounding of the time changes, likewise.
+    steps : int
+        Taylor steps of one run.
+    """
+
+    time: float
+    error: float
+    conditioning: float
+    steps: int
+
+
+def growth(
+    scene: Scene, horizons: Sequence[float] = HORIZONS, tolerance: float = 1e-15
+) -> list[Growth]:
+    """Measure the growth of the error of the Taylor method on a torque-free body.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without torque.
+    horizons : sequence of float
+        Times, s.
+    tolerance : float
+        Of the Taylor method.
+
+    Raises
+    ------
+    InputError
+        Where the scene has no closed form.
+    """
+    if closed_form(scene) is None:
+        raise InputError("growth: the scene has no closed form to be held against")
+    series = prepare(scene, "taylor", tolerance)
+    exact = prepare(scene, "closed-form")
+    rate = scene.right_hand_side()
+    starts = _starts(scene, exact(np.array(scene.omega), 0.0))
+    found = []
+    for time in horizons:
+        errors, turns = [], []
+        for start in starts:
+            wanted = exact(start, time).copy()
+            errors.append(np.abs(series(start, time) - wanted).max())
+            turns.append(np.abs(rate(0.0, wanted.tolist())).max())
+        size = float(np.abs(starts).max())
+        conditioning = _ROUNDING * time * max(turns) / size
+        found.append(Growth(time, float(max(errors)) / size, conditioning, series.steps))
+    return found
+
+
+def _starts(scene: Scene, omega: Array) -> Array:
+    """Return states of one motion, so that no lucky phase decides."""
+    exact = prepare(scene, "closed-form")
+    return np.array([exact(omega.copy(), 0.37 * k).copy() for k in range(_STARTS)])

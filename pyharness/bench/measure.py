@@ -1,0 +1,273 @@
+"""The benchmark: run time against error, ours and other people's, in one process and one run.
+
+Every contender is called with a ladder of settings, each call from omega(0) to omega(T). First
+all are made, called once and judged against the reference; then they are timed in rounds, a batch
+of each in turn, so that what else the machine does hits all alike. The median counts.
+"""
+
+import math
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+
+from pyharness.bench.contenders import Contender, Maker, Outcome, RefusedError
+from pyharness.compare.timing import Entry, time_calls
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.truth.reference import Reference, reference
+
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
+HORIZON, LONG_HORIZON = 3.0, 100.0
+_CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
+
+_LONGEST_CALL = 1.0  # s
+# Seconds for the first calls of a contender in one case, by what is varied.
+_BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
+_LARGEST_STEPS = 1 << 22
+_FAILURES = 12
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Workload:
+    """A scene and how far to go.
+
+    Attributes
+    ----------
+    label : str
+        `5` for Case 5 to T = 3, `3L` for Case 3 to T = 100.
+    scene : Scene
+        What to integrate.
+    horizon : float
+        T, s.
+    """
+
+    label: str
+    scene: Scene
+    horizon: float
+
+    @property
+    def group(self) -> str:
+        """What its ratios are averaged with."""
+        if self.horizon != HORIZON:
+            return f"T = {self.horizon:g}"
+        return f"{'torque-free' if self.scene.torque.is_zero else 'torque'}, T = {HORIZON:g}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A contender with one setting.
+
+    Attributes
+    ----------
+    workload : Workload
+        What was integrated.
+    method : str
+        Name of the contender.
+    kind : str
+        What the setting is: tolerance, steps, none.
+    setting : float or None
+        Its value.
+    seconds : float or None
+        Median time of a call; None where the call failed.
+    error : float or None
+        Largest error of omega at T over the largest component there; None where it failed.
+    evaluations : int or None
+        Right-hand sides of a call, where they can be counted.
+    note : str
+        Why it failed.
+    """
+
+    workload: Workload
+    method: str
+    kind: str
+    setting: float | None
+    seconds: float | None
+    error: float | None
+    evaluations: int | None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A setting that was not run, or a contender that was not (setting None), and why."""
+
+    workload: Workload
+    method: str
+    setting: float | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a run of the benchmark found.
+
+    Attributes
+    ----------
+    workloads, rows, refused : list
+        What was asked, measured, and not run.
+    preparation : dict
+        Seconds of compiling and of first calls by (case, method).
+    doubt : dict
+        Relative error that the reference may have, by label.
+    """
+
+    workloads: list[Workload]
+    rows: list[Row]
+    refused: list[Refusal]
+    preparation: dict[tuple[int | None, str], float]
+    doubt: dict[str, float]
+
+
+def workloads(case: int | None = None, horizon: float | None = None) -> list[Workload]:
+    """Return what is integrated: Cases 2 to 7, Cases 3 and 4 also for long; or what is asked."""
+    cases = _CASES if case is None else (case,)
+    if horizon is not None:
+        mark = "" if horizon == HORIZON else "L" if horizon == LONG_HORIZON else f" T={horizon:g}"
+        return [Workload(f"{n}{mark}", case_scene(n), horizon) for n in cases]
+    short = [Workload(str(n), case_scene(n), HORIZON) for n in cases]
+    return short + [
+        Workload(f"{n}L", case_scene(n), LONG_HORIZON) for n in cases if n in _LONG_CASES
+    ]
+
+
+def measure(
+    loads: Sequence[Workload], contenders: Sequence[Contender], progress: Progress | None = None
+) -> Finding:
+    """Run the benchmark."""
+    say = progress or (lambda text: None)
+    found = Finding(list(loads), [], [], {}, {})
+    makers: dict[tuple[int | None, str], Maker] = {}
+    for number, load in enumerate(loads, 1):
+        place = f"case {load.label} ({number} of {len(loads)})"
+        say(f"{place}: reference")
+        truth = reference(load.scene, [load.horizon], precise=True)
+        size = float(np.abs(truth.omega).max(initial=0.0)) or 1.0
+        found.doubt[load.label] = truth.estimate / size
+        entries: list[tuple[Contender, Entry]] = []
+        for contender in contenders:
+            say(f"{place}: {contender.name}")
+            key = (load.scene.case, contender.name)
+            # Compiled code is kept for the same scene with another horizon.
+            begin = perf_counter()
+            try:
+                if key not in makers:
+                    makers[key] = contender.prepare(load.scene)
+            except RefusedError as error:
+                found.refused.append(Refusal(load, contender.name, None, str(error)))
+                continue
+            spent = perf_counter() - begin
+            first, more = _first_calls(load, contender, makers[key], truth, found.refused)
+            found.preparation[key] = found.preparation.get(key, 0.0) + spent + more
+            entries += [(contender, entry) for entry in first]
+        time_calls([entry for _, entry in entries], partial(_say_at, say, place))
+        found.rows.extend(_row(load, contender, entry) for contender, entry in entries)
+    return found
+
+
+def _say_at(say: Progress, place: str, text: str) -> None:
+    say(f"{place}: {text}")
+
+
+def relative_error(omega: Sequence[float], truth: Reference) -> float | None:
+    """Return the largest error of omega over the largest component of the truth; None if none."""
+    if len(truth.omega) == 0:
+        return None
+    # Near the truth the difference is exact: what the reference has beyond binary64 then counts.
+    difference = np.asarray(omega) - truth.omega[0]
+    if truth.remainder is not None:
+        difference -= truth.remainder[0]
+    size = float(np.abs(truth.omega[0]).max()) or 1.0
+    error = float(np.abs(difference).max()) / size
+    return error if math.isfinite(error) else None
+
+
+def ladder(contender: Contender, scene: Scene, horizon: float) -> Iterator[float]:
+    """Yield settings from coarse to fine; numbers of steps by factors of 3/2 and 4/3."""
+    if contender.settings:
+        yield from contender.settings
+        return
+    # A step for 16 radians of the first motion is too few for anyone. A fast torque does not
+    # count: it may be too faint to need its own steps.
+    phase = max(map(abs, scene.omega)) * horizon / 16.0
+    steps = 1 << max(1, math.ceil(math.log2(max(1.0, phase))))
+    while steps <= _LARGEST_STEPS:
+        yield float(steps)
+        # A low order needs many steps: coarser rungs find its place as well.
+        if contender.order > 2:
+            yield float(steps * 3 // 2)
+        steps *= 2
+
+
+def _first_calls(
+    load: Workload, contender: Contender, make: Maker, truth: Reference, refused: list[Refusal]
+) -> tuple[list[Entry], float]:
+    """Return what will be timed, and the seconds that making and first calls took beyond it."""
+    entries: list[Entry] = []
+    spent = preparing = before = 0.0
+    settings = ladder(contender, load.scene, load.horizon)
+    for setting in settings:
+        last = entries[-1].first if entries else 0.0
+        # Bounded: one call may have been interrupted.
+        expected = last * min(4.0, max(1.0, last / before)) if before else last
+        if expected > _LONGEST_CALL or spent + expected > _BUDGET[contender.setting]:
+            reason = f"and finer: left out, a call would take about {expected:.2g} s"
+            refused.append(Refusal(load, contender.name, setting, reason))
+            break
+        if len(entries) >= _FAILURES and all(e.error is None for e in entries[-_FAILURES:]):
+            reason = f"and finer: left out, {_FAILURES} settings in a row came to nothing"
+            refused.append(Refusal(load, contender.name, setting, reason))
+            break
+        try:
+            begin = perf_counter()
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                warnings.simplefilter("error", UserWarning)
+                ready = make(load.horizon, setting)
+                ready.run()
+                middle = perf_counter()
+                result = ready.run()
+                first = perf_counter() - middle
+                outcome = ready.read(result)
+        except RefusedError as refusal:
+            named = None if contender.setting == "none" else setting
+            refused.append(Refusal(load, contender.name, named, str(refusal)))
+            continue
+        except (UserWarning, ValueError, ArithmeticError, RuntimeError) as failure:
+            reason = f"{type(failure).__name__}: {' '.join(str(failure).split())}"
+            refused.append(Refusal(load, contender.name, setting, reason))
+            continue
+        preparing += max(0.0, middle - begin - first)
+        spent += first
+        before = last
+        error = None if outcome.omega is None else relative_error(outcome.omega, truth)
+        if error is None and not outcome.note:
+            outcome = Outcome(None, None, "overflow")
+        entries.append(Entry(ready, first, outcome, error, setting))
+        if contender.setting == "steps" and _at_rounding([entry.error for entry in entries]):
+            break
+    return entries, preparing
+
+
+def _at_rounding(errors: Sequence[float | None]) -> bool:
+    """Whether smaller steps no longer help: three times in a row nothing was gained."""
+    known = [error for error in errors if error is not None]
+    return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10
+
+
+def _row(load: Workload, contender: Contender, entry: Entry) -> Row:
+    return Row(
+        workload=load,
+        method=contender.name,
+        kind=contender.setting,
+        setting=None if contender.setting == "none" else entry.setting,
+        seconds=entry.seconds,
+        error=entry.error,
+        evaluations=entry.outcome.evaluations if entry.error is not None else None,
+        note=entry.outcome.note,
+    )

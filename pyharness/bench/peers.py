@@ -1,0 +1,166 @@
+"""Other people's integrators in `bench`, each used as its documentation says to be fast."""
+
+import warnings
+from collections.abc import Callable
+from fractions import Fraction
+from functools import partial
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from pyharness.bench.contenders import (
+    TOLERANCES,
+    Contender,
+    Maker,
+    Outcome,
+    Ready,
+    not_finite,
+    plain,
+    refuse_rounding,
+)
+from pyharness.model.scene import Scene, Triple
+
+_SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
+_MOST_STEPS = 10_000_000
+
+
+def peers() -> list[Contender]:
+    """Return all peers, installed or not."""
+    from pyharness.bench import compiled_peers as compiled
+
+    # 2**-52 is heyoka's default.
+    finest = (*TOLERANCES, 2.0**-52)
+
+    def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> Contender:
+        settings = finest if name == "heyoka" else TOLERANCES
+        return Contender(name, "peer", "tolerance", prepare, settings, package=package)
+
+    def fixed(name: str, order: int) -> Contender:
+        prepare = partial(compiled.numba_fixed, name)
+        return Contender(f"numba-{name}", "peer", "steps", prepare, order=order, package="numba")
+
+    return [
+        adaptive("heyoka", "heyoka", _heyoka),
+        fixed("rk4", 4),
+        fixed("dop8", 8),
+        adaptive("numbalsoda-dop853", "numbalsoda", partial(compiled.numbalsoda, "dop853")),
+        adaptive("numbalsoda-lsoda", "numbalsoda", partial(compiled.numbalsoda, "lsoda")),
+        adaptive("odeint", "scipy", _odeint),
+        *(
+            adaptive(f"solve_ivp-{name.lower()}", "scipy", partial(_solve_ivp, name))
+            for name in _SOLVE_IVP
+        ),
+    ]
+
+
+def installed(contender: Contender) -> bool:
+    """Whether the package of a contender is there."""
+    return not contender.package or find_spec(contender.package) is not None
+
+
+def exact_coefficients(scene: Scene) -> Triple:
+    """Return A, B, C of the moments as they are, rounded once."""
+    if scene.moments is None:
+        return scene.euler_coefficients
+    i1, i2, i3 = map(Fraction, scene.moments)
+    return float((i2 - i3) / i1), float((i3 - i1) / i2), float((i1 - i2) / i3)
+
+
+def _heyoka(scene: Scene) -> Maker:
+    """One integrator for each tolerance, kept: a call resets its time and state."""
+    import heyoka
+
+    equations = _heyoka_equations(scene)
+    integrators: dict[float, Any] = {}
+    omega0 = np.array(scene.omega)
+
+    def make(horizon: float, setting: float) -> Ready:
+        if setting not in integrators:
+            integrators[setting] = heyoka.taylor_adaptive(
+                equations, list(scene.omega), tol=setting, compact_mode=False
+            )
+        integrator = integrators[setting]
+        state = integrator.state
+        reached = heyoka.taylor_outcome.time_limit
+
+        def run() -> Any:
+            integrator.time = 0.0
+            state[:] = omega0
+            return integrator.propagate_until(horizon)
+
+        def read(result: Any) -> Outcome:
+            return Outcome(plain(state)) if result[0] == reached else not_finite(str(result[0]))
+
+        return Ready(run, read)
+
+    return make
+
+
+def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
+    import heyoka
+
+    x, y, z = heyoka.make_vars("x", "y", "z")
+    law, time = scene.torque, heyoka.time
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    products = (y * z, x * z, x * y)
+    equations = []
+    for axis, coefficient in enumerate(exact_coefficients(scene)):
+        moment = moments[axis]
+        rate = coefficient * products[axis] + law.constant[axis] / moment
+        if law.rate[axis]:
+            rate = rate + law.rate[axis] / moment * time
+        for waves, function in ((law.sines, heyoka.sin), (law.cosines, heyoka.cos)):
+            for amplitude, frequency in waves:
+                if amplitude[axis]:
+                    rate = rate + amplitude[axis] / moment * function(frequency * time)
+        equations.append(((x, y, z)[axis], rate))
+    return equations
+
+
+def _solve_ivp(name: str, scene: Scene) -> Maker:
+    """Integrate from end to end: no dense output, plain floats in the right-hand side."""
+    from scipy.integrate import solve_ivp
+
+    largest = max(map(abs, scene.omega)) or 1.0
+
+    def make(horizon: float, setting: float) -> Ready:
+        refuse_rounding("solve_ivp", setting)
+        run = partial(
+            solve_ivp, scene.right_hand_side(), (0.0, horizon), scene.omega, method=name,
+            rtol=setting, atol=setting * largest,
+        )  # fmt: skip
+        return Ready(run, read)
+
+    def read(result: Any) -> Outcome:
+        if not result.success:
+            return not_finite(str(result.message))
+        return Outcome(plain(result.y[:, -1]), int(result.nfev))
+
+    return make
+
+
+def _odeint(scene: Scene) -> Maker:
+    from scipy.integrate import ODEintWarning, odeint
+
+    largest = max(map(abs, scene.omega)) or 1.0
+
+    def make(horizon: float, setting: float) -> Ready:
+        refuse_rounding("LSODA", setting)
+        run = partial(
+            odeint, scene.right_hand_side(), scene.omega, np.array([0.0, horizon]),
+            rtol=setting, atol=setting * largest, tfirst=True, mxstep=_MOST_STEPS,
+        )  # fmt: skip
+
+        def read(rows: Any) -> Outcome:
+            # The counts come with an output of their own, which the timed call need not make.
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ODEintWarning)
+                _, told = run(full_output=True)
+            if "successful" not in told["message"]:
+                return not_finite(told["message"])
+            return Outcome(plain(rows[-1]), int(told["nfe"][-1]))
+
+        return Ready(run, read)
+
+    return make

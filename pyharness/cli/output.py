@@ -1,0 +1,205 @@
+"""Where results go: a file is there whole or not at all."""
+
+import os
+import signal
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from threading import current_thread, main_thread
+from typing import Self
+
+from pyharness.model.errors import InputError
+from pyharness.model.pipes import write_waiting
+
+
+def check_writable(path: str, option: str) -> None:
+    """Refuse a path that can't be written, before anything is computed for it."""
+    try:
+        # Through a link to what it names, as an ordinary write would go.
+        target = Path(os.path.realpath(path)) if "\0" not in path else Path()
+        folder = target.parent
+        if "\0" in path:
+            reason = "a path has no null character"
+        elif not path:
+            reason = "a name is missing"
+        elif target.is_dir():
+            reason = "is a folder"
+        elif target.is_symlink():
+            reason = "is a link that leads back to itself"
+        elif _is_special(path):
+            if os.access(path, os.W_OK):
+                return
+            reason = "permission denied"
+        elif not folder.is_dir():
+            reason = f"there is no folder '{folder}'"
+        elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
+            reason = "permission denied"
+        else:
+            return
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+    raise InputError(f"{option} '{path}': {reason}; give a file in a folder that can be written")
+
+
+def numbers_beside(picture: str) -> str:
+    """Return where the numbers of a picture go."""
+    return str(Path(picture).with_suffix(".csv"))
+
+
+def check_apart(picture: str, out: str) -> None:
+    """Refuse a result that would overwrite the picture or its numbers."""
+    for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
+        if os.path.realpath(path) == os.path.realpath(out):
+            raise InputError(
+                f"--out '{out}': there --plot '{picture}' puts {what}; give a file of another name"
+            )
+
+
+def write_files(contents: dict[str, bytes], option: str) -> None:
+    """Write all files or none: each under a name of its own first, then all are renamed.
+
+    Whatever interrupts it, Ctrl-C too, everything is as before. What exists and is no ordinary
+    file (a device, a pipe) is written to, never replaced, and first of all.
+    """
+    path = ""
+    try:
+        for path, content in contents.items():
+            if _is_special(path):
+                write_waiting(path, content)
+        with _Patience() as patience:
+            files = [_File(path) for path in contents if not _is_special(path)]
+            try:
+                for file in files:
+                    path = file.path
+                    file.write(contents[path])
+                    patience.check()
+                # A single rename happens or does not.
+                for file in files if len(files) > 1 else ():
+                    path = file.path
+                    file.keep()
+                for file in files:
+                    path = file.path
+                    file.place()
+            except BaseException:
+                for file in files:
+                    file.undo()
+                raise
+            finally:
+                _remove([name for file in files for name in (file.new, file.old)])
+    except OSError as error:
+        raise InputError(f"{option} '{path}': {error.strerror or error}") from None
+
+
+class _Patience:
+    """Lets a Ctrl-C wait: one that came in the middle of tidying up would leave things behind."""
+
+    def __enter__(self) -> Self:
+        """Hold it from now on."""
+        self._came = False
+        self._before = signal.getsignal(signal.SIGINT)
+        # Python raises KeyboardInterrupt in the main thread alone.
+        self._holds = callable(self._before) and current_thread() is main_thread()
+        if self._holds:
+            signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let it go."""
+        if self._holds:
+            signal.signal(signal.SIGINT, self._before)
+        if self._came and callable(self._before):
+            self._before(signal.SIGINT, None)
+
+    def check(self) -> None:
+        """Give up here if one has come."""
+        if self._came:
+            raise KeyboardInterrupt
+
+    def _note(self, *_: object) -> None:
+        self._came = True
+
+
+class _File:
+    """A file on its way: `new` beside its target, and what the target held, `old`."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        # Through a link to what it names, as an ordinary write would go; and beside that, since
+        # a rename does not leave a file system.
+        self.target = os.path.realpath(path)
+        beside = os.path.join(os.path.dirname(self.target), f".pyharness-{os.urandom(8).hex()}")
+        self.new, self.old = f"{beside}-new", f"{beside}-old"
+        self.written = False
+        self.existed = os.path.lexists(self.target)
+
+    def write(self, content: bytes) -> None:
+        with open(self.new, "xb") as file:
+            file.write(content)
+        self.written = True
+
+    def keep(self) -> None:
+        if self.existed:
+            try:
+                os.link(self.target, self.old)
+            except OSError:  # a file system without links
+                import shutil
+
+                shutil.copy2(self.target, self.old)
+
+    def place(self) -> None:
+        os.replace(self.new, self.target)
+
+    def undo(self) -> None:
+        if not self.written or os.path.lexists(self.new):
+            return
+        if os.path.lexists(self.old):
+            try:
+                os.replace(self.old, self.target)
+            except OSError:
+                self.old = self.new  # better left behind than lost
+        elif not self.existed:
+            _remove([self.target])
+
+
+def _remove(names: list[str]) -> None:
+    for name in names:
+        with suppress(OSError):
+            os.unlink(name)
+
+
+def _is_special(path: str) -> bool:
+    """Whether there is something that is no ordinary file: a device, a pipe."""
+    return Path(path).exists() and not Path(path).is_file()
+
+
+def check_folder(path: str, names: Iterable[str], option: str) -> None:
+    """Refuse a folder in which `names` can't be written, before anything is computed for it."""
+    folder = Path(path)
+    if not path or "\0" in path or os.path.lexists(folder):
+        if not path or "\0" in path or not folder.is_dir():
+            raise InputError(f"{option} '{path}': is not a folder; give one, or a new name")
+        for name in names:
+            check_writable(str(folder / name), option)
+    elif not folder.parent.is_dir() or not os.access(folder.parent, os.W_OK):
+        raise InputError(
+            f"{option} '{path}': can't be made in '{folder.parent}'; "
+            "give a folder, or a new name in a folder that can be written"
+        )
+
+
+def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
+    """Write all files into a folder, which is made if it is missing; all or nothing."""
+    folder = Path(path)
+    files = {str(folder / name): content for name, content in contents.items()}
+    with _Patience():
+        made = not folder.is_dir()
+        try:
+            if made:
+                folder.mkdir()
+            write_files(files, option)
+        except BaseException as error:
+            if made and folder.is_dir():
+                folder.rmdir()
+            if isinstance(error, OSError):
+                raise InputError(f"{option} '{path}': {error.strerror or error}") from None
+            raise

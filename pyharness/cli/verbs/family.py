@@ -1,0 +1,69 @@
+"""`family`: what limits the weighted residual methods; orders derived against orders measured."""
+
+import argparse
+
+from pyharness.cli import options as shared
+from pyharness.history.family import report as views
+from pyharness.history.family.members import POINTS, WEIGHTINGS, Member
+from pyharness.history.family.orders import order_table
+
+_OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
+_DEFAULT_CASE = "5"
+
+
+def declare(parser: shared.Parser) -> None:
+    """Declare the options."""
+    shared.add_scene_options(parser)
+    parser.add_argument("--weighting", metavar="W", help=f"one member: {', '.join(WEIGHTINGS)}")
+    parser.add_argument("--terms", metavar="N", help="one member: powers of t (default 2)")
+    parser.add_argument(
+        "--points", metavar="P", help="one member: thesis, gauss or a,b,... in parts of the step"
+    )
+    parser.add_argument("--corrections", metavar="K", help="one member: corrections (default 1)")
+    parser.add_argument("--format", metavar="F", help=", ".join(shared.FORMATS))
+    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure and show; 1 where an order is below the one derived."""
+    if options.case is None and options.scene is None:
+        options.case = _DEFAULT_CASE
+    scene = shared.chosen_scene(options)
+    form = shared.chosen_format(options, shared.FORMATS)
+    one = any(getattr(options, name) is not None for name in _OF_A_MEMBER)
+    members = [_member(options)] if one else None
+    shared.check_outputs(options)
+    found = order_table(scene, members, shared.progress)
+    shared.progress("")
+
+    if form == "json":
+        from pyharness.model.build import build
+        from pyharness.views.records import json_text
+
+        text = json_text(views.family_record(scene, found, build()))
+    elif form == "csv":
+        from pyharness.views.text import csv_text
+
+        text = csv_text(*views.family_rows(found))
+    elif form == "markdown":
+        text = views.family_markdown(scene, found)
+    else:
+        text = views.family_table(scene, found)
+    shared.emit(text, options.out)
+    return 1 if any(each.misses for each in found) else 0
+
+
+def _member(options: argparse.Namespace) -> Member:
+    points: str | tuple[float, ...] | None = options.points
+    if points is not None and points not in POINTS:
+        letters = all(character.isalpha() or character == "-" for character in str(points))
+        if not (points and letters):
+            points = tuple(shared.numbers(options.points, "--points"))
+    return Member(
+        weighting="collocation" if options.weighting is None else options.weighting,
+        terms=2 if options.terms is None else shared.whole(options.terms, "--terms"),
+        points=points,
+        corrections=1
+        if options.corrections is None
+        else shared.whole(options.corrections, "--corrections"),
+    )

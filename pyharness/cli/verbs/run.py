@@ -1,0 +1,137 @@
+"""`run`: one trajectory, of a program of the appendix or of a method."""
+
+import argparse
+import sys
+
+from pyharness.cli import options as shared
+from pyharness.methods import registry as methods
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.views import text as tables
+
+# What only a program wrote: its printer page, and its tape.
+PROGRAM_FORMATS = ("printer", "tape5")
+FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
+
+
+def declare(parser: shared.Parser) -> None:
+    """Declare the options."""
+    shared.add_scene_options(parser)
+    parser.add_argument("--program", metavar="P", help=", ".join(PROGRAMS))
+    parser.add_argument("--implementation", metavar="I", help="fortran (default) or python")
+    parser.add_argument("--method", metavar="M", help="a method in place of a program")
+    shared.add_listing_options(parser)
+    parser.add_argument(
+        "--times", metavar="T1,T2,...", help="where results are wanted, s (methods)"
+    )
+    parser.add_argument(
+        "--tolerance", metavar="E", help="error at these times over the largest |omega| (methods)"
+    )
+    shared.add_effort_option(parser)
+    shared.add_output_options(parser, FORMATS)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run and show."""
+    scene = shared.chosen_scene(options)
+    form = shared.chosen_format(options, FORMATS)
+    if (options.program is None) == (options.method is None):
+        raise InputError(
+            f"run: give either --program ({', '.join(PROGRAMS)}) "
+            f"or --method ({', '.join(methods.METHODS)})"
+        )
+    if form in PROGRAM_FORMATS:
+        _check_program_format(options, scene, form)
+    listing: Listing | None = None
+    if options.program is not None:
+        name, listing, title, trajectory = _program(options, scene)
+    else:
+        name, title, trajectory = _method(options, scene)
+
+    text: str | bytes
+    if form == "printer":
+        from pyharness.history.printer import page
+
+        text = page(scene, name, trajectory)
+    elif form == "tape5":
+        from pyharness.history.tape5 import records
+
+        text = records(trajectory)
+    elif form == "json":
+        from pyharness.model.build import build
+        from pyharness.views.records import json_text, run_record
+
+        text = json_text(run_record(scene, name, listing, trajectory, build()))
+    elif form == "csv":
+        text = tables.csv_text(*tables.trajectory_rows(trajectory))
+    elif form == "markdown":
+        text = tables.markdown_text(*tables.trajectory_rows(trajectory))
+    else:
+        text = tables.trajectory_table([title], scene, trajectory)
+    if options.plot is not None:
+        from pyharness.views.pictures import trajectory_picture
+
+        picture = trajectory_picture(f"{scene.name}: {title}", trajectory, options.plot)
+        shared.write(picture, "--plot")
+    shared.emit(text, options.out)
+    return 0
+
+
+def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
+    """Refuse a page or a tape that no program could have written, or no one could read."""
+    if options.program is None:
+        raise InputError(
+            f"--format {form} has no meaning with --method; allowed: {', '.join(shared.FORMATS)}"
+        )
+    if form == "printer" and scene.moments is None:
+        raise InputError(
+            "--format printer: the page begins with the moments, and this scene has only "
+            f"coefficients; give moments, or one of {', '.join(shared.FORMATS)}"
+        )
+    if form == "tape5" and options.out is None and sys.stdout.isatty():
+        raise InputError("--format tape5 is binary; give --out FILE, or a pipe")
+
+
+def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, str, Trajectory]:
+    shared.refuse(options, "--program", ("times", "tolerance"))
+    listing = shared.chosen_listing(options)
+    name = listing.program
+    if name != "runge-kutta":
+        shared.refuse(options, f"--program {name}", ("lipschitz", "no_stop"))
+    if options.no_stop:
+        shared.refuse(options, "--no-stop", ("lipschitz",))
+    implementation = options.implementation or "fortran"
+    if implementation not in methods.IMPLEMENTATIONS:
+        raise unknown("implementation", implementation, methods.IMPLEMENTATIONS, "--implementation")
+    lipschitz = shared.positive(options.lipschitz, "--lipschitz", shared.default_lipschitz())
+    shared.check_outputs(options)
+    program = methods.PROGRAM_REGISTRY[name]
+    trajectory = program.run(
+        scene,
+        listing,
+        implementation,
+        lipschitz,
+        not options.no_stop,
+        effort=shared.chosen_effort(options),
+    )
+    title = f"program {name} ({implementation}), {shared.listing_text(listing)}"
+    return name, listing, title, trajectory
+
+
+def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
+    listing_options = ("implementation", "listing", "fix", "keep", "reading", "lipschitz")
+    shared.refuse(options, "--method", (*listing_options, "no_stop"))
+    name = options.method
+    if name not in methods.METHODS:
+        raise unknown("method", name, methods.METHODS, "--method")
+    default = max(1e-9, methods.METHODS[name].finest)
+    tolerance = shared.positive(options.tolerance, "--tolerance", default)
+    times = scene.times()
+    if options.times is not None:
+        times = shared.numbers(options.times, "--times")
+    shared.check_outputs(options)
+    trajectory = methods.solve(scene, times, name, tolerance, shared.chosen_effort(options))
+    title = f"method {name}: {methods.METHODS[name].title}, tolerance {tolerance:g}"
+    return name, title, trajectory

@@ -1,0 +1,105 @@
+"""`stress`: numerical stability tried to breaking, each trial with a bound derived beforehand."""
+
+import argparse
+
+from pyharness.cli import options as shared
+from pyharness.compare.checks import Check
+from pyharness.compare.checks_report import checks_record, junit_text
+from pyharness.model.errors import InputError, unknown
+from pyharness.stress.run import TRIALS, Outcome, stress, trial, worst
+
+FORMATS = ("table", "json", "junit")
+_FOLDER = "worst"
+
+
+def declare(parser: shared.Parser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--only", metavar="ID,...", help=f"trials, or checks by name: {', '.join(TRIALS)}"
+    )
+    parser.add_argument(
+        "--save", metavar="DIR", help="where the worst inputs go, as scene files (default: worst)"
+    )
+    parser.add_argument("--plot", metavar="FILE", help="draw one trial, with its numbers as CSV")
+    parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
+    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Try and show; 1 where a bound does not hold."""
+    form = shared.chosen_format(options, FORMATS)
+    only = shared.names(options.only)
+    for each in only:
+        if each.partition("/")[0] not in TRIALS:
+            raise unknown("trial", each.partition("/")[0], TRIALS, "--only")
+    if options.plot is not None and len(_chosen(only)) != 1:
+        raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")
+    shared.check_outputs(options)
+    folder = options.save or _FOLDER
+    # One check alone is a replay: its input has been saved before.
+    saves = options.save is not None or not any("/" in each for each in only)
+    if saves:
+        from pyharness.cli.output import check_folder
+
+        check_folder(folder, (), "--save")
+
+    outcomes: list[Outcome] = []
+    for outcome in stress(only):
+        shared.progress(f"{len(outcomes) + 1}: {outcome.check.id}")
+        outcomes.append(outcome)
+    shared.progress("")
+    if not outcomes:
+        raise unknown("check", ",".join(only), TRIALS, "--only")
+    checks = [outcome.check for outcome in outcomes]
+    if saves:
+        _save(folder, outcomes)
+    if options.plot is not None:
+        shared.write(_picture(_chosen(only)[0], checks, options.plot), "--plot")
+    if form == "json":
+        from pyharness.model.build import build
+        from pyharness.views.records import json_text
+
+        text = json_text(checks_record(checks, build()))
+    elif form == "junit":
+        text = junit_text("stress", checks)
+    else:
+        from pyharness.stress.report import stress_table
+
+        text = stress_table([trial(name) for name in _chosen(only)], checks)
+    shared.emit(text, options.out)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _chosen(only: list[str]) -> list[str]:
+    names = {each.partition("/")[0] for each in only} or set(TRIALS)
+    return [name for name in TRIALS if name in names]
+
+
+def _picture(name: str, checks: list[Check], path: str) -> dict[str, bytes]:
+    if name == "regions":
+        from pyharness.stress.region_picture import regions_picture
+        from pyharness.theory.regions import regions
+
+        return regions_picture(regions(), path)
+    if name == "length":
+        from pyharness.stress.length_picture import picture
+        from pyharness.stress.trials.length import curves
+
+        return picture(list(curves()), path)
+    from pyharness.stress.pictures import stress_picture
+
+    return stress_picture(trial(name), checks, path)
+
+
+def _save(folder: str, outcomes: list[Outcome]) -> None:
+    from pyharness.cli.output import write_folder
+    from pyharness.model.scene_file import scene_text
+
+    files = {}
+    for name, outcome in worst(outcomes).items():
+        assert outcome.scene is not None
+        check = outcome.check
+        comments = [f"worst of {name}: {check.value}, limit {check.limit}", check.replay]
+        files[name.replace("/", "-") + ".toml"] = scene_text(outcome.scene, comments).encode()
+    if files:
+        write_folder(folder, files, "--save")

@@ -1,0 +1,158 @@
+"""`verify`: bits between languages, error against the truth, and what changed."""
+
+import argparse
+from pathlib import Path
+
+from pyharness.cli import options as shared
+from pyharness.compare.checks import Check
+from pyharness.compare.checks_report import checks_record, checks_table, junit_text, samples_lines
+from pyharness.model.errors import InputError, unknown
+from pyharness.verify.kinds import KINDS, verify
+from pyharness.verify.random_methods import ROUNDING
+from pyharness.verify.selection import DRAWS, RECORD, Selection
+
+FORMATS = ("table", "json", "junit")
+# Options that no other kind looks at.
+_OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
+
+
+def declare(parser: shared.Parser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--only", metavar="ID,...", help=f"kinds, or checks by name: {', '.join(KINDS)}"
+    )
+    parser.add_argument("--seed", metavar="S", help="of the random draws (default: the week)")
+    parser.add_argument("--draws", metavar="N", help=f"random draws (default {DRAWS})")
+    parser.add_argument(
+        "--external", metavar="FILE", help="a file of published figures, these alone"
+    )
+    parser.add_argument(
+        "--self-test",
+        action="store_true",
+        help="plant faults, and report which check catches which",
+    )
+    parser.add_argument("--update", action="store_true", help="write the golden record anew")
+    parser.add_argument(
+        "--record", metavar="DIR", help="the golden record (default: the checkout's)"
+    )
+    parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
+    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Verify and show; 1 where something is not as it should be."""
+    form = shared.chosen_format(options, FORMATS)
+    chosen = _selection(options)
+    shared.check_outputs(options)
+    if options.update:
+        refused = ("self_test", "only", "seed", "draws", "external", "format", "out")
+        shared.refuse(options, "--update", refused)
+        return _update(chosen.record)
+    if options.self_test:
+        shared.refuse(options, "--self-test", ("only", "draws", "external"))
+        return _self_test(options, chosen, form)
+    checks = []
+    for check in verify(chosen):
+        checks.append(check)
+        if len(checks) % 20 == 0 or check.kind != "cells":
+            shared.progress(f"{len(checks)}: {check.id}")
+    shared.progress("")
+    if not checks:
+        if not chosen.record.is_dir() and chosen.may_ask("golden"):
+            raise InputError("there is no golden record here; give --record DIR, or a checkout")
+        asked = f"--only {options.only}" if options.only else "--draws 0"
+        raise InputError(f"{asked}: no such check; the kinds are {', '.join(KINDS)}")
+    if form != "table":
+        text = _machine_text(checks, form, chosen.seed)
+    else:
+        more = samples_lines(checks, ROUNDING) if options.draws is not None else []
+        text = checks_table([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
+    shared.emit(text, options.out)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _self_test(options: argparse.Namespace, chosen: Selection, form: str) -> int:
+    from pyharness.compare.checks_report import self_test_table
+    from pyharness.verify.plants.plants import PLANTS
+    from pyharness.verify.plants.self_test import as_check, self_test
+
+    found = []
+    for caught in self_test(chosen.seed, chosen.record):
+        found.append(caught)
+        shared.progress(f"{len(found)} of {len(PLANTS) + 1}: {as_check(caught).id}")
+    shared.progress("")
+    checks = [as_check(caught) for caught in found]
+    if form == "table":
+        text = self_test_table(_title(chosen), found)
+    else:
+        text = _machine_text(checks, form, chosen.seed)
+    shared.emit(text, options.out)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _selection(options: argparse.Namespace) -> Selection:
+    only = shared.names(options.only)
+    problems = None
+    if options.external is not None:
+        from pyharness.verify.external_file import read_problem
+
+        shared.refuse(options, "--external", ("seed", "draws", "record"))
+        if any(each.partition("/")[0] != "external" for each in only):
+            raise InputError(f"--only {options.only}: with --external, external/... is allowed")
+        problems = [read_problem(options.external)]
+        only = only or ["external"]
+    for each in only:
+        if each.partition("/")[0] not in KINDS:
+            raise unknown("kind", each.partition("/")[0], KINDS, "--only")
+    for kind, names in _OF_ONE_KIND.items():
+        if only and not any(each.partition("/")[0] == kind for each in only):
+            shared.refuse(options, f"--only {options.only}", names)
+    draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
+    if draws < 0:
+        raise InputError(f"--draws: {draws}; allowed: 0 or more")
+    changes = {} if options.seed is None else {"seed": options.seed}
+    record = RECORD if options.record is None else Path(options.record)
+    if options.record is not None and not options.update and not record.is_dir():
+        raise InputError(f"--record '{options.record}': is not a folder; verify --update makes one")
+    return Selection(only=only, draws=draws, record=record, problems=problems, **changes)
+
+
+def _title(chosen: Selection) -> list[str]:
+    title = [f"seed of the random draws: {chosen.seed}"] if chosen.may_ask("random") else []
+    if chosen.may_ask("golden") and not chosen.record.is_dir():
+        title.append("there is no golden record here (it stands in the checkout): not compared")
+    return title
+
+
+def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
+    """Say that figures of the user's were not judged: no failure shows it."""
+    count = sum(check.passed and check.value is None for check in checks)
+    if chosen.problems is None or not count:
+        return []
+    return [f"{count} of {len(checks)} judge nothing: too much for the method (--format json: why)"]
+
+
+def _machine_text(checks: list[Check], form: str, seed: str) -> str:
+    if form == "junit":
+        return junit_text("verify", checks)
+    from pyharness.model.build import build
+    from pyharness.views.records import json_text
+
+    return json_text(checks_record(checks, build(), seed=seed))
+
+
+def _update(record: Path) -> int:
+    from pyharness.cli.output import check_folder, write_folder
+    from pyharness.verify.golden import update
+
+    if not record.parent.is_dir():
+        raise InputError("there is no golden record here to update; give --record DIR")
+    check_folder(str(record), (), "--record")
+    files, news = update(record)
+    write_folder(str(record), files, "--record")
+    for path in record.glob("*.toml"):
+        if path.name not in files:
+            path.unlink()
+    lines = news or ["nothing moved"]
+    shared.emit("".join(f"{line}\n" for line in [*lines, f"{len(files)} files in {record}"]), None)
+    return 0

@@ -1,0 +1,120 @@
+"""The two notions of agreement, kept apart: error against the truth, and bits between languages."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.truth.reference import Reference
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """How far a trajectory is from the truth.
+
+    Attributes
+    ----------
+    omega : tuple of float
+        Largest error of each component (rad/s).
+    velocity : float or None
+        Largest error of any component of V (m/s).
+    energy, momentum : float or None
+        Largest drift of energy and of momentum squared, relative to the start; None where a
+        torque acts or the moments are not known.
+    error : ndarray, shape (n,)
+        Largest error of any component of omega at each result (rad/s).
+    """
+
+    omega: tuple[float, float, float]
+    velocity: float | None
+    energy: float | None
+    momentum: float | None
+    error: Array
+
+
+def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
+    """Hold a trajectory against the truth at the times that both have."""
+    n = min(len(trajectory.time), len(truth.time))
+    with np.errstate(all="ignore"):
+        errors = np.abs(trajectory.omega[:n] - truth.omega[:n])
+        first, second, third = (float(e) for e in errors.max(axis=0, initial=0.0))
+        speed = None
+        if trajectory.velocity is not None and truth.velocity is not None:
+            speed = float(np.abs(trajectory.velocity[:n] - truth.velocity[:n]).max(initial=0.0))
+        energy = momentum = None
+        if scene.moments is not None and scene.torque.is_zero:
+            inertia = np.array(scene.moments)
+            energy = _drift(scene, trajectory, inertia)
+            momentum = _drift(scene, trajectory, inertia * inertia)
+    return Accuracy((first, second, third), speed, energy, momentum, errors.max(axis=1, initial=0))
+
+
+def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
+    start = float(weights @ np.square(scene.omega))
+    if start == 0.0:
+        return 0.0
+    return float(np.abs(np.square(trajectory.omega) @ weights / start - 1.0).max(initial=0.0))
+
+
+def distance(first: Trajectory, second: Trajectory) -> float:
+    """Return the largest distance in units in the last place over TIME, U and V.
+
+    NaN agrees with NaN; a different number of rows is infinitely far.
+    """
+    if len(first.time) != len(second.time):
+        return math.inf
+    return max(
+        ulps(first.recorded_time, second.recorded_time),
+        ulps(first.omega, second.omega),
+        ulps(_velocity(first), _velocity(second)),
+    )
+
+
+def differences(first: Trajectory, second: Trajectory) -> list[str]:
+    """Name all in which two trajectories of a program differ: bits, counters, stop, IER."""
+    found = [
+        name
+        for name, x, y in (
+            ("steps", first.steps, second.steps),
+            ("evaluations", first.evaluations, second.evaluations),
+            ("ending", first.ended, second.ended),
+            ("stop", first.stop, second.stop),
+        )
+        if x != y
+    ]
+    if found:
+        return found
+    for name, x, y in (
+        ("time", first.time, second.time),
+        ("TIME", first.recorded_time, second.recorded_time),
+        ("omega", first.omega, second.omega),
+        ("velocity", _velocity(first), _velocity(second)),
+    ):
+        if ulps(x, y):
+            found.append(name)
+    if not np.array_equal(first.ier, second.ier):  # type: ignore[arg-type]
+        found.append("IER")
+    return found
+
+
+def _velocity(trajectory: Trajectory) -> Array:
+    return np.empty((0, 3)) if trajectory.velocity is None else trajectory.velocity
+
+
+def ulps(x: Array, y: Array) -> float:
+    """Return the largest number of representable values between two arrays of one shape."""
+    both_nan = np.isnan(x) & np.isnan(y)
+    one_nan = np.isnan(x) ^ np.isnan(y)
+    if one_nan.any():
+        return math.inf
+    first, second = np.where(both_nan, 0, _ordinal(x)), np.where(both_nan, 0, _ordinal(y))
+    return float((np.maximum(first, second) - np.minimum(first, second)).max(initial=0))
+
+
+def _ordinal(x: Array) -> NDArray[np.uint64]:
+    """Return the place of each value among all representable ones; -0 comes just before +0."""
+    bits = np.ascontiguousarray(x).view(np.uint64)
+    return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

@@ -1,0 +1,212 @@
+"""Original against corrected, Fortran against twin, everything against the reference.
+
+Two notions of agreement, never mixed: bits between languages (in units in the last place), and
+error against the truth (in rad/s, never below what the reference itself may be wrong by).
+"""
+
+import itertools
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
+from pyharness.compare.orders import Order, measured_order
+from pyharness.methods.registry import IMPLEMENTATIONS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.model.effort import check_steps
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.truth.reference import Reference, reference
+
+_TIMING_BATCHES = 3
+_TIMING_SECONDS = 3e-4
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramFinding:
+    """One program with one listing."""
+
+    listing: Listing
+    trajectory: Trajectory
+    accuracy: Accuracy
+    ulps: float
+    differences: tuple[str, ...]
+    order: Order | None
+    seconds_per_step: float
+
+
+@dataclass(frozen=True, eq=False)
+class MethodFinding:
+    """One method of `solve_ivp`; `failure` says why there is no trajectory."""
+
+    method: str
+    tolerance: float
+    trajectory: Trajectory | None
+    accuracy: Accuracy | None
+    seconds: float
+    failure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """All that was found about one scene."""
+
+    scene: Scene
+    lipschitz: float
+    reference: Reference
+    programs: tuple[ProgramFinding, ...]
+    methods: tuple[MethodFinding, ...]
+
+    @property
+    def unexpected(self) -> tuple[str, ...]:
+        """What is not as it should be, one sentence each; empty if all is well."""
+        found = []
+        for each in self.programs:
+            who = f"{each.listing.program} {each.listing.label}"
+            if each.differences:
+                found.append(f"{who}: Fortran and twin differ in {', '.join(each.differences)}")
+            if each.order is not None and each.order.state == "misses":
+                text = "misses the reference as the step is halved"
+                found.append(f"{who}: {text}: {each.order}, due {each.order.due}")
+        return tuple(found)
+
+    @property
+    def not_judged(self) -> tuple[str, ...]:
+        """Of which mended programs the scene can't tell whether they are right, and why."""
+        return tuple(
+            f"{each.listing.program} {each.listing.label}: {each.order}"
+            for each in self.programs
+            if each.order is not None and not each.order.is_judged
+        )
+
+
+def compare(
+    scene: Scene,
+    listings: Sequence[Listing],
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    tolerance: float = 1e-8,
+    effort: float = 1.0,
+) -> Comparison:
+    """Compare programs and methods on one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to integrate.
+    listings : sequence of Listing
+        The programs to run, each with its active defects (see `listings_for`).
+    lipschitz : float
+        Constant of the stop test (1/s).
+    may_stop : bool
+        Whether the stop test may end a run.
+    tolerance : float
+        What `solve_ivp` is asked for, relative to the largest component of omega.
+    effort : float
+        Factor on the work of each of them after which it gives up.
+
+    Returns
+    -------
+    Comparison
+        `unexpected` is empty where all is as it should be.
+
+    Raises
+    ------
+    NotBuiltError
+        Where the extension is not built.
+    InputError
+        Where the reference or a program would need too many steps.
+    """
+    for listing, implementation in itertools.product(listings, IMPLEMENTATIONS):
+        check_steps(scene, listing.program, implementation, effort)
+    truth = reference(scene, scene.times(), velocity=True, effort=effort)
+    programs = []
+    for listing in listings:
+        program = PROGRAM_REGISTRY[listing.program]
+        run = partial(
+            program.run, scene, listing, lipschitz=lipschitz, may_stop=may_stop, effort=effort
+        )
+        compiled, twin = run("fortran"), run("python")
+        judged = not listing.defects and not listing.readings
+        programs.append(
+            ProgramFinding(
+                listing=listing,
+                trajectory=compiled,
+                accuracy=accuracy(scene, compiled, truth),
+                ulps=distance(compiled, twin),
+                differences=tuple(differences(compiled, twin)),
+                order=measured_order(scene, program, listing, truth) if judged else None,
+                seconds_per_step=_seconds(partial(run, "fortran")) / max(compiled.steps, 1),
+            )
+        )
+    import scipy.integrate  # noqa: F401  (not to be timed with the first method)
+
+    methods = [_method(scene, name, tolerance, effort, truth) for name in SCIPY_METHODS]
+    return Comparison(scene, lipschitz, truth, tuple(programs), tuple(methods))
+
+
+def listings_for(
+    programs: Iterable[str] = PROGRAMS,
+    base: str | None = None,
+    fix: Sequence[str] = (),
+    keep: Sequence[str] = (),
+    readings: Sequence[str] = (),
+) -> list[Listing]:
+    """Return what to compare: original and corrected, and the subset asked for between them.
+
+    A defect or reading applies to the programs that have it; one that no program has is a
+    mistake. With `base` and nothing else, only that listing is shown.
+    """
+    chosen = list(programs)
+    for option, kind, names in (
+        ("--fix", "defect", fix),
+        ("--keep", "defect", keep),
+        ("--reading", "reading", readings),
+    ):
+        allowed = {name for program in chosen for name in names_of(kind, program)}
+        for name in names:
+            if name not in allowed:
+                raise unknown(kind, name, sorted(allowed), option)
+    for name in sorted(set(fix) & set(keep)):
+        raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
+    result = []
+    for program in chosen:
+        defects, own_readings = names_of("defect", program), names_of("reading", program)
+        mended = [name for name in fix if name in defects]
+        kept = [name for name in keep if name in defects]
+        selected = [name for name in readings if name in own_readings]
+        bases = [base] if base and not (fix or keep) else ["original", "corrected"]
+        rows = [subset(program, each, readings=selected) for each in bases]
+        if mended or kept:
+            rows.insert(1, subset(program, base, mended, kept, selected))
+        result += rows
+    return result
+
+
+def _method(
+    scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
+) -> MethodFinding:
+    start = time.perf_counter()
+    try:
+        trajectory = solve(scene, scene.times(), name, tolerance, effort)
+    except InputError as error:
+        return MethodFinding(name, tolerance, None, None, math.nan, str(error))
+    seconds = time.perf_counter() - start
+    return MethodFinding(name, tolerance, trajectory, accuracy(scene, trajectory, truth), seconds)
+
+
+def _seconds(run: Callable[[], object]) -> float:
+    """Return the median time of a call, over batches long enough for the clock."""
+    start = time.perf_counter()
+    run()
+    calls = max(1, round(_TIMING_SECONDS / max(time.perf_counter() - start, 1e-7)))
+    batches = []
+    for _ in range(_TIMING_BATCHES):
+        start = time.perf_counter()
+        for _ in range(calls):
+            run()
+        batches.append((time.perf_counter() - start) / calls)
+    return sorted(batches)[_TIMING_BATCHES // 2]

@@ -1,0 +1,265 @@
+"""Orders: the power with which an error against the truth falls as the step is halved."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from pyharness.methods.registry import Program, solve
+from pyharness.model.effort import check_steps
+from pyharness.model.errors import InputError
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.theory.conditioning import ROUNDING, conditioning
+from pyharness.truth.reference import Reference
+
+# An order must come within half an order of the one that is due.
+ORDER_SLACK = 0.5
+# It is measured where halving the step moves the result by less than this, relative to the
+# largest, and a step turns body and torque by fewer radians: steps that skip periods of the torque
+# seem to have settled too.
+_SMALL_CHANGE = 1e-3
+_SMALL_ANGLE = 0.5
+# Steps are halved until this many are taken, and eight times at least.
+_MOST_STEPS = 2**18
+_HALVINGS = 8
+# Where a textbook method of its order settles with so many times fewer steps, it is the program's
+# fault that it does not.
+_MARGIN = 4
+_TEXTBOOK = {2: "improved-euler", 4: "rk4"}
+# Roundings of a step.
+_ROUNDINGS = 8.0
+# A matrix with a larger condition number may be found singular.
+_CONDITION = 1e15
+
+State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"]
+Quantity = Literal["omega", "velocity"]
+
+
+@dataclass(frozen=True)
+class Order:
+    """What became of the error as the step was halved.
+
+    Attributes
+    ----------
+    due : int
+        The order that the method has.
+    state : {"as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"}
+        Whether it showed. `rounding`: the error was that of rounding before it could. The last
+        four: it can't be told, for no step was small enough, the program found its matrix
+        singular, the motion multiplies rounding too much, or the solution leaves every bound.
+    value : float or None
+        As measured, if it could be.
+    step_size : float
+        The finest step that was tried (s); of `singular` the longest that makes it so.
+    steps : int
+        How many were taken in the finest run that could be held against the truth.
+    error, time : float
+        The largest error of that run (rad/s), and when it had it (s).
+    """
+
+    due: int
+    state: State
+    value: float | None
+    step_size: float
+    steps: int = 0
+    error: float = math.inf
+    time: float = math.nan
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether it is known if the method has its order."""
+        return self.state in ("as due", "rounding", "misses")
+
+    def __str__(self) -> str:
+        """Return what was seen, in a few words."""
+        if self.value is not None:
+            return f"order {self.value:.2f}"
+        return {
+            "singular": f"IER = 129 at steps of {self.step_size:.1e} s",
+            "sensitive": "the error may be rounding that the motion has multiplied",
+            "unbounded": "the solution itself leaves every bound",
+            "rounding": "rounding from the start",
+        }.get(self.state, f"does not settle down to steps of {self.step_size:.1e} s")
+
+
+class _SingularError(Exception):
+    """A matrix was found singular that has to be: the program is another method then."""
+
+
+def measured_order(
+    scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
+) -> Order:
+    """Measure the order of a program's omega; see `order_of`.
+
+    An error that rounding may have grown to is no miss. That it does not settle is one, if a
+    textbook method of its order does.
+
+    Parameters
+    ----------
+    scene : Scene
+        With the longest step.
+    program : Program
+        Its compiled code is judged.
+    listing : Listing
+        Its defects and readings.
+    truth : Reference
+        At the times of `scene`.
+    pairs : int
+        As in `order_of`.
+    """
+
+    def omega(finer: Scene) -> Array:
+        run = program.run(finer, listing, may_stop=False, velocity=False)
+        failed = run.steps < finer.steps or (run.ier is not None and run.ier.any())
+        if failed and _may_be_singular(program.name, finer.step_size):
+            raise _SingularError
+        return run.omega
+
+    def textbook(finer: Scene) -> Array:
+        return solve(finer, finer.times(), _TEXTBOOK[program.order], 1.0).omega
+
+    found = order_of(scene, omega, program.order, truth, pairs=pairs)
+    if found.state in ("misses", "unsettled", "singular") and _is_grown_rounding(scene, found):
+        return replace(found, state="sensitive", value=None)
+    if found.state in ("unsettled", "singular"):
+        fewer = min(found.steps, _MOST_STEPS) // _MARGIN
+        if order_of(scene, textbook, program.order, truth, most_steps=fewer).is_judged:
+            return replace(found, state="misses")
+    return found
+
+
+def order_of(
+    scene: Scene,
+    solution: Callable[[Scene], Array],
+    due: int,
+    truth: Reference,
+    quantity: Quantity = "omega",
+    pairs: int = 2,
+    most_steps: int | None = None,
+) -> Order:
+    """Halve the step until it is small, and measure the power with which the error falls.
+
+    Parameters
+    ----------
+    scene : Scene
+        With the longest step.
+    solution : callable
+        Returns what is judged after each step of the scene that it is given, shape (n, 3);
+        fewer rows where it overflows.
+    due : int
+        The order that it has.
+    truth : Reference
+        At the times of `scene`.
+    quantity : {"omega", "velocity"}
+        What of the truth is meant.
+    pairs : int
+        Halvings, one after another, in which the order has to show, or not to.
+    most_steps : int, optional
+        How far to go; by default 2**18, or eight halvings.
+    """
+    n = len(truth.time)
+    if n < scene.steps:
+        return Order(due, "unbounded", None, scene.step_size)
+    right = truth.omega if quantity == "omega" else truth.velocity
+    assert right is not None
+    start = max(map(abs, scene.omega)) if quantity == "omega" else 0.0
+    scale = float(np.abs(right).max(initial=start))
+    fastest = _fastest(scene, truth.omega)
+    state: State = "unsettled"
+    step_size, steps = scene.step_size, 0
+    error, worst = math.inf, math.nan
+    previous: Array | None = None
+    previous_error = math.inf
+    orders: list[float] = []
+    for finer in _halved(scene, most_steps):
+        parts = finer.steps // n
+        try:
+            found = solution(finer)[parts - 1 :: parts]
+        except _SingularError:
+            if state != "singular":
+                state, step_size = "singular", finer.step_size
+            previous = None
+            continue
+        steps = finer.steps
+        if state != "singular":
+            step_size = finer.step_size
+        if len(found) < n:  # overflow: the step is far too large
+            previous = None
+            continue
+        errors = np.abs(found - right).max(axis=1)
+        error, worst = float(errors.max()), float(truth.time[errors.argmax()])
+        if error <= _ROUNDINGS * ROUNDING * scale * steps + truth.error:
+            shown = [each for each in orders if _shows(each, due)]
+            value = shown[-1] if shown else None
+            state = "as due" if shown else "rounding"
+            return Order(due, state, value, step_size, steps, error, worst)
+        settles = previous is not None and np.abs(found - previous).max() < _SMALL_CHANGE * scale
+        if settles and finer.step_size * fastest <= _SMALL_ANGLE:
+            order = math.log2(previous_error / error)
+            if orders and _shows(order, due) != _shows(orders[-1], due):
+                orders.clear()
+            orders.append(order)
+            if len(orders) == pairs:
+                state = "as due" if _shows(order, due) else "misses"
+                return Order(due, state, order, step_size, steps, error, worst)
+        previous, previous_error = found, error
+    if orders and _shows(orders[-1], due):
+        return Order(due, "as due", orders[-1], step_size, steps, error, worst)
+    return Order(due, state, None, step_size, steps, error, worst)
+
+
+def _shows(order: float, due: int) -> bool:
+    return order >= due - ORDER_SLACK
+
+
+def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
+    """Yield the scene in its own steps, in half of them, and so on."""
+    most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
+    for halvings in itertools.count():
+        parts = 2**halvings
+        if scene.steps * parts > most:
+            return
+        try:
+            finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
+            check_steps(finer, "orders", "fortran", 1.0)
+        except InputError:
+            return  # does not fit in memory, or takes too long
+        yield finer
+
+
+def _fastest(scene: Scene, omega: Array) -> float:
+    """Return a rate (rad/s) above those of small disturbances of omega, and of the torque."""
+    sizes = np.abs(np.vstack([scene.omega, omega]))
+    others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
+    waves = scene.torque.sines + scene.torque.cosines
+    turning = float((np.abs(scene.euler_coefficients) * others).max())
+    return max([turning, *(abs(frequency) for _, frequency in waves)])
+
+
+def _is_grown_rounding(scene: Scene, found: Order) -> bool:
+    """Whether the motion may have made the error of roundings on the way; if unknown, it may."""
+    if not found.steps or not math.isfinite(found.error):
+        return False
+    try:
+        flow = conditioning(scene, found.time)
+    except InputError:
+        return True
+    return found.error <= flow.limit(0.0, _ROUNDINGS * found.steps) * flow.largest
+
+
+def _may_be_singular(program: str, step_size: float) -> bool:
+    """Whether the matrix of collocation at such steps (s) may be found singular."""
+    from pyharness.theory.collocation_matrices import PARTS
+
+    if program not in PARTS:
+        return False
+    points = np.array([[step_size * part] for part in map(float, PARTS[program])])
+    powers = np.arange(len(points))
+    with np.errstate(all="ignore"):
+        matrix = (powers + 1) * points**powers
+    return not (np.isfinite(matrix).all() and np.linalg.cond(matrix) < _CONDITION)

@@ -1,0 +1,1 @@
+"""The thesis: its listings, its figures, its statements."""

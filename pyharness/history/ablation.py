@@ -1,0 +1,145 @@
+"""What each defect does: alone mended, alone kept, and in every company."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from pyharness.compare.agreement import accuracy
+from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.model.effort import check_steps
+from pyharness.model.errors import unknown
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing, corrected, names_of, original, subset
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.trajectory import Stop
+from pyharness.truth.reference import Reference, reference
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What one listing makes of one scene.
+
+    Attributes
+    ----------
+    listing : Listing
+        The active defects and readings.
+    omega, velocity : float
+        Largest error of any component (rad/s, m/s) at the steps that were run.
+    steps : int
+        Steps that were run.
+    ended : str
+        As in a trajectory.
+    stop : Stop or None
+        What ended the run.
+    """
+
+    listing: Listing
+    omega: float
+    velocity: float
+    steps: int
+    ended: str
+    stop: Stop | None
+
+
+@dataclass(frozen=True)
+class CaseEffects:
+    """A defect or reading in one program and case, alone mended and alone kept."""
+
+    program: str
+    case: int
+    punched: Effect
+    mended_alone: Effect
+    kept_alone: Effect
+    mended: Effect
+
+
+def entries(kind: str | None = None) -> list[dict[str, Any]]:
+    """Return the entries of the apparatus, of one kind or of all; InputError for no such kind."""
+    everything: list[dict[str, Any]] = facts("apparatus")["entry"]
+    kinds = sorted({entry["kind"] for entry in everything})
+    if kind is not None and kind not in kinds:
+        raise unknown("kind", kind, kinds, "--kind")
+    return [entry for entry in everything if kind in (None, entry["kind"])]
+
+
+def entry(name: str) -> dict[str, Any]:
+    """Return an entry of the apparatus; InputError where there is none of that name."""
+    for each in entries():
+        if each["id"] == name:
+            return each
+    raise unknown("entry", name, [each["id"] for each in entries()])
+
+
+def effect(
+    scene: Scene,
+    listing: Listing,
+    truth: Reference,
+    may_stop: bool = True,
+    effort: float = 1.0,
+) -> Effect:
+    """Run a listing and hold it against the truth (with velocity) at the scene's times."""
+    run = PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=may_stop, effort=effort)
+    found = accuracy(scene, run, truth)
+    velocity = math.nan if found.velocity is None else found.velocity
+    return Effect(listing, max(found.omega), velocity, run.steps, run.ended, run.stop)
+
+
+@cache
+def case_truth(case: int) -> Reference:
+    """Return the truth of a case with velocity, computed once."""
+    scene = case_scene(case)
+    return reference(scene, scene.times(), velocity=True)
+
+
+def effects_of(name: str) -> Iterator[CaseEffects]:
+    """Yield what a flagged defect or reading does in each of its programs, case by case.
+
+    For a reading, which no listing has by default, *mended alone* is the program as punched and
+    *kept alone* the mended program with the reading; both have it where they are compared.
+    """
+    known = entry(name)
+    for program in known["programs"]:
+        if known["kind"] == "reading":
+            listings = (
+                original(program, [name]),
+                original(program),
+                corrected(program, [name]),
+                corrected(program),
+            )
+        else:
+            listings = (
+                original(program),
+                subset(program, "original", fix=[name]),
+                subset(program, "corrected", keep=[name]),
+                corrected(program),
+            )
+        for case in case_numbers():
+            scene, truth = case_scene(case), case_truth(case)
+            yield CaseEffects(
+                program, case, *(effect(scene, listing, truth) for listing in listings)
+            )
+
+
+def lattice(
+    scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
+) -> list[Effect]:
+    """Return the effect of every subset of a program's defects, largest error of omega first."""
+    check_steps(scene, program, "fortran", effort)
+    truth = reference(scene, scene.times(), velocity=True, effort=effort)
+    names = names_of("defect", program)
+    found = []
+    for bits in range(2 ** len(names)):
+        active = frozenset(name for i, name in enumerate(names) if bits >> i & 1)
+        listing = Listing(program, active, frozenset(readings))
+        found.append(effect(scene, listing, truth, effort=effort))
+    return sorted(found, key=_size, reverse=True)
+
+
+def _size(found: Effect) -> tuple[float, float]:
+    # What overflowed is worse than anything that did not.
+    worst = math.inf if found.ended == "overflow" else found.omega
+    # Three digits: what differs by rounding alone is a tie.
+    return float(f"{worst:.2e}"), float(f"{found.velocity:.2e}")

@@ -1,0 +1,166 @@
+"""Where claims are tested: the programs in one state, under stated assumptions, run once each."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+
+from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.model.listing import Listing, names_of
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original.collocation import interval
+from pyharness.original.equations import Vector, omega_rate
+from pyharness.truth.reference import Reference, reference
+
+COLLOCATION = ("two-term", "four-term")
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """What the thesis does not say.
+
+    Attributes
+    ----------
+    start : Triple or None
+        omega(0) of the cases whose start is not given (rad/s); None for those of Table 1 as
+        `cases.toml` has them.
+    readings : frozenset of str
+        Readings that are not the adopted ones.
+    steps : int
+        Steps of a run.
+    """
+
+    start: Triple | None = None
+    readings: frozenset[str] = frozenset()
+    steps: int = 100
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """The three programs with their defects, or without.
+
+    Attributes
+    ----------
+    punched : bool
+        As punched, or as mended.
+    assumptions : Assumptions
+        Under which they run.
+    mended : frozenset of str
+        Defects that are mended even as punched: what would the verdict be without this one?
+    """
+
+    punched: bool
+    assumptions: Assumptions = field(default_factory=Assumptions)
+    mended: frozenset[str] = frozenset()
+
+    def listing(self, program: str) -> Listing:
+        """Return the program's listing in this state."""
+        defects = set(names_of("defect", program)) - self.mended if self.punched else set()
+        readings = self.assumptions.readings & set(names_of("reading", program))
+        return Listing(program, frozenset(defects), readings)
+
+    def scene(self, case: int) -> Scene:
+        """Return a case under the assumptions."""
+        return _scene(case, self.assumptions.start, self.assumptions.steps)
+
+    def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
+        """Run a program on a case; with `parts`, in steps so much smaller over the same time."""
+        return _run(self.listing(program), self.scene(case), may_stop, parts)
+
+    def truth(self, case: int) -> Reference:
+        """Return the true solution of a case at its steps."""
+        return _truth(self.scene(case))
+
+    def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
+        """Return the largest error of omega (rad/s) at the steps of the case; inf on overflow."""
+        run = self.run(program, case, may_stop, parts)
+        if run.ended == "overflow":
+            return math.inf
+        return distance(run.omega[parts - 1 :: parts], self.truth(case).omega)
+
+    def models(self, case: int, terms: int) -> Array:
+        """Return omega of the collocation model of so many terms, at points k/(n+1).
+
+        As punched the points leave the interval, unless `dt-accumulates` is mended, and the
+        torque must be constant; the thesis lists neither the three- nor the five-term model.
+        """
+        accumulates = self.punched and "dt-accumulates" not in self.mended
+        return _model(self.scene(case), terms, accumulates)
+
+
+def distance(first: Array, second: Array) -> float:
+    """Return the largest difference of any component at the rows that both have (rad/s)."""
+    n = min(len(first), len(second))
+    with np.errstate(all="ignore"):
+        return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
+
+
+def ranges(truth: Reference) -> Array:
+    """Return how far each component moves (rad/s)."""
+    spread: Array = truth.omega.max(axis=0) - truth.omega.min(axis=0)
+    return spread
+
+
+def largest(truth: Reference) -> float:
+    """Return the largest component of omega (rad/s)."""
+    return float(np.abs(truth.omega).max())
+
+
+@cache
+def _scene(case: int, start: Triple | None, steps: int) -> Scene:
+    from pyharness.model.facts import facts
+
+    scene = replace(case_scene(case), steps=steps)
+    if start is not None and case in facts("claims")["assumed"]["cases"]:
+        scene = replace(scene, omega=start)
+    return scene
+
+
+@cache
+def _run(listing: Listing, scene: Scene, may_stop: bool, parts: int) -> Trajectory:
+    finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
+    return PROGRAM_REGISTRY[listing.program].run(finer, listing, may_stop=may_stop)
+
+
+@cache
+def _truth(scene: Scene) -> Reference:
+    return reference(scene, scene.times())
+
+
+@cache
+def _model(scene: Scene, terms: int, accumulates: bool) -> Array:
+    h = scene.step_size
+    state = list(scene.omega)
+    rows = []
+    for step in range(scene.steps):
+        dt = h * (step + 1) if accumulates else h
+        points = [dt * k / (terms + 1) for k in range(1, terms + 1)]
+        begin = step * h
+        torques = [scene.normalized_torque(begin + t) for t in (0.0, *points)]
+
+        def rates(k: int, x: Vector, torques: Sequence[Vector] = torques) -> list[float]:
+            return omega_rate(scene.euler_coefficients, torques[k], x)
+
+        state, _ = interval(state, points, h, rates)
+        rows.append(state)
+    return np.array(rows)
+
+
+def required_constant(laboratory: Laboratory, case: int) -> float:
+    """Return the Lipschitz constant (1/s) that lets the Runge-Kutta program run all its steps."""
+    scene = laboratory.scene(case)
+    listing = laboratory.listing("runge-kutta")
+    program = PROGRAM_REGISTRY["runge-kutta"]
+    constant = 0.0
+    for _ in range(6 * scene.steps):
+        run = program.run(scene, listing, lipschitz=constant or 1e-300)
+        if run.stop is None:
+            return constant
+        constant = run.stop.quotient * (1.0 + 1e-12)
+        if math.isinf(constant):
+            return constant
+    return constant

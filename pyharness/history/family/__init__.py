@@ -1,0 +1,1 @@
+"""The weighted residual methods as one family: orders derived, and orders measured."""

@@ -1,0 +1,236 @@
+"""The weighted residual family of III.1 and IV.2: any weighting, number of terms, corrections.
+
+One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
+omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, as it is at the beginning;
+each correction takes f along the estimate before it and chooses the c's so that the integrals of
+W (omega' - f) vanish (eq. 26). The thesis does one correction.
+
+What a correction does is the same in every step: see `pyharness.theory.tableau`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.theory.tableau import basis, grid, tableau
+
+WEIGHTINGS = ("collocation", "subdomain", "galerkin", "least-squares")
+POINTS = ("thesis", "gauss")
+MOST_TERMS = 12
+MOST_CORRECTIONS = 100
+# Beyond it, the points lie so close together that half the digits are lost.
+_WORST_CONDITION = 1e8
+
+
+@dataclass(frozen=True)
+class Member:
+    """One method of the family.
+
+    Attributes
+    ----------
+    weighting : str
+        One of `WEIGHTINGS`. Least squares is that of f held (eq. 25 with dR/dc_i = i t**(i-1)).
+    terms : int
+        Powers of t in the trial function, n.
+    points : {"thesis", "gauss"} or tuple of float, or None
+        Where collocation makes the residual vanish, in parts of the step: k/(n+1), those of
+        Gauss and Legendre, or n different numbers from 0 to 1. None for the other weightings,
+        and "thesis" for collocation where nothing is given.
+    corrections : int
+        Corrections of the first estimate, k; the thesis's programs do one.
+
+    Raises
+    ------
+    InputError
+        Where there is no such method.
+    """
+
+    weighting: str = "collocation"
+    terms: int = 2
+    points: str | tuple[float, ...] | None = None
+    corrections: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse what is no method."""
+        if self.weighting not in WEIGHTINGS:
+            raise unknown("weighting", self.weighting, WEIGHTINGS)
+        if not 1 <= self.terms <= MOST_TERMS:
+            raise InputError(f"terms is {self.terms}; allowed: 1 to {MOST_TERMS}")
+        if not 0 <= self.corrections <= MOST_CORRECTIONS:
+            raise InputError(f"corrections is {self.corrections}; allowed: 0 to {MOST_CORRECTIONS}")
+        if self.weighting != "collocation":
+            if self.points is not None:
+                raise InputError(
+                    f"points have no meaning with {self.weighting}; allowed: with collocation"
+                )
+        elif self.points is None:
+            object.__setattr__(self, "points", "thesis")
+        elif isinstance(self.points, str):
+            if self.points not in POINTS:
+                raise unknown("points", self.points, (*POINTS, "a list as in 0.25,0.75"))
+        else:
+            self._check_points(self.points)
+
+    def _check_points(self, points: Sequence[float]) -> None:
+        if len(points) != self.terms:
+            raise InputError(
+                f"points: {len(points)} given; allowed: as many as there are terms, {self.terms}"
+            )
+        for point in points:
+            if not 0.0 <= point <= 1.0:
+                raise InputError(f"points: {point:g}; allowed: 0 to 1, in parts of the step")
+        if len(set(points)) < len(points):
+            raise InputError("points: one is given twice; allowed: different points")
+        if np.linalg.cond(basis(np.array(points), self.terms)) > _WORST_CONDITION:
+            raise InputError("points: too close together for binary64; take them further apart")
+
+    @property
+    def points_label(self) -> str:
+        """What a table calls the points."""
+        if self.points is None:
+            return "-"
+        if isinstance(self.points, str):
+            return self.points
+        return ",".join(f"{point:g}" for point in self.points)
+
+
+def converged_order(member: Member) -> int:
+    """Return the order of a member after ever more corrections (derived in docs/family.md)."""
+    n = member.terms
+    if member.weighting == "galerkin":
+        return n
+    if member.weighting == "least-squares":
+        return 2 * n
+    if member.weighting == "subdomain":
+        return n + 1 + (n % 2 == 0)
+    nodal = Polynomial.fromroots(grid(member.points, n))
+    order = n
+    while order < 2 * n:
+        moment = (nodal * Polynomial([0.0] * (order - n) + [1.0])).integ()
+        if abs(moment(1.0) - moment(0.0)) > 1e-12:
+            break
+        order += 1
+    return order
+
+
+def predicted_order(member: Member) -> int:
+    """Return the power of h with which the error at a fixed time falls, for general motions.
+
+    The first estimate has order 1 and a correction gains one, up to the converged order.
+    """
+    return min(member.corrections + 1, converged_order(member))
+
+
+def run(scene: Scene, member: Member) -> Trajectory:
+    """Integrate a scene with one member.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to integrate.
+    member : Member
+        With what.
+
+    Returns
+    -------
+    Trajectory
+        Without velocity. The first estimate takes the torque at the beginning of the step, the
+        corrections take it at the true times. Error: the power `predicted_order` of the step,
+        and about a unit in the last place a step.
+
+    Notes
+    -----
+    Source: Jacobs 1982, III.1 (eq. 20-27) and IV.2.
+    """
+    omega = march(scene, [member])[0]
+    finite = np.isfinite(omega).all(axis=1)
+    rows = len(omega) if finite.all() else int(np.argmin(finite))
+    time = np.array(scene.times()[:rows])
+    scheme = tableau(member.weighting, member.terms, member.points)
+    overflow = rows < scene.steps
+    return Trajectory(
+        time=time,
+        recorded_time=time,
+        omega=omega[:rows],
+        velocity=None,
+        steps=rows,
+        evaluations=(rows + overflow) * (1 + member.corrections * len(scheme.nodes)),
+        ended="overflow" if overflow else "complete",
+    )
+
+
+def march(scene: Scene, members: Sequence[Member]) -> Array:
+    """Integrate a scene with several members side by side, which costs hardly more than one.
+
+    Returns
+    -------
+    ndarray, shape (members, steps, 3)
+        omega (rad/s); from an overflow on, what is not finite.
+    """
+    schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
+    width = max(len(scheme.nodes) for scheme in schemes)
+    # Nodes that a member does not have stand at the beginning of the step and count nothing.
+    nodes = np.zeros((len(members), width))
+    matrix = np.zeros((len(members), width, width))
+    weights = np.zeros((len(members), 1, width))
+    for i, scheme in enumerate(schemes):
+        m = len(scheme.nodes)
+        nodes[i, :m], matrix[i, :m, :m], weights[i, 0, :m] = (
+            scheme.nodes, scheme.matrix, scheme.weights,
+        )  # fmt: skip
+    corrections = np.array([m.corrections for m in members])
+    last = [np.flatnonzero(corrections == k) for k in range(corrections.max() + 1)]
+
+    h = scene.step_size
+    result = np.full((len(members), scene.steps, 3), math.nan)
+    start = np.tile(np.array(scene.omega), (len(members), 1, 1))
+    with np.errstate(all="ignore"):
+        for step in range(scene.steps):
+            begin = step * h
+            torque = _torque(scene, np.array([begin]))
+            rates = _rates(scene, torque, start)
+            end = start + h * rates
+            estimate = start + h * nodes[:, :, None] * rates
+            torque = _torque(scene, begin + h * nodes)
+            for k in range(1, len(last)):
+                rates = _rates(scene, torque, estimate)
+                done = last[k]
+                if len(done):
+                    end[done] = start[done] + h * (weights[done] @ rates[done])
+                if k < len(last) - 1:
+                    estimate = start + h * (matrix @ rates)
+            start = end
+            result[:, step] = end[:, 0]
+            if not np.isfinite(end).any():
+                break
+    return result
+
+
+def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
+    a, b, c = scene.euler_coefficients
+    first, second, third = omega[..., 0], omega[..., 1], omega[..., 2]
+    rates = np.empty(omega.shape)
+    rates[..., 0] = torque[..., 0] + a * second * third
+    rates[..., 1] = torque[..., 1] + b * first * third
+    rates[..., 2] = torque[..., 2] + c * first * second
+    return rates
+
+
+def _torque(scene: Scene, times: Array) -> Array:
+    """Return the normalized torque at many times, shape (..., 3); one for all if constant."""
+    law = scene.torque
+    torque = np.array(law.constant)
+    if law.varies:
+        t = times[..., None]
+        torque = torque + np.array(law.rate) * t
+        for amplitude, frequency in law.sines:
+            torque = torque + np.array(amplitude) * np.sin(frequency * t)
+        for amplitude, frequency in law.cosines:
+            torque = torque + np.array(amplitude) * np.cos(frequency * t)
+    return torque if scene.moments is None else torque / np.array(scene.moments)

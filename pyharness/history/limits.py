@@ -1,0 +1,239 @@
+"""What the programs as punched tend to as the step goes to zero.
+
+A program that does not converge to the solution converges to something else, or to nothing.
+The derivations stand in docs/findings.md; here each limit is solved for, independently of the
+programs, and the programs are held against it while their step is halved.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.model.effort import advice
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, names_of, original, subset
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.truth.reference import Reference, reference
+
+_TOLERANCE = 1e-11
+_MOST_EVALUATIONS = 1_000_000  # some ten seconds
+
+TENDS_TO = {
+    "two-term": "the solution of w' = F(w) - (2/9) t^2 Q(F(w)), Q the quadratic part of F",
+    "four-term": "the true solution",
+    "runge-kutta": "2 y(t/2) - y(0), y the true solution",
+}
+NOTHING = "nothing: TIME = t^2/(2h) + t/2 leaves every bound"
+
+
+@dataclass(frozen=True)
+class Halving:
+    """A program as punched at one step size.
+
+    Attributes
+    ----------
+    step_size : float
+        s.
+    from_limit, from_truth : float
+        Largest distance of any component of omega (rad/s) at the times of the largest step;
+        infinite where the run overflowed.
+    """
+
+    step_size: float
+    from_limit: float
+    from_truth: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a program as punched tends to, and how it comes near.
+
+    Attributes
+    ----------
+    program : str
+        Which.
+    tends_to : str
+        The limit in words.
+    halvings : tuple of Halving
+        From the scene's own step downward.
+    order : float
+        Power of the step with which the distance from the limit falls, at the last halving.
+    """
+
+    program: str
+    tends_to: str
+    halvings: tuple[Halving, ...]
+    order: float
+
+
+def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
+    """Hold a program as punched, without its stop test, against its limit.
+
+    Parameters
+    ----------
+    program : str
+        One of the three.
+    scene : Scene
+        Where the torque varies with time, the collocation programs have no limit, and the
+        Runge-Kutta program's is found from its limit equations.
+    halvings : int
+        How often the step is halved.
+    effort : float
+        Factor on the work that is done before giving up.
+
+    Raises
+    ------
+    InputError
+        Where that is not enough.
+    """
+    times = scene.times()
+    truth = reference(scene, times, effort=effort)
+    wanted, tends_to = _limit_solution(program, scene, times, truth, effort)
+    found = []
+    for parts in (2**k for k in range(halvings + 1)):
+        finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
+        run = PROGRAM_REGISTRY[program].run(
+            finer, original(program), may_stop=False, velocity=False, effort=effort
+        )
+        omega = run.omega[parts - 1 :: parts]
+        distances = []
+        for goal in (wanted, truth.omega):
+            complete = run.ended == "complete" and len(goal) == len(omega)
+            distances.append(float(np.abs(omega - goal).max()) if complete else math.inf)
+        found.append(Halving(finer.step_size, *distances))
+    last, before = found[-1].from_limit, found[-2].from_limit
+    finite = math.isfinite(before) and math.isfinite(last) and min(before, last) > 0.0
+    return Limit(program, tends_to, tuple(found), math.log2(before / last) if finite else math.nan)
+
+
+def _limit_solution(
+    program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
+) -> tuple[Array, str]:
+    """Return the limit at `times`, NaN where there is none, and its name."""
+    scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
+    if program == "runge-kutta":
+        if not scene.torque.varies:
+            half = reference(scene, [t / 2.0 for t in times], effort=effort)
+            return 2.0 * half.omega - np.array(scene.omega), TENDS_TO[program]
+        return _slow_slopes(
+            scene, times, scale, effort
+        ), "w' = F(p, t) with p' = F(p, t) / 2, p(0) = w(0)"
+    if scene.torque.varies:
+        return np.full((len(times), 3), math.nan), NOTHING
+    if program == "four-term":
+        return truth.omega, TENDS_TO[program]
+    return _extrapolated(scene, times, scale, effort), TENDS_TO[program]
+
+
+def _extrapolated(scene: Scene, times: Sequence[float], scale: float, effort: float) -> Array:
+    """Solve the limit equation of the two-term program.
+
+    In step n the points are t/3 and 2t/3, t = n h, beyond the step's beginning. The slope there
+    along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F); the line through its
+    values at the two points, read at 0, is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
+    """
+    right_hand_side = scene.right_hand_side()
+    a, b, c = scene.euler_coefficients
+
+    def rate(t: float, omega: Sequence[float]) -> list[float]:
+        f = right_hand_side(t, omega)
+        quadratic = (a * f[1] * f[2], b * f[0] * f[2], c * f[0] * f[1])
+        return [x - 2.0 / 9.0 * t * t * q for x, q in zip(f, quadratic, strict=True)]
+
+    return _solved(rate, list(scene.omega), times, scale, effort)
+
+
+def _slow_slopes(scene: Scene, times: Sequence[float], scale: float, effort: float) -> Array:
+    """Solve the limit equations of the Runge-Kutta program where the torque varies.
+
+    U(1) = p gains h/2 F(p) a step, and the result gains h F(p): slopes are taken at a point that
+    moves at half speed.
+    """
+    right_hand_side = scene.right_hand_side()
+
+    def rate(t: float, state: Sequence[float]) -> list[float]:
+        f = right_hand_side(t, state[:3])
+        return [x / 2.0 for x in f] + f
+
+    return _solved(rate, [*scene.omega, *scene.omega], times, scale, effort)[:, 3:]
+
+
+def _solved(
+    rate: Callable[[float, Sequence[float]], list[float]],
+    start: list[float],
+    times: Sequence[float],
+    scale: float,
+    effort: float,
+) -> Array:
+    """Return the solution at `times`; NaN from where it leaves every bound."""
+    from scipy.integrate import solve_ivp
+
+    evaluations = 0
+    most = effort * _MOST_EVALUATIONS
+
+    def counted(time: float, state: Sequence[float]) -> list[float]:
+        nonlocal evaluations
+        evaluations += 1
+        if evaluations > most:
+            needed = effort * times[-1] / time if time else None
+            raise InputError(
+                f"limits: no limit found beyond t = {time:.6g} s after {most:.0f} right-hand "
+                "sides; " + advice("take fewer or smaller steps", effort, needed)
+            )
+        return rate(time, state)
+
+    def bounded(time: float, state: Sequence[float]) -> float:
+        return 1e6 * scale - max(map(abs, state))
+
+    bounded.terminal = True  # type: ignore[attr-defined]
+    with np.errstate(all="ignore"):
+        result = solve_ivp(
+            counted,
+            (0.0, times[-1]),
+            start,
+            method="DOP853",
+            t_eval=times,
+            events=bounded,
+            rtol=_TOLERANCE,
+            atol=_TOLERANCE * scale,
+        )
+    rows = np.full((len(times), len(start)), math.nan)
+    if len(result.t):  # else y is an empty list
+        rows[: len(result.t)] = result.y.T
+    return rows
+
+
+def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
+    """Name the defects, by program, that change no omega of a scene beyond rounding.
+
+    A defect is invisible where mending it alone, all others kept, moves no omega by more than
+    rounding and leaves the last step where it was.
+    """
+    found = {}
+    for program in PROGRAMS:
+        run = PROGRAM_REGISTRY[program].run
+        punched = run(scene, original(program))
+        names = []
+        for name in names_of("defect", program):
+            mended = run(scene, subset(program, "original", fix=[name]))
+            same_end = (mended.steps, mended.ended) == (punched.steps, punched.ended)
+            if same_end and _same(punched.omega, mended.omega):
+                names.append(name)
+        found[program] = tuple(names)
+    return found
+
+
+def _same(first: Array, second: Array) -> bool:
+    scale = float(np.abs(first).max(initial=0.0))
+    return bool(np.abs(first - second).max(initial=0.0) <= 1e-11 * scale)
+
+
+def tends_elsewhere(found: Limit) -> bool:
+    """Whether the program comes near its limit while its distance from the truth stays."""
+    nearer = found.halvings[-1].from_limit < found.halvings[0].from_limit / 8.0
+    first, last = found.halvings[0].from_truth, found.halvings[-1].from_truth
+    return nearer and last > first / 2.0

@@ -1,0 +1,232 @@
+"""The modern kernels: scenes and times in, trajectories out; one solver per kind of method."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.methods.kernels import COMPLETE, GAVE_UP, REFUSED, extension, normalized
+from pyharness.model.effort import Solver, advice, waves
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array, Trajectory
+
+FIXED_STEP = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
+
+# Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
+# as much as half of one.
+_MOST_EVALUATIONS = 200_000_000
+_ORDER_THAT_SHOWS = 8
+# Two solutions that differ by so many units in the last place will not get closer.
+_ROUNDING = 16 * 2.0**-53
+# Of the range of numbers (rad/s): a solution that reached it twice leaves it.
+_NEAR_THE_END = 1e300
+
+
+def closed_form(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Solve a scene that has a closed form; the tolerance plays no part.
+
+    Raises
+    ------
+    InputError
+        Where the scene has none: torque on a body that is no sphere, or coefficients all of
+        one sign; and where the phase is so large that it has no digit left, or the times and
+        waves are too many.
+    """
+    work = np.array([effort, 0.0])
+    if not any(scene.euler_coefficients):
+        rows, n_rows, status = extension().sphere_solution(
+            *normalized(scene)[1:], scene.omega, times, effort=work
+        )
+        if status == GAVE_UP:
+            raise InputError(
+                f"closed-form: {waves(scene)} waves at {len(times)} times would take too long; "
+                + advice("take fewer times", effort, work[1])
+            )
+    elif not scene.torque.is_zero:
+        raise InputError(
+            "closed-form: the scene has torque, and its body is no sphere; "
+            "allowed: a sphere, or no torque"
+        )
+    else:
+        rows, n_rows, status = extension().torque_free_solution(
+            scene.euler_coefficients, scene.omega, times
+        )
+    if status == REFUSED:
+        raise InputError(
+            "closed-form: no bounded motion, or a disturbance too faint to square; allowed: "
+            "coefficients A, B, C not all of one sign, none of them zero between equal signs"
+        )
+    if status == GAVE_UP:
+        raise TimedError(
+            "closed-form: at t = {time} s the phase is beyond 1e15 radians and has no digit left; "
+            "take a shorter time",
+            times[n_rows],
+        )
+    return _trajectory(times, rows, n_rows, status, len(times), 0)
+
+
+def fixed_step(name: str) -> Solver:
+    """Return the solver of a method of III.2: steps of the scene's size, no error control.
+
+    Before each time the last step is shortened to hit it.
+    """
+    number = FIXED_STEP[name]
+
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        work = np.array([effort, 0.0])
+        rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(
+            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
+            scene.step_size, effort=work,
+        )  # fmt: skip
+        if status == GAVE_UP:
+            raise TimedError(
+                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s are too many; "
+                + advice("take a larger step or a shorter time", effort, work[1]),
+                scene.step_size,
+            )
+        return _trajectory(times, rows, n_rows, status, steps, evaluations)
+
+    return solve
+
+
+def gauss(stages: int) -> Solver:
+    """Return the solver by Gauss collocation, steps halved until two solutions agree.
+
+    The error of the finer one is taken to be their difference over ratio**order - 1, where their
+    steps differ by that ratio, and twice that for safety. No more than order 8 is counted on: steps
+    of high order are long, and the coarser ones too long for the order to show.
+    """
+
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        torque = normalized(scene)[1:]
+        if times[-1] == 0.0:
+            return _trajectory(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
+        scale = max(map(abs, scene.omega))
+        start = max(scale, _driven(torque, times[-1]))
+        step, spent, reached = _first_step(scene, times), 0, 0.0
+        most = effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
+        more = 1.0  # times the steps of the next try that will be needed, as far as known
+        pace = 2.0 * stages  # right-hand sides of a step
+        before: _Solution | None = None
+        counts = previous = _counts(times, step)
+        while True:
+            # Each step takes two iterations at the least.
+            steps = float(counts.sum())
+            if not step or spent + 2.0 * stages * steps > most:
+                needed = spent + steps * (pace * (more - 1.0) + 2.0 * stages * more)
+                raise TimedError(
+                    f"gauss-{stages} gave up at t = {{time}} s after {spent} right-hand sides; "
+                    + advice(
+                        "take a shorter time, a larger tolerance or more stages",
+                        effort,
+                        effort * max(needed, 0.5 * pace * more * steps) / most,
+                    ),
+                    reached,
+                )
+            found = _Solution(
+                *extension().gauss_solution(
+                    scene.euler_coefficients,
+                    *torque,
+                    scene.omega,
+                    times,
+                    stages,
+                    step,
+                    effort=effort,
+                )
+            )
+            spent += found.evaluations
+            pace = max(pace, found.evaluations / steps)
+            reached = float(found.reached[0])
+            if before is not None and before.n_rows == found.n_rows:
+                n = found.n_rows
+                scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
+                difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
+                # Where an interval has as many steps as before, the difference tells nothing.
+                ratio = float((counts / previous).min(initial=2.0))
+                known = ratio ** min(2 * stages, _ORDER_THAT_SHOWS) - 1.0
+                allowed = max(tolerance * scale * known / 2.0, _ROUNDING * scale)
+                close = known > 0.0 and difference <= allowed
+                if known > 0.0 and allowed > 0.0:
+                    excess = difference / (allowed * (known + 1.0))
+                    more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
+                if (close and found.status == COMPLETE) or found.blows_up(before, start):
+                    count = int(counts.sum())
+                    return _trajectory(times, found.rows, n, found.status, count, spent)
+            before, previous = found, counts
+            step *= 0.5
+            counts = _counts(times, step)
+
+    return solve
+
+
+@dataclass(frozen=True)
+class _Solution:
+    rows: Array
+    reached: Array
+    n_rows: int
+    status: int
+    evaluations: int
+
+    def blows_up(self, coarser: "_Solution", start: float) -> bool:
+        """Whether it ended where the coarser one did, at an omega without bound.
+
+        That grows as steps fall, or is at the end of the range of numbers. `start` is the omega
+        of the beginning, or what torque alone would make of it: there may be no row.
+        """
+        if COMPLETE in (self.status, coarser.status):
+            return False
+        # What only grows with time is as far from the coarser one in time as in size.
+        if abs(self.reached[0] - coarser.reached[0]) > 0.01 * abs(self.reached[0]):
+            return False
+        largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
+        so_far = float(np.abs(self.rows[:, : self.n_rows]).max(initial=start))
+        return largest > 1.5 * before > 1e3 * so_far or min(largest, before) > _NEAR_THE_END
+
+
+def _counts(times: Sequence[float], step: float) -> Array:
+    """Return the steps that the kernel takes to each time but 0: equal, `step` at the most."""
+    lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
+    lengths = lengths[lengths > 0.0]
+    with np.errstate(over="ignore", divide="ignore"):
+        return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
+
+
+def _first_step(scene: Scene, times: Sequence[float]) -> float:
+    """Return a step in which the phase grows by about a half, a whole part of the shortest way.
+
+    Equal intervals have then twice as many steps when it is halved.
+    """
+    lengths = [abs(t1 - t0) for t0, t1 in itertools.pairwise((0.0, *times)) if t1 != t0]
+    shortest = min(lengths, default=1.0)
+    rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
+    for amplitude, frequency in scene.torque.sines + scene.torque.cosines:
+        if any(amplitude):
+            rate = max(rate, abs(frequency))
+    return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
+
+
+def _driven(torque: tuple[Array, ...], time: float) -> float:
+    """Return the largest omega that torque alone gives until `time` (rad/s), or infinity."""
+    constant, rate, sines, cosines = torque
+    with np.errstate(over="ignore", invalid="ignore"):
+        push = np.abs(constant) + np.abs(rate * time)
+        push += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
+        driven = float(push.max()) * abs(time)
+    return driven if math.isfinite(driven) else math.inf
+
+
+def _trajectory(
+    times: Sequence[float], rows: Array, n_rows: int, status: int, steps: int, evaluations: int
+) -> Trajectory:
+    time = np.array(times[:n_rows], dtype=float)
+    ended = "complete" if status == COMPLETE else "overflow"
+    return Trajectory(time, time, rows.T[:n_rows], None, steps, evaluations, ended)

@@ -1,0 +1,303 @@
+"""Solvers: prepared once, called in a loop at little more than the cost of the kernel itself.
+
+`prepare` validates the scene, decides what it needs (`plan`) and packs it; a call then looks at
+three arguments and enters the kernel. `solve` is the same for one use, with rows at many times.
+"""
+
+import reprlib
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from pyharness.methods.kernels import ENDS, extension, normalized
+from pyharness.methods.plan import EITHER, FINEST, Plan, plan
+from pyharness.model.effort import checked_effort
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.values import (
+    Number,
+    Numbers,
+    Triple,
+    number,
+    three,
+    three_floats,
+    tolerance_of,
+)
+
+if TYPE_CHECKING:
+    from pyharness._solver import BoundKernel
+else:
+    try:
+        from pyharness._solver import BoundKernel
+    except ImportError:  # not built, as `extension` says when a solver is made
+        BoundKernel = object
+
+# Places in the packed array: see fortran/modern/prepared.f90.
+_EFFORT_AT, _WAVES_AT = 14, 15
+_CODES = {
+    "closed-form": 1,
+    "sphere": 2,
+    "taylor": 3,
+    "improved-euler": 4,
+    "taylor-3": 5,
+    "rk4": 6,
+    "quick": 7,
+    EITHER: 8,
+    **{f"gauss-{stages}": 10 + stages for stages in range(1, 9)},
+}
+_FREE_OR_SERIES = 9
+PREPARED = (
+    "auto",
+    "closed-form",
+    *(name for name in _CODES if name not in ("closed-form", "sphere", EITHER)),
+)
+
+
+class Solver(BoundKernel):
+    """A scene prepared for one method.
+
+    Call it as ``solver(omega0, t_end)``: `omega0` three real numbers (rad/s), `t_end` one, in
+    seconds on either side of 0. It returns the angular velocity at `t_end`, a new array of shape
+    (3,); or ``solver(omega0, t_end, out=array)`` writes it into an array of three floats that lie
+    side by side, which may be `omega0` itself, and returns that. What is none of these is refused
+    with an InputError, and `out` stays as it was. Fastest is an array of floats for `omega0`.
+
+    Where the kernel could not finish the result is NaN and `status` says why; so it is from a
+    start, or to a time, that is not finite.
+
+    Threads may share a solver and call it at once: the kernel releases the GIL. Solvers can be
+    copied and pickled; a copy has made no call yet.
+
+    Attributes
+    ----------
+    plan : Plan
+        What was decided, and why.
+    """
+
+    # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
+    # Python between, which would cost as much as an easy solve.
+    plan: Plan
+    _scene: Scene
+    _tolerance: float
+    _effort: float
+    _asked: str
+
+    def __new__(
+        cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0
+    ) -> Self:
+        """Pack what does not change; `prepare` is the way to make one."""
+        kernel = extension().solve_packed
+        packed = _pack(scene, _code(chosen, asked), tolerance, effort)
+        solver = super().__new__(cls, kernel, packed, _check)
+        solver.plan = chosen
+        solver._scene = scene
+        solver._tolerance = tolerance
+        solver._effort = effort
+        solver._asked = asked
+        return solver
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a copy, in this process or another, be prepared as this one was."""
+        given = (self._scene, self.plan, self._tolerance, self._asked, self._effort)
+        return type(self), given
+
+    def __repr__(self) -> str:
+        """Say the scene and the method."""
+        return f"<Solver of '{self._scene.name}' by {self.plan.method}>"
+
+    @property
+    def status(self) -> str:
+        """How this thread's last call ended: complete, overflow, refused or gave up.
+
+        ``complete``, in 0 steps, where this thread has made none. A call that was refused at the
+        door, or interrupted, is not counted.
+        """
+        return ENDS[self._ending[0]]
+
+    @property
+    def steps(self) -> int:
+        """Steps of this thread's last call (right-hand sides of Gauss collocation).
+
+        0 of a closed form.
+        """
+        return self._ending[1]
+
+    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
+        """Return rows at `times` from another start.
+
+        Parameters
+        ----------
+        omega0 : sequence of three floats
+            rad/s.
+        times : float or iterable of float, shape (n,)
+            s; strictly monotonic, also on both sides of 0.
+
+        Raises
+        ------
+        InputError
+            For a start that is not three finite numbers, or times out of order.
+        """
+        from dataclasses import replace
+
+        from pyharness.methods.registry import METHODS
+        from pyharness.methods.registry import solve as solve_by_name
+
+        scene = replace(self._scene, omega=three("omega0", omega0))
+        method = "taylor" if self._asked == "quick" else self._asked
+        # What was prepared in the scene's steps has no tolerance of its own.
+        tolerance = max(self._tolerance, METHODS[method].finest)
+        return solve_by_name(scene, times, method, tolerance, self._effort)
+
+
+def prepare(
+    scene: Scene, method: str = "auto", tolerance: Number = 1e-12, effort: float = 1.0
+) -> Solver:
+    """Prepare a solver.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to solve. Its step size is that of the methods with a fixed step.
+    method : str
+        A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
+    tolerance : float
+        Largest error of any component at the end, relative to the largest on the way; methods with
+        a fixed step do not look at it. Where small differences grow by a factor K on the way, no
+        method keeps less than some 1e-15 K.
+    effort : float
+        Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
+
+    Returns
+    -------
+    Solver
+        Ready to be called.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, one that can't take the scene, or a tolerance or an effort out of
+        range.
+    NotBuiltError
+        Where the extension is not built.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pyharness import case_scene, prepare
+    >>> solver = prepare(case_scene(2), tolerance=1e-12)
+    >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
+    array([-0.958924,  0.283662, 10.      ])
+    """
+    checked_scene(scene)
+    if not isinstance(method, str) or method not in PREPARED:
+        raise unknown("method", method, PREPARED)
+    tolerance = tolerance_of(tolerance, FINEST)
+    effort = checked_effort(effort)
+    return Solver(scene, plan(scene, method, tolerance), tolerance, method, effort)
+
+
+def solve(
+    scene: Scene,
+    times: Number | Numbers,
+    method: str = "auto",
+    tolerance: Number = 1e-12,
+    effort: float = 1.0,
+) -> Trajectory:
+    """Solve a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to solve.
+    times : float or iterable of float, shape (n,)
+        Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
+        twice, from 0 backward and from 0 forward.
+    method : str
+        A name in `pyharness.methods.registry.METHODS`.
+    tolerance : float
+        Largest error of any component at `times`, relative to the largest from 0 to the last of
+        them.
+    effort : float
+        Factor on the work after which the method gives up: 1 is some ten seconds.
+
+    Returns
+    -------
+    Trajectory
+        One row per time, in the order of `times`; fewer where the solution overflows: those between
+        0 and the overflow, on either side. Steps and evaluations are of both sides together.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, one that can't take the scene, times out of order, a tolerance
+        that the method can't meet, or one that takes more work than `effort` allows.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, solve
+    >>> solve(case_scene(1), [1.0, 2.0]).omega
+    array([[3.5, 3.5, 3.5],
+           [6. , 6. , 6. ]])
+    """
+    from pyharness.methods.registry import solve as solve_by_name
+
+    return solve_by_name(scene, times, method, tolerance, effort)
+
+
+def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
+    """Convert what a call was given and can't read at once.
+
+    Raises
+    ------
+    InputError
+        For what is no start, no time or no buffer.
+    """
+    start, time = three_floats("omega0", omega0), number("t_end", t_end)
+    if out is not None:
+        _check_buffer(out)
+    return start, time
+
+
+def _check_buffer(out: Any) -> None:
+    allowed = "a writable array of three float64 side by side"
+    if not isinstance(out, np.ndarray):
+        raise _refused("out", out, allowed)
+    flags = out.flags
+    if out.dtype.char != "d" or not out.dtype.isnative or out.shape != (3,):
+        raise InputError(f"out: {out.dtype} of shape {out.shape}; allowed: {allowed}")
+    if not flags.writeable:
+        raise InputError(f"out: an array that is read-only; allowed: {allowed}")
+    if not (flags.c_contiguous and flags.aligned):
+        raise InputError(f"out: an array with strides {out.strides}; allowed: {allowed}")
+
+
+def _refused(where: str, value: object, allowed: str) -> InputError:
+    try:
+        shown = reprlib.repr(value)
+    except ValueError:  # Python writes no whole number of many digits
+        shown = "a number of too many digits to be shown"
+    return InputError(f"{where}: {shown}; allowed: {allowed}")
+
+
+def _code(chosen: Plan, asked: str) -> int:
+    """Return the number by which the kernel knows what was decided."""
+    if chosen.method == "closed-form":
+        if chosen.closed_form == "sphere":
+            return _CODES["sphere"]
+        # A disturbance too faint to square: then the series, if that is not against the order.
+        return _FREE_OR_SERIES if asked == "auto" else _CODES["closed-form"]
+    return _CODES[chosen.method]
+
+
+def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
+    coefficients, constant, rate, sines, cosines = normalized(scene)
+    # Four places more than the waves need: the kernel names where the cosines would begin.
+    packed = np.zeros(_WAVES_AT + sines.size + cosines.size + 4)
+    packed[0] = code
+    packed[1:5] = tolerance, scene.step_size, sines.shape[1], cosines.shape[1]
+    packed[5:14] = np.concatenate([coefficients, constant, rate])
+    packed[_EFFORT_AT] = effort
+    packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
+    packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
+    return packed

@@ -1,0 +1,309 @@
+"""`scipy.integrate.solve_ivp` as methods; SciPy is imported when one is used.
+
+SciPy controls the error of a step, a tolerance here is on the error at the times asked for. A
+coarse run ahead tells what lies between the two: the largest omega, to which both are relative;
+how far the motion goes, over which errors of steps add up; and how it multiplies them.
+"""
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyharness.methods.linearised import growth, propagators
+from pyharness.model.effort import Solver, advice, waves
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array, Trajectory
+
+RightHandSide = Callable[[float, Sequence[float]], list[float]]
+
+# What errors of steps add up to until the end, in those of one step, at the most: so much in a
+# motion of a few radians, and so much more for each radian times the factor by which a difference
+# grows. Measured on random scenes other than those that check it, with half as much again.
+_SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
+_SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
+# Growth beyond which a tolerance is left to be multiplied by it, as it is by every method's.
+_SENSITIVE = 1e3
+# Rows on the way are read off a polynomial in each step, whose error is not controlled.
+_ROWS = 4.0
+# Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
+# place takes it for a constant torque, however small the differences that it sees.
+_WAVE_STEP = 2.0
+# solve_ivp takes none below 100 times the rounding of 1; what is claimed with it is for motions
+# of a few radians.
+_FINEST_STEP = 2.222e-14
+_A_FEW = 1.05
+FINEST = {name: _A_FEW * _FINEST_STEP * total for name, total in _SUM.items()}
+
+_COARSE = 1e-3
+# A scale that is so many times too large is no scale for a coarse run.
+_FAR = 4.0
+_MOST_GUESSES = 200
+_NODES_PER_RADIAN = 4.0
+_FEWEST_NODES, _MOST_NODES = 30, 20_000
+
+# A phase of so many radians has hardly a digit left in binary64. What still grows there is on
+# its way to infinity in finite time, and LSODA would never come back from it.
+_LARGEST_PHASE = 1e13
+# Five to ten seconds of Python; each wave of a torque adds an eighth to what a right-hand side
+# costs, and Radau solves linear systems besides.
+_MOST_EVALUATIONS = 500_000
+_RADAU_SHARE = 2
+# LSODA squares the span for its first step: below 1e-150 s that is none at all, and it stands.
+_SHORTEST_SPAN = 2.0**-300
+
+
+class Ahead(NamedTuple):
+    """What a scene makes of the errors of steps, as a coarse run sees it.
+
+    Attributes
+    ----------
+    largest : float
+        Largest abs(omega) of any component from 0 to the end, rad/s.
+    radians : float
+        How far the motion goes: the largest coefficient times omega, summed over the time; and the
+        waves of the torque, as far as they move it.
+    growth : float
+        Largest factor by which a small difference on the way reaches the end, at least 1.
+    """
+
+    largest: float
+    radians: float
+    growth: float
+
+    def finest(self, name: str) -> float:
+        """Return the smallest tolerance that a method of SciPy can meet."""
+        return _FINEST_STEP * steps_sum(name, self.radians, self.growth)
+
+
+def steps_sum(name: str, radians: float, growth: float) -> float:
+    """Return what errors of steps of a method of SciPy add up to, in those of one step."""
+    return _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
+
+
+def finest_tolerance(name: str, scene: Scene, time: float) -> float:
+    """Return the smallest tolerance that a method of SciPy can meet from 0 to `time` (s)."""
+    return _Run(scene, time, name).ahead().finest(name)
+
+
+def scipy_method(name: str) -> Solver:
+    """Return the solver by a method of `solve_ivp`, with the scene's own right-hand side."""
+
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        if times[-1] == 0.0:
+            return rows_trajectory(times, np.array([scene.omega]), 0, 0, "complete")
+        run = _Run(scene, times[-1], name, effort)
+        try:
+            ahead = run.ahead()
+            if ahead.largest == 0.0:
+                # At rest, and nothing that would move it.
+                rest = np.zeros((len(times), 3))
+                return rows_trajectory(times, rest, run.evaluations, len(times), "complete")
+            finest = ahead.finest(name)
+            if tolerance < finest * (1.0 - 1e-9):
+                raise InputError(
+                    f"tolerance is {tolerance:g}; {run.label} can't meet it over "
+                    f"{ahead.radians:.3g} radians in which small differences grow "
+                    f"{ahead.growth:.3g} times; allowed for this motion: {finest * 1.06:.2g} to 1, "
+                    "or a shorter time"
+                )
+            total = steps_sum(name, ahead.radians, ahead.growth)
+            if len(times) > 1:
+                total *= _ROWS
+            step = max(_FINEST_STEP, tolerance / total)
+            longest = _longest_step(scene, times[-1], step * ahead.largest)
+            result = run.solved(name, step, step * ahead.largest, times, longest)
+            if result.status == 1 and not _may_run_away(scene):
+                # It is not on its way to infinity: it turns, and no one can tell how far.
+                raise TimedError(
+                    f"{run.label} gave up at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
+                    "the phase has hardly a digit left; take a shorter time",
+                    float(result.t_events[0][0]) * run.unit,
+                )
+        except _NoNumberError:
+            return rows_trajectory([], np.empty((0, 3)), run.evaluations, len(times), "overflow")
+        rows = result.y.T if len(result.t) else np.empty((0, 3))
+        finite = np.isfinite(rows).all(axis=1)
+        count = len(rows) if finite.all() else int(np.argmin(finite))
+        ended = "complete" if count == len(times) else "overflow"
+        # The result does not carry the steps taken; right-hand sides are what is counted, those of
+        # the coarse run too.
+        return rows_trajectory(times[:count], rows[:count], run.evaluations, len(times), ended)
+
+    return solve
+
+
+class _NoNumberError(Exception):
+    """Linear algebra met what has left the range of numbers."""
+
+
+class _Run:
+    """Calls of `solve_ivp` for one scene and time; all their right-hand sides are counted."""
+
+    def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
+        self.scene = scene
+        self.end = end
+        self.label = name.lower()
+        self.effort = effort
+        self.evaluations = 0
+        self.unit = _unit(self.end)
+        self.rate = max(map(abs, self.scene.euler_coefficients))
+        self.slopes = _in_units(self.scene.right_hand_side(), self.unit)
+        self.most = int(self.effort * _MOST_EVALUATIONS * 8 / (8 + waves(self.scene)))
+        if name == "Radau":
+            self.most //= _RADAU_SHARE
+
+    def solved(
+        self,
+        name: str,
+        relative: float,
+        absolute: float,
+        times: Sequence[float] | None = None,
+        longest: float = math.inf,
+    ) -> Any:
+        """Return what `solve_ivp` finds at `times`; with its dense output where none are given."""
+        from scipy.integrate import solve_ivp
+
+        def phase_left(time: float, omega: Sequence[float]) -> float:
+            return _LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, omega))
+
+        phase_left.terminal = True  # type: ignore[attr-defined]
+        # LSODA warns of what the rows that are missing say already.
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            try:
+                return solve_ivp(
+                    self._counted,
+                    (0.0, self.end / self.unit),
+                    self.scene.omega,
+                    method=name,
+                    t_eval=None if times is None else [time / self.unit for time in times],
+                    dense_output=times is None,
+                    events=phase_left,
+                    rtol=relative,
+                    atol=absolute,
+                    max_step=longest / self.unit,
+                )
+            except InputError:
+                raise
+            except (ValueError, ArithmeticError) as error:
+                # Radau's linear algebra refuses what has left the range of numbers.
+                if "infs or NaNs" in str(error):
+                    raise _NoNumberError from None
+                raise InputError(
+                    f"{self.label} gave up: {error}; take a shorter time, slower motion or smaller "
+                    "torques"
+                ) from None
+
+    def _counted(self, time: float, omega: Sequence[float]) -> list[float]:
+        self.evaluations += 1
+        if self.evaluations > self.most:
+            raise TimedError(
+                f"{self.label} gave up at t = {{time}} s after {self.most} right-hand sides; "
+                + advice(
+                    "take a shorter time or a larger tolerance",
+                    self.effort,
+                    self.effort * self.end / (time * self.unit) if time else None,
+                ),
+                time * self.unit,
+            )
+        return self.slopes(time, omega)
+
+    def ahead(self) -> Ahead:
+        """Look ahead in a coarse run, whose own scale is found on the way.
+
+        Where omega leaves every bound, what start or torque alone would give is the scale, and
+        nothing is known of the rest.
+        """
+        scale = max(map(abs, self.scene.omega)) or driven(self.scene, self.end)
+        if scale == 0.0:
+            return Ahead(0.0, 0.0, 1.0)
+        for _ in range(_MOST_GUESSES):
+            coarse = self.solved("RK45", _COARSE, _COARSE * scale)
+            largest = _largest(coarse.y)
+            if not 0.0 < largest < scale / _FAR:
+                break
+            scale = largest
+        if coarse.status != 0 or not math.isfinite(largest):
+            # It leaves every bound, or loses its phase: no tolerance is met to the end.
+            return Ahead(max(scale, driven(self.scene, self.end)), 0.0, 1.0)
+        length = abs(float(coarse.t[-1]) * self.unit)
+        count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
+        times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))
+        omega = np.nan_to_num(coarse.sol(times).T)
+        sizes = np.abs(omega).max(axis=1)
+        largest = max(largest, float(sizes.max()))
+        radians = self.rate * length * float(np.mean(sizes)) + _turned(self.scene, length, largest)
+        with np.errstate(all="ignore"):
+            flow = propagators(self.scene, times * self.unit, omega)
+        return Ahead(largest, radians, growth(np.nan_to_num(flow)))
+
+
+def _may_run_away(scene: Scene) -> bool:
+    """Whether omega may leave every bound in finite time: its coefficients are of one sign."""
+    return min(scene.euler_coefficients) > 0.0 or max(scene.euler_coefficients) < 0.0
+
+
+def _largest(omega: Array) -> float:
+    return float(np.nan_to_num(np.abs(omega), nan=0.0, posinf=0.0).max(initial=0.0))
+
+
+def driven(scene: Scene, time: float) -> float:
+    """Return the largest omega that torque alone may give a body at rest until `time`."""
+    law, span = scene.torque, abs(time)
+    found = 0.0
+    for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
+        total = abs(law.constant[axis]) * span + 0.5 * abs(law.rate[axis]) * span * span
+        for amplitude, frequency in law.sines:
+            f = abs(frequency)
+            total += abs(amplitude[axis]) * span * min(0.5 * f * span, 2.0 / max(f * span, 1.0))
+        for amplitude, frequency in law.cosines:
+            total += abs(amplitude[axis]) * span * min(1.0, 1.0 / max(abs(frequency) * span, 1.0))
+        found = max(found, total / moment)
+    return found if math.isfinite(found) else 1.0
+
+
+def _longest_step(scene: Scene, time: float, allowed: float) -> float:
+    """Return the step (s) that no wave outruns which over the whole time would count."""
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    frequencies = [
+        abs(frequency)
+        for amplitude, frequency in scene.torque.sines + scene.torque.cosines
+        if any(abs(a) / i * abs(time) > allowed for a, i in zip(amplitude, moments, strict=True))
+    ]
+    fastest = max(frequencies, default=0.0)
+    return _WAVE_STEP / fastest if fastest > 0.0 else math.inf
+
+
+def _turned(scene: Scene, span: float, largest: float) -> float:
+    """Return the radians by which waves turn, each as far as it moves so large an omega."""
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    found = 0.0
+    for amplitude, frequency in scene.torque.sines + scene.torque.cosines:
+        push = max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True))
+        found += min(abs(frequency) * span, push * span / largest if largest > 0.0 else 0.0)
+    return found
+
+
+def _unit(span: float) -> float:
+    """Return the unit of time in which a span is no tiny number, a power of 2; 1 for most."""
+    return 1.0 if abs(span) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(span)[1])
+
+
+def _in_units(right_hand_side: RightHandSide, unit: float) -> RightHandSide:
+    """Return the same equations in another unit of time."""
+    if unit == 1.0:
+        return right_hand_side
+    return lambda time, omega: [unit * slope for slope in right_hand_side(unit * time, omega)]
+
+
+def rows_trajectory(
+    times: Sequence[float], omega: np.ndarray, evaluations: int, steps: int, ended: str
+) -> Trajectory:
+    """Return a trajectory without velocity, recorded at its true times."""
+    time = np.array(times, dtype=float)
+    return Trajectory(time, time, omega, None, steps, evaluations, ended)

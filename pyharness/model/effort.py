@@ -1,0 +1,96 @@
+"""How much work is done without being asked for: every limit, and the one option that lifts it.
+
+A limit counts work, steps times waves and the like, so that a method gives up after some ten
+seconds. `effort` is a factor on all of them.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import Number, number
+
+# Of a forecast: the pace so far is not that of the rest.
+_SLACK = 2.0
+# Of an effort that was advised, and rounded.
+_ROUNDING = 1.0 + 1e-9
+# Where there is no forecast.
+_UNFORESEEN = 10.0
+
+
+# Steps of a program without waves, some 30 s of the slowest; and what a wave costs of such a step.
+_MOST_STEPS = {"fortran": 1e8, "python": 5e5}
+_A_WAVE = {"fortran": 1.0, "python": 0.05}
+
+
+class Solver(Protocol):
+    """What turns a scene into rows at times that run away from 0."""
+
+    def __call__(
+        self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
+    ) -> Trajectory:
+        """Solve, or raise InputError."""
+
+
+def checked_effort(effort: Number) -> float:
+    """Return the factor; InputError where it is no finite number above 0."""
+    value = number("effort", effort)
+    if not 0.0 < value < math.inf:
+        raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
+    return value
+
+
+def advice(instead: str, effort: float, needed: float | None = None) -> str:
+    """Return what to do where a limit ended the work, as the end of a message.
+
+    Parameters
+    ----------
+    instead : str
+        What else would help, as in "take a shorter time".
+    effort : float
+        The factor on the limit.
+    needed : float, optional
+        What it should have been, as far as can be told.
+    """
+    factor = suggested(effort, needed)
+    return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
+
+
+def suggested(effort: float, needed: float | None = None) -> str:
+    """Return a factor that should do: two digits, rounded up."""
+    factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
+    factor = min(1e300, factor)
+    digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
+    rounded = math.ceil(factor / digit) * digit
+    return f"{rounded:.0f}" if 10.0 <= rounded < 1e15 else f"{rounded:.2g}"
+
+
+def waves(scene: Scene) -> int:
+    """Return the number of waves in a torque, which every step has to sum up."""
+    return len(scene.torque.sines) + len(scene.torque.cosines)
+
+
+def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
+    """Refuse a scene that takes a program longer than anyone waits who was not asked.
+
+    Raises
+    ------
+    InputError
+        It names the option that lifts the limit, and how far; or for an unknown implementation.
+    """
+    if implementation not in _MOST_STEPS:
+        raise unknown("implementation", implementation, _MOST_STEPS)
+    cost = 1.0 + _A_WAVE[implementation] * waves(scene)
+    needed = scene.steps * cost / _MOST_STEPS[implementation]
+    if needed <= checked_effort(effort) * _ROUNDING:
+        return
+    load = f"{scene.steps} steps"
+    if waves(scene):
+        load += f" with {waves(scene)} waves of torque"
+    raise InputError(
+        f"{program} ({implementation}): {load} would take too long; "
+        + advice("take fewer steps", effort, needed / _SLACK)
+    )

@@ -1,0 +1,160 @@
+"""Listings: which defects of a program are active, and which readings are selected."""
+
+from collections.abc import Iterable, Set
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.facts import facts
+from pyharness.model.values import several
+
+PROGRAMS = ("two-term", "four-term", "runge-kutta")
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A program as punched, as mended, or anything between.
+
+    Attributes
+    ----------
+    program : str
+        One of `PROGRAMS`.
+    defects : frozenset of str
+        The defects that are active.
+    readings : frozenset of str
+        The readings selected that are not the adopted ones.
+    """
+
+    program: str
+    defects: frozenset[str]
+    readings: frozenset[str] = frozenset()
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, program: str, defects: Iterable[str], readings: Iterable[str] = ...
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Refuse names that the program does not have."""
+        _check_program(self.program)
+        for kind, field in (("defect", "defects"), ("reading", "readings")):
+            names = _names(field, getattr(self, field))
+            object.__setattr__(self, field, names)
+            for name in sorted(names):
+                if name not in names_of(kind, self.program):
+                    raise _foreign(kind, name, self.program)
+
+    @property
+    def label(self) -> str:
+        """`original`, `corrected` or `custom`."""
+        if not self.defects:
+            return "corrected"
+        return "original" if self.defects == set(names_of("defect", self.program)) else "custom"
+
+    @property
+    def flags(self) -> int:
+        """The active names as the bits that the Fortran reads."""
+        active = self.defects | self.readings
+        return sum(1 << entry["flag"] for entry in entries() if entry["id"] in active)
+
+    def has(self, name: str) -> bool:
+        """Whether the defect or reading `name` is active."""
+        return name in self.defects or name in self.readings
+
+
+def entries() -> list[dict[str, Any]]:
+    """Return the defects and readings of the apparatus that have a flag."""
+    return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
+
+
+def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
+    """Return the names of a kind (`defect` or `reading`), of one program or of all."""
+    return tuple(
+        entry["id"]
+        for entry in entries()
+        if entry["kind"] == kind and (program is None or program in entry["programs"])
+    )
+
+
+def original(program: str, readings: Iterable[str] = ()) -> Listing:
+    """Return the program as punched: every defect is active."""
+    return Listing(program, frozenset(names_of("defect", program)), frozenset(readings))
+
+
+def corrected(program: str, readings: Iterable[str] = ()) -> Listing:
+    """Return the program as mended: no defect is active."""
+    return Listing(program, frozenset(), frozenset(readings))
+
+
+def subset(
+    program: str,
+    base: str | None = None,
+    fix: Iterable[str] = (),
+    keep: Iterable[str] = (),
+    readings: Iterable[str] = (),
+) -> Listing:
+    """Return the listing that the options of the command line describe.
+
+    Parameters
+    ----------
+    base : {"original", "corrected"}, optional
+        What to start from; where only `keep` is given, `corrected`, else `original`.
+    fix, keep : iterable of str
+        Defects to mend, and defects to keep.
+    readings : iterable of str
+        Readings to select that are not the adopted ones.
+
+    Raises
+    ------
+    InputError
+        For a name in both `fix` and `keep`, or one that the program does not have.
+    """
+    _check_program(program)
+    mended, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
+    for name in sorted(mended & kept):
+        raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
+    for option, kind, names in (
+        ("--fix", "defect", mended),
+        ("--keep", "defect", kept),
+        ("--reading", "reading", chosen),
+    ):
+        for name in sorted(names - set(names_of(kind, program))):
+            raise _foreign(kind, name, program, option)
+    if base is None:
+        base = "corrected" if kept and not mended else "original"
+    if not isinstance(base, str) or base not in ("original", "corrected"):
+        raise unknown("listing", base, ("original", "corrected"), "--listing")
+    defects = set(names_of("defect", program)) if base == "original" else set()
+    return Listing(program, frozenset((defects - mended) | kept), frozenset(chosen))
+
+
+def checked_listing(listing: object) -> Listing:
+    """Return a listing; InputError where it is none."""
+    if isinstance(listing, Listing):
+        return listing
+    raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")
+
+
+def _check_program(program: object) -> None:
+    if not isinstance(program, str) or program not in PROGRAMS:
+        raise unknown("program", program, PROGRAMS)
+
+
+def _names(where: str, names: object) -> frozenset[str]:
+    allowed = "allowed: a list of names"
+    found = list(names if isinstance(names, Set) else several(where, names, allowed))
+    for name in found:
+        if not isinstance(name, str):
+            raise InputError(f"{where}: {kind_of(name)} where a name belongs")
+    return frozenset(found)
+
+
+def _foreign(kind: str, name: str, program: str, where: str = "") -> InputError:
+    if name in names_of(kind):
+        place = f"{where}: " if where else ""
+        return InputError(
+            f"{place}program {program} has no {kind} '{name}'; "
+            f"allowed: {', '.join(names_of(kind, program)) or 'none'}"
+        )
+    return unknown(kind, name, names_of(kind, program), where)

@@ -1,0 +1,98 @@
+"""The same motion faster or slower: omega and time in other units.
+
+Products of omegas below 1e-154 underflow, and of those above 1e154 overflow, though the solution
+is an ordinary number. A method that forms them gets such a scene in units that bring it near 1, by
+a power of two, which changes no digit.
+"""
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.trajectory import Trajectory
+
+# Far enough from the ends that products of components of unlike size keep their digits.
+_LARGE = 2.0**300
+
+
+def scaled(scene: Scene, factor: float) -> Scene:
+    """Return the scene with the solution factor omega(factor t): the same motion, faster.
+
+    A power of 2 as factor changes no digit of any quantity.
+    """
+    law = scene.torque
+
+    def times(values: Triple, power: int) -> Triple:
+        # One factor after the other: its square alone may be too large a number.
+        for _ in range(power):
+            first, second, third = values
+            values = first * factor, second * factor, third * factor
+        return values
+
+    return replace(
+        scene,
+        omega=times(scene.omega, 1),
+        torque=replace(
+            law,
+            constant=times(law.constant, 2),
+            rate=times(law.rate, 3),
+            sines=tuple((times(a, 2), f * factor) for a, f in law.sines),
+            cosines=tuple((times(a, 2), f * factor) for a, f in law.cosines),
+        ),
+        step_size=scene.step_size / factor,
+    )
+
+
+def is_ordinary(scene: Scene) -> bool:
+    """Whether products of the first omega are far from the ends of binary64."""
+    return 1.0 / _LARGE <= max(map(abs, scene.omega)) <= _LARGE
+
+
+def factor_near_one(scene: Scene, time: float) -> float:
+    """Return the power of 2 by which a scene is scaled; 1 for every ordinary one."""
+    if is_ordinary(scene):
+        return 1.0
+    largest = max(map(abs, scene.omega))
+    law = scene.torque
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    for axis, moment in enumerate(moments):
+        # A slow sine never comes to its amplitude.
+        waves = sum(abs(a[axis]) * min(1.0, abs(f * time)) for a, f in law.sines)
+        waves += sum(abs(a[axis]) for a, _ in law.cosines)
+        push = abs(law.constant[axis]) + abs(law.rate[axis] * time) + waves
+        # What the torque gives it counts like what it has.
+        largest = max(largest, push / moment * abs(time))
+    if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
+        return 1.0
+    # A step short of the ends of the exponents, where the factor itself would not be a number.
+    exponent = max(-1000, min(1000, math.frexp(largest)[1]))
+    factor = math.ldexp(1.0, -exponent)
+    return factor if _fits(scene, time, factor) else 1.0
+
+
+def _fits(scene: Scene, time: float, factor: float) -> bool:
+    """Whether times and torques are numbers of full length in the new units, or nothing at all."""
+    law = scene.torque
+    waves = law.sines + law.cosines
+    sizes = [abs(x) * factor * factor for a in (law.constant, *(a for a, _ in waves)) for x in a]
+    sizes += [abs(x) * factor * factor * factor for x in law.rate]
+    sizes += [abs(f) * factor for _, f in waves]
+    sizes += [scene.step_size / factor * scene.steps]
+    faster = abs(time) / factor
+    short = sizes[-1] < sys.float_info.min or 0.0 < faster < sys.float_info.min
+    return all(map(math.isfinite, (*sizes, faster))) and not short
+
+
+def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
+    """Return the trajectory of a scaled scene in the units of the scene."""
+    with np.errstate(over="ignore"):
+        omega = trajectory.omega / factor
+    finite = np.isfinite(omega).all(axis=1)
+    count = len(omega) if finite.all() else int(np.argmin(finite))
+    time = np.array(times[:count], dtype=float)
+    ended = trajectory.ended if count == len(trajectory.omega) else "overflow"
+    return replace(trajectory, time=time, recorded_time=time, omega=omega[:count], ended=ended)

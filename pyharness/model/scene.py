@@ -1,0 +1,272 @@
+"""Scenes: body, torque law, initial angular velocity, step size and steps, checked once."""
+
+import itertools
+import math
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, SupportsIndex
+
+from pyharness.model.errors import InputError, kind_of, printable
+from pyharness.model.facts import facts
+from pyharness.model.values import (
+    Number,
+    Numbers,
+    finite,
+    number,
+    several,
+    three,
+    three_floats,
+    whole,
+)
+from pyharness.model.values import Triple as Triple
+
+Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
+# What the waves of a law may be given as: pairs of three numbers and one.
+Waves = Iterable[tuple[Numbers, Number]]
+
+# A result row in binary64 with IER, once in the kernel and once in the trajectory.
+_BYTES_PER_STEP = 2 * (8 * 8 + 4)
+# The compiled programs count steps and right-hand sides, five a step at the most, in 32 bits.
+_COUNTABLE_STEPS = 400_000_000
+_LONGEST_NAME = 60
+
+
+@dataclass(frozen=True)
+class TorqueLaw:
+    """N(t) = constant + rate t + sum of amplitude sin(frequency t) + the same with cos.
+
+    N m for a body of moments; 1/s2, torque over moment, for one of coefficients. Three numbers may
+    be a list, a tuple or an array; the fields are plain tuples of floats.
+
+    Raises
+    ------
+    InputError
+        For what is not three finite numbers, or no wave.
+    """
+
+    constant: Triple = (0.0, 0.0, 0.0)
+    rate: Triple = (0.0, 0.0, 0.0)
+    sines: tuple[Wave, ...] = ()
+    cosines: tuple[Wave, ...] = ()
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            constant: Numbers = ...,
+            rate: Numbers = ...,
+            sines: Waves = ...,
+            cosines: Waves = ...,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Check and convert."""
+        for name in ("constant", "rate"):
+            object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
+        for name in ("sines", "cosines"):
+            object.__setattr__(self, name, _waves(f"[torque] {name}", getattr(self, name)))
+
+    @property
+    def varies(self) -> bool:
+        """Whether N depends on time."""
+        waves = self.sines + self.cosines
+        return any(self.rate) or any(any(amplitude) for amplitude, _ in waves)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether N is zero at all times."""
+        return not (self.varies or any(self.constant))
+
+    def at(self, time: float) -> Triple:
+        """Return N at `time` (s), the terms added in the order of the definition."""
+        torque = list(self.constant)
+        if self.varies:
+            for axis in range(3):
+                torque[axis] += self.rate[axis] * time
+                for amplitude, frequency in self.sines:
+                    torque[axis] += amplitude[axis] * _wave(math.sin, frequency * time)
+                for amplitude, frequency in self.cosines:
+                    torque[axis] += amplitude[axis] * _wave(math.cos, frequency * time)
+        return torque[0], torque[1], torque[2]
+
+
+def _wave(function: Callable[[float], float], angle: float) -> float:
+    # Python raises for an infinite angle where Fortran, like IEEE 754, answers NaN.
+    return function(angle) if math.isfinite(angle) else math.nan
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One problem: what moves, under what, from where, in which steps.
+
+    Exactly one of `moments` (kg m2) and `coefficients` (A, B, C of equations 13-15) is given. Three
+    numbers may be a list, a tuple or an array; the fields are plain tuples of floats. Of a name a
+    line of 60 characters is kept, with what steers a terminal escaped.
+
+    Raises
+    ------
+    InputError
+        Where a value is missing, not finite, out of range, or the run does not fit in memory.
+    """
+
+    name: str
+    omega: Triple
+    moments: Triple | None = None
+    coefficients: Triple | None = None
+    torque: TorqueLaw = field(default_factory=TorqueLaw)
+    step_size: float = 0.01
+    steps: int = 100
+    masses: Triple = field(default_factory=lambda: _deck("masses"))
+    forces: Triple = field(default_factory=lambda: _deck("forces"))
+    case: int | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            name: str,
+            omega: Numbers,
+            moments: Numbers | None = None,
+            coefficients: Numbers | None = None,
+            torque: TorqueLaw = ...,
+            step_size: Number = 0.01,
+            steps: SupportsIndex = 100,
+            masses: Numbers = ...,
+            forces: Numbers = ...,
+            case: SupportsIndex | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Convert, and refuse what no method can run."""
+        if not isinstance(self.name, str):
+            raise InputError(f"name is {kind_of(self.name)}; it must be text")
+        self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
+        if (self.moments is None) == (self.coefficients is None):
+            raise InputError("[body]: give either moments or coefficients, three numbers")
+        if self.moments is not None:
+            self._set("moments", _above_zero("[body] moments", "I", self.moments))
+        if self.coefficients is not None:
+            self._set("coefficients", three("[body] coefficients", self.coefficients))
+        self._set("omega", three("[initial] omega", self.omega))
+        if not isinstance(self.torque, TorqueLaw):
+            raise InputError(f"[torque] is {kind_of(self.torque)}; it must be a TorqueLaw")
+        self._set("step_size", number("[run] step_size", self.step_size))
+        if not (math.isfinite(self.step_size) and self.step_size > 0.0):
+            raise InputError(
+                f"[run] step_size is {self.step_size:g}; "
+                "allowed: a finite number above 0, in seconds"
+            )
+        self._set("steps", whole("[run] steps", self.steps))
+        limit = most_steps()
+        if not 1 <= self.steps <= limit:
+            raise InputError(
+                f"[run] steps is {_size(self.steps, limit)}; "
+                f"allowed: 1 to {limit}, what fits in this machine's memory"
+            )
+        if not math.isfinite(self.step_size * self.steps):
+            raise InputError("step size times steps is not finite; take fewer or smaller steps")
+        self._set("masses", _above_zero("masses", "m", self.masses))
+        self._set("forces", three("forces", self.forces))
+        if self.case is not None:
+            self._set("case", whole("case", self.case))
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    @property
+    def euler_coefficients(self) -> Triple:
+        """A, B, C of equations 13-15, without unit."""
+        if self.coefficients is not None:
+            return self.coefficients
+        assert self.moments is not None
+        first, second, third = self.moments
+        return (second - third) / first, (third - first) / second, (first - second) / third
+
+    @property
+    def is_impossible(self) -> bool:
+        """Whether the moments break the triangle inequality, so that no body has them."""
+        if self.moments is None:
+            return False
+        low, middle, high = sorted(self.moments)
+        return high > low + middle
+
+    def times(self) -> list[float]:
+        """Return the true times of the results, n h for n = 1 ... steps (s)."""
+        return [n * self.step_size for n in range(1, self.steps + 1)]
+
+    def normalized_torque(self, time: float) -> Triple:
+        """Return M = N / I at `time` (1/s2)."""
+        first, second, third = self.torque.at(time)
+        if self.moments is None:
+            return first, second, third
+        return first / self.moments[0], second / self.moments[1], third / self.moments[2]
+
+    def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
+        """Return f(t, omega) of equations 16-18: rad/s2, three plain floats."""
+        a, b, c = self.euler_coefficients
+        if self.torque.varies:
+
+            def varying(time: float, omega: Sequence[float]) -> list[float]:
+                x, y, z = omega
+                m1, m2, m3 = self.normalized_torque(time)
+                return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
+
+            return varying
+        m1, m2, m3 = self.normalized_torque(0.0)
+
+        def constant(time: float, omega: Sequence[float]) -> list[float]:
+            x, y, z = omega
+            return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
+
+        return constant
+
+
+def most_steps() -> int:
+    """Return the largest number of steps whose rows fit in half of this machine's memory."""
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
+
+
+def _size(steps: int, limit: int) -> str:
+    # A whole number has no bound: Python refuses to write or to convert one of many digits.
+    if abs(steps) > 10**18:
+        return "a number of more than 18 digits"
+    size = f" (it would need {steps * _BYTES_PER_STEP / 1e9:.3g} GB)"
+    return f"{steps}{size if steps > limit else ''}"
+
+
+def checked_scene(scene: object) -> Scene:
+    """Return a scene; InputError where it is none."""
+    if isinstance(scene, Scene):
+        return scene
+    raise InputError(f"scene is {kind_of(scene)}; it must be a Scene, as case_scene makes one")
+
+
+def _deck(name: str) -> Triple:
+    first, second, third = facts("cases")["deck"][name]
+    return first, second, third
+
+
+def _above_zero(where: str, symbol: str, values: object) -> Triple:
+    found = three_floats(where, values)
+    for axis, value in enumerate(found, 1):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(
+                f"{where}: {symbol}{axis} is {value:g}; allowed: a finite number above 0"
+            )
+    return found
+
+
+def _waves(where: str, values: object) -> tuple[Wave, ...]:
+    allowed = "allowed: a list of waves, each an amplitude of three numbers and a frequency"
+    waves = []
+    for value in several(where, values, allowed):
+        wave = list(itertools.islice(several(where, value, allowed), 3))
+        if len(wave) != 2:
+            raise InputError(f"{where}: a wave is not two things; {allowed}")
+        amplitude, frequency = wave
+        waves.append(
+            (three(f"{where} amplitude", amplitude), finite(f"{where} frequency", frequency))
+        )
+    return tuple(waves)

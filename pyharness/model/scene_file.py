@@ -1,0 +1,151 @@
+"""Where scenes come from: Table 1 by number, or a TOML file of the form in the README."""
+
+import os
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, SupportsIndex
+
+from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.facts import facts
+from pyharness.model.pipes import read_some
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.values import whole
+
+_LARGEST_FILE = 1_000_000
+_TABLES = {
+    "body": ("moments", "coefficients"),
+    "initial": ("omega",),
+    "torque": ("constant", "rate", "sines", "cosines"),
+    "run": ("step_size", "steps"),
+}
+_WAVES = ("sines", "cosines")
+
+
+def case_numbers() -> list[int]:
+    """Return the numbers of the cases of Table 1."""
+    return [entry["number"] for entry in facts("cases")["case"]]
+
+
+def case_scene(number: SupportsIndex) -> Scene:
+    """Return the scene of a case of Table 1; InputError where there is no such case."""
+    number = whole("case", number)
+    for entry in facts("cases")["case"]:
+        if entry["number"] == number:
+            deck = facts("cases")["deck"]
+            return Scene(
+                name=entry["title"],
+                omega=entry["omega"],
+                moments=entry["moments"],
+                torque=_torque(entry.get("torque", {})),
+                step_size=deck["step_size"],
+                steps=deck["steps"],
+                case=number,
+            )
+    shown = str(number) if abs(number) < 10**18 else "of more than 18 digits"
+    raise unknown("case", shown, map(str, case_numbers()), "--case")
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """Return the scene of a TOML file.
+
+    Raises
+    ------
+    InputError
+        Where the file can't be read, is not TOML, has an unknown key, or lacks a value.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"scene file: {kind_of(path)}; allowed: a path, as text or a Path")
+    path = os.fsdecode(path)
+    where = f"scene file '{path}'"
+    data = read_toml(path, where)
+    try:
+        return scene_of(data, Path(path).stem)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
+    """Return the content of a user's TOML file; InputError, which begins with `where`, if none."""
+    try:
+        content = read_some(os.fspath(path), _LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{where}: {reason}; give a TOML file that can be read") from None
+    if len(content) > _LARGEST_FILE:
+        raise InputError(f"{where}: larger than {_LARGEST_FILE} bytes; a scene is a few lines")
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise InputError(f"{where}: not UTF-8 text; TOML files are") from None
+    except RecursionError:
+        raise InputError(f"{where}: nested too deeply; a scene has two levels") from None
+    except ValueError as error:
+        raise InputError(f"{where}: not TOML: {' '.join(str(error).split())}") from None
+
+
+def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
+    """Return a scene as the text of a file that `read_scene` reads back to the last bit.
+
+    `comments` are lines at its head.
+    """
+    import json
+
+    body = "moments" if scene.moments is not None else "coefficients"
+    law = scene.torque
+    lines = [f"# {line}" for line in comments]
+    lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
+    lines += [f"{body} = {list(scene.moments or scene.coefficients or ())}"]
+    lines += ["[initial]", f"omega = {list(scene.omega)}"]
+    lines += ["[torque]", f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
+    for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
+        each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
+        lines.append(f"{name} = [{', '.join(each)}]")
+    lines += ["[run]", f"step_size = {scene.step_size!r}", f"steps = {scene.steps}"]
+    return "\n".join(lines) + "\n"
+
+
+def scene_of(data: dict[str, Any], default_name: str) -> Scene:
+    """Return the scene that the content of a file describes; InputError where it describes none."""
+    check_keys(data, ("name", *_TABLES), "top level")
+    tables: dict[str, dict[str, Any]] = {}
+    for table, keys in _TABLES.items():
+        tables[table] = data.get(table, {})
+        if not isinstance(tables[table], dict):
+            raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
+        if table != "torque":
+            check_keys(tables[table], keys, f"[{table}]")
+    body, initial, run = tables["body"], tables["initial"], tables["run"]
+    if "omega" not in initial:
+        raise InputError("[initial] omega is missing; give three numbers in rad/s")
+    return Scene(
+        name=data.get("name", default_name),
+        omega=initial["omega"],
+        torque=_torque(tables["torque"]),
+        **body,
+        **run,
+    )
+
+
+def _torque(table: dict[str, Any]) -> TorqueLaw:
+    check_keys(table, _TABLES["torque"], "[torque]")
+    waves = {key: _waves(f"[torque] {key}", table[key]) for key in _WAVES if key in table}
+    return TorqueLaw(**{**table, **waves})
+
+
+def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"{where} must be a list of {{ amplitude = [..], frequency = .. }}")
+    for entry in entries:
+        check_keys(entry, ("amplitude", "frequency"), where)
+        for key in ("amplitude", "frequency"):
+            if key not in entry:
+                raise InputError(f"{where}: {key} is missing")
+    return [(entry["amplitude"], entry["frequency"]) for entry in entries]
+
+
+def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
+    """Refuse a key that is not among those allowed."""
+    for key in table:
+        if key not in allowed:
+            raise unknown("key", key, allowed, where)

@@ -1,0 +1,48 @@
+"""The same problem from another side: axes turned, signs changed, begun later."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
+from pyharness.model.trajectory import Array
+
+
+def turned(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
+    """Return the scene with every vector turned, the body too where it takes part."""
+
+    def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
+        return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
+
+    law = scene.torque
+    return replace(
+        scene,
+        omega=turn(scene.omega),
+        moments=turn(scene.moments) if body and scene.moments else scene.moments,
+        torque=TorqueLaw(turn(law.constant), turn(law.rate), waves(law.sines), waves(law.cosines)),
+    )
+
+
+def shifted(scene: Scene, omega: Array, by: float) -> Scene:
+    """Return the problem that begins at the time `by` (s) with `omega`."""
+    law = scene.torque
+    sines: list[Wave] = []
+    cosines: list[Wave] = []
+
+    def times(values: Triple, factor: float) -> Triple:
+        return values[0] * factor, values[1] * factor, values[2] * factor
+
+    for amplitude, frequency in law.sines:
+        sines.append((times(amplitude, math.cos(frequency * by)), frequency))
+        cosines.append((times(amplitude, math.sin(frequency * by)), frequency))
+    for amplitude, frequency in law.cosines:
+        cosines.append((times(amplitude, math.cos(frequency * by)), frequency))
+        sines.append((times(amplitude, -math.sin(frequency * by)), frequency))
+    c, r = law.constant, law.rate
+    constant = (c[0] + r[0] * by, c[1] + r[1] * by, c[2] + r[2] * by)
+    first, second, third = (float(w) for w in omega)
+    return replace(
+        scene,
+        omega=(first, second, third),
+        torque=TorqueLaw(constant, r, tuple(sines), tuple(cosines)),
+    )

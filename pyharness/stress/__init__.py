@@ -1,0 +1,1 @@
+"""Numerical stability tried to breaking, each trial with a bound derived beforehand."""

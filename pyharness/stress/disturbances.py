@@ -1,0 +1,265 @@
+"""What the programs themselves make of small disturbances: their steps, probed by running them.
+
+Held against `pyharness.theory.amplification`, which knows the schemes but not the programs.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from pyharness.methods import registry as methods
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.trajectory import Array
+from pyharness.original import collocation
+from pyharness.original.equations import omega_rate
+from pyharness.theory.amplification import NEAREST, amplification, boundary, weight_of_squares
+from pyharness.theory.collocation_matrices import points, solver_roundings
+from pyharness.theory.conditioning import ROUNDING
+from pyharness.theory.rational import Exact
+from pyharness.theory.schemes import Numbers, runge_kutta_punched, spacing
+
+# A step is a polynomial of omega: each product of stages doubles its degree.
+_DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
+# Roundings on the longest way through a step but for the solving of systems: four stages of a
+# rate and a sum, seven each, and the result.
+_LONGEST = 40.0
+# Of omega: how far neighbours lie that a derivative is taken from.
+_REACH = 2.0**-2
+_GROWTH_STEPS = 64
+# Sizes of the weights of all points, wherever they lie: largest where points far beyond the
+# step are extrapolated to its beginning, by 2, -1 or by 4, -6, 4, -1.
+_WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What was found, what was derived, and how far rounding may part them.
+
+    Attributes
+    ----------
+    found, derived : ndarray
+        Of one shape.
+    limit : float
+        Of the largest difference.
+    """
+
+    found: Array
+    derived: Array
+    limit: float
+
+    @property
+    def difference(self) -> float:
+        """Largest difference of an element; NaN where one is not finite."""
+        return float(np.abs(self.found - self.derived).max())
+
+
+def held_steady(coefficients: Triple, omega: Triple, step: float) -> Scene:
+    """Return the scene in which a constant torque holds a body at a steady omega.
+
+    With few binary digits everywhere the balance is exact, and no rounding disturbs it.
+    """
+    a, b, c = coefficients
+    x, y, z = omega
+    law = TorqueLaw((-a * y * z, -b * x * z, -c * x * y))
+    return Scene(
+        "steady rotation", omega, coefficients=coefficients, torque=law, step_size=step, steps=1
+    )
+
+
+def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
+    """Return step size times the derivatives of equations 13-15, exactly."""
+    a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
+    x, y, z = map(Fraction, omega)
+    return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
+
+
+def eigenvalues(scene: Scene) -> Array:
+    """Return z of a steady rotation: step size times the eigenvalues."""
+    return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
+
+
+def first_step(scene: Scene, listing: Listing) -> Probe:
+    """Differentiate the first step of a program at a steady rotation.
+
+    The step is a polynomial of known degree, so that differences with enough neighbours have
+    no error but rounding.
+    """
+
+    def stepped(omega: Array) -> Array:
+        run = _run(replace(scene, omega=_triple(omega), steps=1), listing)
+        return run[0] if len(run) else np.full(3, np.nan)
+
+    found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[listing.program] // 2)
+    matrix = np.array(amplification(listing).of(jacobian(scene, scene.omega)), dtype=float)
+    derived = sum(np.split(matrix[-3:], len(matrix) // 3, axis=1))
+    units = _units(scene, listing.program, np.abs(np.array(scene.omega)) + reach)
+    return Probe(found, np.asarray(derived), amplified * ROUNDING * float(units.max()))
+
+
+def later_steps(scene: Scene, listing: Listing) -> Probe:
+    """Follow a disturbance of a spinning top through the steps of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        C and the torque zero, omega3 the spin and the others the disturbance: its equations are
+        linear, so that no disturbance is too large.
+    """
+    rows = _run(scene, listing)
+    found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
+    small = [row[:2] for row in jacobian(scene, (0.0, 0.0, scene.omega[2]))[:2]]
+    one = np.array(amplification(listing).of(small), dtype=float)
+    state = np.tile(np.array(scene.omega[:2]), len(one) // 2)
+    power = np.eye(len(one))
+    norms, sizes = [], []
+    for _ in range(scene.steps):
+        norms.append(float(np.abs(power).sum(axis=1).max()))
+        sizes.append(float(np.abs(state).max()))
+        state, power = one @ state, one @ power
+    moved = float(scene.steps) if listing.has("dt-accumulates") else 1.0
+    spin = abs(scene.omega[2])
+    unit = float(_units(scene, listing.program, np.array([1.0, 1.0, spin]), moved)[:2].max())
+    total = sum(n * s for n, s in zip(reversed(norms), sizes, strict=True))
+    return Probe(found, state[-2:], ROUNDING * unit * total)
+
+
+def complex_step(listing: Listing, step: int, z: complex) -> Probe:
+    """Run the twin's step on x' = z x, as in step number `step` of a run of steps of 1 s."""
+    program = listing.program
+    moved = float(step) if listing.has("dt-accumulates") else 1.0
+
+    def rates(k: int, x: Sequence[float]) -> list[float]:
+        return [z * each for each in x]  # type: ignore[misc]
+
+    (found,), _ = collocation.interval([1.0], points(program, moved), 1.0, rates)
+    derived = amplification(listing, step).at(np.array(z))[-1, -1]
+    _, varying = solver_roundings(program)
+    weights = _WEIGHTS[program]
+    rate = abs(z) * (1.0 + moved * abs(z))
+    units = _LONGEST * (1.0 + weights * rate)
+    units += varying * (rate + weights * moved * abs(z) ** 2)
+    return Probe(np.array([found]), np.array([derived]), ROUNDING * units)
+
+
+def observed_boundary(listing: Listing, direction: complex) -> Probe:
+    """Find by bisection where the disturbance of a spinning top begins to grow.
+
+    Where a second vector is kept, growth is that of the change from step to step: beside what
+    stays it would not be seen.
+    """
+    matrix = amplification(listing)
+    expected, slope = boundary(matrix, direction)
+
+    def grows(distance: float) -> bool:
+        # Along -1 the disturbance lies on the eigenvector that decays, exactly.
+        second = distance if direction.real else -distance
+        start = (1.0, -1.0 if direction.real else 0.0, 1.0)
+        scene = Scene(
+            "top", start, coefficients=(distance, second, 0.0), step_size=1.0, steps=_GROWTH_STEPS
+        )
+        rows = np.vstack([scene.omega, _run(scene, listing)])[:, :2]
+        if len(rows) <= _GROWTH_STEPS:
+            return True
+        if matrix.size > 1:
+            rows = np.diff(rows, axis=0)
+        return bool(np.square(rows[-1]).sum() > np.square(rows[0]).sum())
+
+    low, high = NEAREST, 8.0
+    if grows(low):
+        low = high = 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    top = Scene("top", (1.0, 1.0, 1.0), coefficients=(expected, expected, 0.0), step_size=1.0)
+    unit = float(_units(top, listing.program, np.ones(3))[:2].max())
+    return Probe(np.array([high]), np.array([expected]), 2.0 * ROUNDING * unit / slope)
+
+
+def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
+    """Differentiate a step of the twin of a collocation program where the body is not steady.
+
+    Its result is omega + h F + h**2/2 J F + w h**3 Q(F), Q the quadratic part of F; only w knows
+    where the points are.
+    """
+    program, h = listing.program, scene.step_size
+    moved = float(step) if listing.has("dt-accumulates") else 1.0
+    coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
+
+    def rates(k: int, x: Sequence[float]) -> list[float]:
+        return omega_rate(coefficients, torque, x)
+
+    def stepped(omega: Array) -> Array:
+        end, _ = collocation.interval(omega.tolist(), points(program, moved * h), h, rates)
+        return np.array(end)
+
+    found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[program] // 2)
+    units = _units(scene, program, np.abs(np.array(scene.omega)) + reach, moved)
+    derived = _moving(scene, float(weight_of_squares(listing, step)))
+    return Probe(found, derived, amplified * ROUNDING * float(units.max()))
+
+
+def _moving(scene: Scene, weight: float) -> Array:
+    h, omega = scene.step_size, np.array(scene.omega)
+    a = np.array(scene.euler_coefficients)
+
+    def along(direction: Array) -> Array:
+        """Return the derivative of equations 13-15 at `direction`, a matrix."""
+        x, y, z = direction
+        return np.asarray(a[:, None] * np.array([[0.0, z, y], [z, 0.0, x], [y, x, 0.0]]))
+
+    rate = np.array(scene.right_hand_side()(0.0, scene.omega))
+    j, along_rate = along(omega), along(rate)
+    third = weight * h**3 * (along_rate @ j)
+    return np.asarray(np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third)
+
+
+def _differentiated(
+    stepped: Callable[[Array], Array], omega: Sequence[float], count: int
+) -> tuple[Array, float, float]:
+    """Return the derivative of a step, how far neighbours lay, how far rounding is amplified."""
+    base = np.array(omega)
+    reach = _REACH * float(np.abs(base).max())
+    spread = reach / count
+    weights = [float(each) for each in spacing(count)]
+    columns = []
+    for axis in range(3):
+        total = np.zeros(3)
+        for i, weight in enumerate(weights, 1):
+            away = np.zeros(3)
+            away[axis] = i * spread
+            total += weight * (stepped(base + away) - stepped(base - away))
+        columns.append(total / spread)
+    return np.array(columns).T, reach, 2.0 * sum(map(abs, weights)) / spread
+
+
+def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
+    """Return by how many units of 2**-53 rounding may change each omega in a step.
+
+    Every rounding is one of a term that is no larger than with all signs positive.
+    """
+    on = Numbers(scene, scene.step_size, sizes=True)
+    if program == "runge-kutta":
+        # As punched each stage stands on the last one: the larger terms.
+        return _LONGEST * runge_kutta_punched(on, sizes)
+    first = on.times_step(on.rate(sizes))
+    estimate = sizes + moved * first
+    rate = on.times_step(on.rate(estimate))
+    _, varying = solver_roundings(program)
+    # The solution of the first system is wrong likewise, and is carried through the rates.
+    wrong = varying * moved * first
+    carried = 0.5 * on.times_step(on.rate(estimate + wrong) - on.rate(estimate - wrong))
+    weights = _WEIGHTS[program]
+    return np.asarray(_LONGEST * (sizes + weights * rate) + varying * rate + weights * carried)
+
+
+def _run(scene: Scene, listing: Listing) -> Array:
+    program = methods.PROGRAM_REGISTRY[listing.program]
+    return program.run(scene, listing, may_stop=False, velocity=False).omega
+
+
+def _triple(omega: Array) -> Triple:
+    first, second, third = omega.tolist()
+    return first, second, third

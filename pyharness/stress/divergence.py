@@ -1,0 +1,122 @@
+"""Where fixed steps are too large: foretold by linear stability, and found by running."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pyharness.methods.registry import solve
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.theory.amplification import Amplification
+
+Runner = Callable[[Scene], Trajectory]
+
+_SAMPLES = 20_000
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """The smallest steps that diverge.
+
+    Attributes
+    ----------
+    found : float
+        Smallest step (s) with which some omega leaves twice the bound of the solution, or
+        overflows; 0 where the smallest one tried does.
+    foretold : float
+        Where the wobble about axis 3 doubles by linear stability (s).
+    limit : float
+        How far the two may be apart, relative to `foretold`.
+    """
+
+    found: float
+    foretold: float
+    limit: float
+
+
+def divergence(
+    scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
+) -> Divergence:
+    """Compare where runs of a spinning body diverge with where they should.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without torque, spinning about a stable axis 3.
+    time : float
+        How long (s).
+    matrix : Amplification
+        Of the method's step.
+    runner : callable
+        Runs a scene in its own steps.
+    smallest : float
+        Smallest step (s) to try.
+    """
+    found = smallest_divergent(scene, time, runner, smallest)
+    a, b, c = scene.euler_coefficients
+    spin = abs(scene.omega[2])
+    rate = math.sqrt(-a * b) * spin
+    foretold = _doubling(matrix, rate, time, smallest)
+    bounds = _bounds(scene, time)
+    # omega3**2 - (C/A) omega1**2 does not change, nor does omega3**2 - (C/B) omega2**2: until
+    # the wobble has doubled, the spin, and the rate with it, change by so much of themselves.
+    change = 0.0
+    if c:
+        wobble = 2.0 * max(bounds[:2])
+        change = abs(c) / min(abs(a), abs(b)) * wobble**2 / (2.0 * spin * spin)
+    low = _doubling(matrix, rate * (1.0 + change), time, smallest)
+    # A peak between two results may be missed by half the angle of a step.
+    missed = -math.log(math.cos(min(1.5, 0.5 * rate * foretold)))
+    high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
+    limit = max(foretold - low, high - foretold) / foretold + 2.0 * foretold / time
+    return Divergence(found, foretold, limit)
+
+
+def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
+    """Return the smallest step (s) with which a run leaves twice the solution's bound.
+
+    By bisection of the number of steps; 0 where `smallest` leaves it too, infinity where none
+    does.
+    """
+    bounds = 2.0 * np.array(_bounds(scene, time))
+
+    def leaves(steps: int) -> bool:
+        run = runner(replace(scene, step_size=time / steps, steps=steps))
+        return run.ended != "complete" or bool((np.abs(run.omega) > bounds).any())
+
+    low, high = 1, math.floor(time / smallest)
+    if leaves(high):
+        return 0.0
+    if not leaves(low):
+        return math.inf
+    while high > low + 1:
+        middle = (low + high) // 2 if high < 2 * low else round(math.sqrt(low * high))
+        low, high = (middle, high) if leaves(middle) else (low, middle)
+    return time / low
+
+
+def _doubling(
+    matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
+) -> float:
+    """Return the smallest step (s) with which a wobble at `rate` (1/s) doubles, and `missed`."""
+    wanted = math.log(2.0) + missed
+
+    def grown(step: float) -> float:
+        growth = float(matrix.radius(np.array(1j * rate * step)))
+        return time / step * math.log(growth)
+
+    low, high = smallest, time
+    for _ in range(200):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if grown(middle) >= wanted else (middle, high)
+    return high
+
+
+def _bounds(scene: Scene, time: float) -> Sequence[float]:
+    """Return the largest size of each omega along the solution."""
+    times = np.linspace(0.0, time, _SAMPLES + 1)[1:].tolist()
+    omega: Array = solve(scene, times, "taylor", 1e-12).omega
+    largest: list[float] = np.abs(np.vstack([scene.omega, omega])).max(axis=0).tolist()
+    return largest

@@ -1,0 +1,301 @@
+"""Length: a million revolutions; energy, momentum and phase against Brouwer's law."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from pyharness.compare.checks import bounded, described, may_hold
+from pyharness.methods.kernels import COMPLETE, extension, normalized
+from pyharness.methods.prepared import prepare
+from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.stress.run import Outcome, Trial, replay
+from pyharness.theory import brouwer, promises
+from pyharness.theory.brouwer import LAWS, Noise, Orbit
+from pyharness.truth.elliptic import torque_free
+
+# A revolution is 2 pi over the largest component of omega: the body's own turn.
+REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
+MOTIONS = {
+    # Case 4: quick precession about the axis of the spin.
+    "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0)),
+    # All three components take part, and the modulus is large.
+    "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
+}
+# With so many, over two decades, chance takes a walk for a drift less than once in a thousand.
+STARTS = 12
+# Below it the last rounding of a result still counts beside those before it.
+_FIT_FROM = 10**2.5
+# Midway between what chance makes of rounding and what a preference does.
+_HALFWAY = 0.25
+# A phase error (rad) beyond which its linear measure says only that it is large.
+_LOST = 0.1
+
+# Of fortran/modern/taylor.f90: the part of omega that the last two terms may have, and how often
+# that before a step is taken again.
+_LEAST_SHARE, _SLACK = 1e-19, 16.0
+_ORDER = 28
+# Steps of Gauss collocation, in radians of the fastest rate: with 8 stages truncation is far below
+# rounding, with 4 it leads the phase and must leave energy alone.
+_PARTS = {8: 1.0, 4: 0.25}
+# A value of the closed form, at any time: tests/methods/test_closed_form.py.
+_CLOSED_FORM = 16.0 * brouwer.ROUNDING
+
+Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A method: how it runs, the noise of its steps, and how far it is followed.
+
+    Attributes
+    ----------
+    run : callable
+        ``run(scene, times)``: omega at the times, shape (n, 3), and the steps until then.
+    noise : callable
+        ``noise(orbit, scene, step)``.
+    revolutions, others : float
+        The longest run, of one start and of the others.
+    preference : bool
+        Whether what a step adds is known to prefer a direction: then powers of 1 and 2 are due.
+    """
+
+    run: Runner
+    noise: Callable[[Orbit, Scene, float], Noise]
+    revolutions: float
+    others: float
+    preference: bool = False
+
+
+def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
+    found = solve(scene, times, "taylor", METHODS["taylor"].finest)
+    return found.omega, found.steps * np.array(times) / times[-1]
+
+
+def _taylor_noise(body: Orbit, scene: Scene, step: float) -> Noise:
+    # The last two terms are at most SLACK shares; what follows them falls at least by halves.
+    return brouwer.taylor_noise(body, scene, step, _ORDER, _SLACK * _LEAST_SHARE)
+
+
+def _gauss(stages: int, part: float) -> Runner:
+    def run(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
+        step = part / _rate(scene)
+        rows, n_rows, status, evaluations = _gauss_rows(scene, times, stages, step)
+        if (n_rows, status) != (len(times), COMPLETE):
+            raise InputError(f"gauss-{stages} gave up after {evaluations} right-hand sides")
+        lengths = np.diff([0.0, *times])
+        return rows, np.cumsum(np.ceil(lengths / step - 1e-6))
+
+    return run
+
+
+def _gauss_rows(
+    scene: Scene, times: Sequence[float], stages: int, step: float
+) -> tuple[Array, int, int, int]:
+    rows, _, n_rows, status, evaluations = extension().gauss_solution(
+        scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
+    )
+    return rows.T, n_rows, status, evaluations
+
+
+def _gauss_noise(stages: int) -> Callable[[Orbit, Scene, float], Noise]:
+    return lambda body, scene, step: brouwer.gauss_noise(body, scene, step, stages)
+
+
+def _rate(scene: Scene) -> float:
+    """Return the largest rate of the linearised equations (1/s), within a third."""
+    a = np.abs(np.array(scene.euler_coefficients))
+    return float(a.max()) * _largest(scene)
+
+
+CONTENDERS = {
+    # What a series leaves out keeps its sign; and its steps fall in with a periodic motion, so
+    # that the rounding of a step comes back with every revolution.
+    "taylor": Contender(_taylor, _taylor_noise, 1e6, 10**5.5, preference=True),
+    # Equal steps of a part of a radian; ten times as costly as a Taylor step.
+    "gauss-8": Contender(_gauss(8, _PARTS[8]), _gauss_noise(8), 1e6, 1e5),
+    "gauss-4": Contender(_gauss(4, _PARTS[4]), _gauss_noise(4), 1e5, 10**4.5),
+}
+
+
+def run(only: Sequence[str]) -> Iterator[Outcome]:
+    """Follow each motion by each method."""
+    for motion in MOTIONS:
+        for name, contender in CONTENDERS.items():
+            if may_hold(f"length/{name}/{motion}", only):
+                yield from hold(name, contender, motion)
+                if name != "gauss-4":
+                    yield _prepared(name, motion)
+        if may_hold(f"length/closed-form/{motion}", only):
+            yield from _closed_form(motion)
+        for name in ("dop853", "lsoda"):
+            if may_hold(f"length/{name}/{motion}", only):
+                yield from _scipy(name, motion)
+        for program in PROGRAMS:
+            for listing in (original(program), corrected(program)):
+                if may_hold(f"length/{program}/{motion}/{listing.label}", only):
+                    yield from _program(listing, motion)
+
+
+def hold(name: str, contender: Contender, motion: str) -> Iterator[Outcome]:
+    """Hold one method to Brouwer's law: a bound at each horizon, and the power of the growth."""
+    scene = MOTIONS[motion]
+    body = orbit_of(motion)
+    for what, found, steps, limits in measured(contender, scene, body):
+        for k, revolutions in enumerate(REVOLUTIONS[: len(steps)]):
+            id = f"length/{name}/{motion}/{what}/{revolutions:.0f}"
+            value = float(np.nanmax(np.abs(found[:, k])))
+            note = f"{steps[k]:.0f} steps, {steps[k] ** LAWS[what]:.1e} to the power {LAWS[what]}"
+            yield Outcome(bounded(id, value, limits[k], replay(id), note), scene)
+        fitted = [
+            k
+            for k, revolutions in enumerate(REVOLUTIONS[: len(steps)])
+            if revolutions >= 0.99 * _FIT_FROM and not np.isnan(found[:, k]).any()
+        ]
+        power = brouwer.exponent(steps[fitted], found[:, fitted])
+        id = f"length/{name}/{motion}/{what}/power"
+        due = LAWS[what] + (0.5 if contender.preference else 0.0)
+        yield Outcome(bounded(id, power, due + _HALFWAY, replay(id), f"due {due}"), scene)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The error of one method over the number of steps, its bound, and by how many starts."""
+
+    motion: str
+    method: str
+    what: str
+    steps: Array
+    error: Array
+    limits: Array
+    starts: Array
+
+
+def curves() -> Iterator[Curve]:
+    """Measure every method on every motion, as the trial does."""
+    for motion, scene in MOTIONS.items():
+        for method, contender in CONTENDERS.items():
+            for what, found, steps, limits in measured(contender, scene, orbit_of(motion)):
+                starts = (~np.isnan(found)).sum(axis=0)
+                error = brouwer.root_mean_square(found)
+                yield Curve(motion, method, what, steps, error, np.array(limits), starts)
+
+
+def measured(
+    contender: Contender, scene: Scene, body: Orbit
+) -> Iterator[tuple[str, Array, Array, list[float]]]:
+    """Yield what is watched, its errors, the steps to each horizon and the bounds there.
+
+    The errors have a row for each start and a column for each horizon, NaN beyond its run.
+    """
+    turn = 2.0 * math.pi / body.largest
+    reached = [r for r in REVOLUTIONS if r <= 1.01 * contender.revolutions]
+    found = {what: np.full((STARTS, len(reached)), math.nan) for what in LAWS}
+    steps = np.zeros(len(reached))
+    for number, start in enumerate(starts(scene, body)):
+        most = contender.others if number else contender.revolutions
+        times = [r * turn for r in reached if r <= 1.01 * most]
+        rows, counted = contender.run(start, times)
+        steps[: len(times)] = np.maximum(steps[: len(times)], counted)
+        for k, (time, row) in enumerate(zip(times, rows, strict=True)):
+            for what, error in brouwer.errors(start, body, time, row).items():
+                found[what][number, k] = error
+    noise = contender.noise(body, scene, reached[-1] * turn / steps[-1])
+    limits = [body.limits(noise, count) for count in steps]
+    for what in LAWS:
+        yield what, found[what], steps, [each[what] for each in limits]
+
+
+@cache
+def orbit_of(motion: str) -> Orbit:
+    """Return the orbit of a motion."""
+    return brouwer.orbit(MOTIONS[motion])
+
+
+def starts(scene: Scene, body: Orbit) -> list[Scene]:
+    """Return states of one motion, so that no lucky phase decides."""
+    times = [0.37 * k / body.frequency for k in range(STARTS)]
+    rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
+    return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
+
+
+def _largest(scene: Scene) -> float:
+    return max(map(abs, scene.omega))
+
+
+def _prepared(name: str, motion: str) -> Outcome:
+    """Hold a prepared solver, which takes the same steps, to the bits of the rows."""
+    scene = MOTIONS[motion]
+    time = 1e4 * 2.0 * math.pi / orbit_of(motion).largest
+    if name == "taylor":
+        rows = _taylor(scene, [time])[0]
+        found = prepare(scene, name, METHODS[name].finest)(np.array(scene.omega), time)
+    else:
+        rows = CONTENDERS[name].run(scene, [time])[0]
+        stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
+        found = prepare(stepped, name)(np.array(scene.omega), time)
+    id = f"length/{name}/{motion}/prepared"
+    return Outcome(bounded(id, float(np.count_nonzero(rows[-1] != found)), 0.0, replay(id)), scene)
+
+
+def _closed_form(motion: str) -> Iterator[Outcome]:
+    scene, body = MOTIONS[motion], orbit_of(motion)
+    times = [r * 2.0 * math.pi / body.largest for r in REVOLUTIONS]
+    rows = solve(scene, times, "closed-form", METHODS["closed-form"].finest).omega
+    found = [brouwer.errors(scene, body, t, row) for t, row in zip(times, rows, strict=True)]
+    for what in LAWS:
+        gain = body.turn if what == "phase" else body.gains[what]
+        limit = _CLOSED_FORM * gain + (0.0 if what == "phase" else 4.0 * brouwer.ROUNDING)
+        id = f"length/closed-form/{motion}/{what}"
+        value = max(abs(each[what]) for each in found)
+        yield Outcome(bounded(id, value, limit, replay(id), "at any time"), scene)
+
+
+def _scipy(name: str, motion: str) -> Iterator[Outcome]:
+    scene, body = MOTIONS[motion], orbit_of(motion)
+    time = 1e2 * 2.0 * math.pi / body.largest
+    found = solve(scene, [time], name, promises.finest(name, scene, time))
+    yield from _described(name, motion, "100", scene, body, time, found.omega[-1])
+
+
+def _program(listing: Listing, motion: str) -> Iterator[Outcome]:
+    """Say what a program makes of 10 and of 1e4 revolutions, in a hundred steps each."""
+    body = orbit_of(motion)
+    step = 2.0 * math.pi / body.largest / 100.0
+    scene = replace(MOTIONS[motion], step_size=step, steps=1_000_000)
+    found = PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=False, velocity=False)
+    for count in (1_000, 1_000_000):
+        where = f"{listing.label}/{count // 100}"
+        if len(found.omega) < count:
+            id = f"length/{listing.program}/{motion}/{where}"
+            note = f"{found.ended} after {found.steps} steps"
+            yield Outcome(described(id, None, replay(id), note), scene)
+            continue
+        row = found.omega[count - 1]
+        yield from _described(listing.program, motion, where, scene, body, count * step, row)
+
+
+def _described(
+    name: str, motion: str, where: str, scene: Scene, body: Orbit, time: float, row: Array
+) -> Iterator[Outcome]:
+    for what, error in brouwer.errors(scene, body, time, row).items():
+        id = f"length/{name}/{motion}/{where}/{what}"
+        lost = what == "phase" and abs(error) > _LOST
+        yield Outcome(described(id, error, replay(id), "lost" if lost else ""), scene)
+
+
+TRIAL = Trial(
+    "length",
+    "a million revolutions of torque-free bodies; energy, momentum and phase",
+    "Brouwer's law: independent roundings of mean 0, each within a running error analysis of "
+    "the step, add up to 4 sqrt(n) of one (Hoeffding), phase to the shear of the motion times "
+    "n**1.5; truncation adds n times its bound. The power of the growth must be nearer to what is "
+    "due, to chance (1/2, 3/2) or to a known preference (1, 2), than to the next",
+    run,
+)

@@ -1,0 +1,214 @@
+"""Linear stability: what a step of each program makes of a small disturbance.
+
+A disturbance of a steady rotation obeys x' = J x, and so does the velocity beside one. Along an
+eigenvector of J a step is a matrix whose elements are polynomials in z = h times the eigenvalue.
+They are worked out here by the algebra of each scheme, in fractions, and hold as they stand for
+hJ in place of z. The Runge-Kutta program as punched keeps a second vector, U(1), from step to
+step: its matrix has two rows, for U(1) and for the result.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.listing import Listing
+from pyharness.theory.collocation_matrices import PARTS
+from pyharness.theory.rational import Exact, inverse, product, times
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Coefficients = NDArray[np.object_]
+
+_HIGHEST = 5
+# A boundary nearer than that is the origin itself.
+NEAREST = 2.0**-4
+_NOTHING = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class Amplification:
+    """The matrix of one step.
+
+    Attributes
+    ----------
+    coefficients : ndarray of Fraction, shape (m, m, 5)
+        Element (i, j), the coefficients of 1, z ... z**4; the last row is the result's.
+    """
+
+    coefficients: Coefficients
+
+    @property
+    def size(self) -> int:
+        """How many vectors are kept from step to step."""
+        return len(self.coefficients)
+
+    def at(self, z: Complex) -> Complex:
+        """Return the matrices at many z, shape (..., m, m)."""
+        powers = np.stack([z**k for k in range(_HIGHEST)], axis=-1)
+        return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
+
+    def radius(self, z: Complex) -> NDArray[np.float64]:
+        """Return the largest size of an eigenvalue at many z."""
+        return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
+
+    def moving(self) -> "Amplification":
+        """Return the matrix without the result, where that only stays and gathers the rest."""
+        column = self.coefficients[:, -1]
+        if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
+            return Amplification(self.coefficients[:-1, :-1])
+        return self
+
+    def of(self, matrix: Exact) -> Exact:
+        """Return the matrix of a step for a system, from hJ of n rows: m n rows, exact."""
+        count = len(matrix)
+        powers = [[[Fraction(int(i == j)) for j in range(count)] for i in range(count)]]
+        for _ in range(_HIGHEST - 1):
+            powers.append(product(matrix, powers[-1]))
+        result = np.zeros((self.size, count, self.size, count), dtype=object)
+        for i in range(self.size):
+            for j in range(self.size):
+                for power, c in zip(powers, self.coefficients[i, j], strict=True):
+                    result[i, :, j, :] += c * np.array(power, dtype=object)
+        flat: Exact = result.reshape(self.size * count, self.size * count).tolist()
+        return flat
+
+    def text(self) -> str:
+        """Return the polynomial, or the matrix row by row, as text."""
+        rows = [", ".join(_polynomial_text(each) for each in row) for row in self.coefficients]
+        return rows[0] if self.size == 1 else "[" + "; ".join(rows) + "]"
+
+
+def amplification(listing: Listing, step: int = 1) -> Amplification:
+    """Return the matrix of one step of a program.
+
+    Parameters
+    ----------
+    listing : Listing
+        The program and its active defects.
+    step : int
+        Which step, from 1: with `dt-accumulates` the points of collocation move.
+    """
+    if listing.program == "runge-kutta":
+        return _runge_kutta(listing)
+    moved = step if listing.has("dt-accumulates") else 1
+    return collocation([part * moved for part in PARTS[listing.program]])
+
+
+def collocation(points: Sequence[Fraction]) -> Amplification:
+    """Return the matrix of the scheme of IV.2 with points in parts of the step.
+
+    The first estimate takes the right-hand side z x constant, one correction takes it along it.
+    """
+    count = len(points)
+    matrix = [[(j + 1) * point**j for j in range(count)] for point in points]
+    solver = np.array(inverse(matrix), dtype=object)
+
+    def fitted(rates: Sequence[Coefficients], times: Sequence[Fraction]) -> list[Coefficients]:
+        c = solver @ np.array(rates, dtype=object)
+        return [_one(1, 0)[0] + sum(each * t ** (k + 1) for k, each in enumerate(c)) for t in times]
+
+    constant = _times_z(_one(1, 0)[0])
+    estimate = fitted([constant] * count, points)
+    (end,) = fitted([_times_z(x) for x in estimate], [Fraction(1)])
+    return Amplification(np.array([[end]], dtype=object))
+
+
+def weight_of_squares(listing: Listing, step: int) -> Fraction:
+    """Return what a collocation program integrates s**2 over a step to, in steps cubed.
+
+    Along the first estimate the right-hand side is F + s J F + s**2 Q(F): the true weight is 1/3.
+    """
+    moved = step if listing.has("dt-accumulates") else 1
+    points = [part * moved for part in PARTS[listing.program]]
+    matrix = [[(j + 1) * point**j for j in range(len(points))] for point in points]
+    c = times(inverse(matrix), [point * point for point in points])
+    return sum(c, Fraction(0))
+
+
+def _runge_kutta(listing: Listing) -> Amplification:
+    """Follow U(1) and the base of the step through the four stages (cards 770-1200)."""
+    first, base = _one(2, 0), _one(2, 1)
+    half = Fraction(1, 2)
+
+    def stored(before: Coefficients, slope: Coefficients, length: Fraction) -> Coefficients:
+        start = before if listing.has("stage-base") else base
+        return np.asarray(start + length * slope)
+
+    k1 = _times_z(first)
+    first = stored(first, k1, half)
+    k2 = _times_z(first)
+    second = stored(first, k2, half)
+    k3 = _times_z(second)
+    third = stored(second, k3, Fraction(1))
+    k4 = _times_z(third)
+    result = base + (k1 + 2 * (k2 + k3) + k4) / 6
+    kept = first if listing.has("base-not-restored") else result
+    matrix = np.array([kept, result], dtype=object)
+    if listing.has("base-not-restored"):
+        return Amplification(matrix)
+    # U(1) is the base: one vector, seen twice.
+    return Amplification(matrix[1:].sum(axis=1, keepdims=True))
+
+
+def runge_kutta_4() -> Amplification:
+    """Return that of equation 31 as it stands."""
+    return _runge_kutta(Listing("runge-kutta", frozenset()))
+
+
+def _one(size: int, place: int) -> Coefficients:
+    """Return the vector at `place` itself, shape (size, powers of z)."""
+    result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
+    result[place, 0] = Fraction(1)
+    return result
+
+
+def _times_z(x: Coefficients) -> Coefficients:
+    assert not x[..., -1].any()
+    return np.roll(x, 1, axis=-1)
+
+
+def _polynomial_text(coefficients: Coefficients) -> str:
+    terms = []
+    for k, c in enumerate(coefficients):
+        if c:
+            power = "" if k == 0 else "z" if k == 1 else f"z^{k}"
+            size = str(c) if c != 1 or not k else ""
+            terms.append(f"{size} {power}".strip())
+    return " + ".join(terms) or "0"
+
+
+def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
+    """Return how far along a direction disturbances do not grow, and the slope there.
+
+    Parameters
+    ----------
+    matrix : Amplification
+        Of a step.
+    direction : complex
+        -1 or 1j: z is a positive number times this.
+
+    Returns
+    -------
+    distance, slope : float
+        Distance 0 where they grow from the beginning; the slope is that of the largest
+        eigenvalue beyond the distance.
+    """
+
+    def grows(distance: float) -> bool:
+        return float(matrix.radius(np.array(distance * direction))) > 1.0 + _NOTHING
+
+    low = NEAREST
+    if grows(low):
+        return 0.0, 1.0
+    while not grows(low + NEAREST):
+        low += NEAREST
+    high = low + NEAREST
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    beyond = high * (1.0 + 1e-6)
+    rise = float(matrix.radius(np.array(beyond * direction))) - 1.0
+    return high, rise / (beyond - high)

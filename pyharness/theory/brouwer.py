@@ -1,0 +1,263 @@
+"""How rounding adds up over many steps of a torque-free motion: Brouwer's law, as bounds.
+
+Brouwer 1937, Astronomical Journal 46: where each step's rounding is a matter of chance, energy
+and momentum wander like the square root of the number of steps, and the phase, which sums up
+what the frequency has done, like its power 3/2. A rounding with a preference makes them 1 and 2.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.truth.elliptic import torque_free
+
+ROUNDING = 2.0**-53
+# Hoeffding 1963: a sum of n independent terms of mean 0 and at most c in size exceeds
+# 4 c sqrt(n) with a probability of 2 exp(-8), whatever their distribution.
+DEVIATIONS = 4.0
+LAWS = {"energy": 0.5, "momentum": 0.5, "phase": 1.5}
+_SAMPLES = 256
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What one step may add, over the largest abs(omega).
+
+    Attributes
+    ----------
+    step : float
+        s.
+    rounding : float
+        Bound of what rounding adds, as often up as down.
+    truncation : float
+        Bound of what the method leaves out, which may have a preference.
+    conserves : bool
+        Whether truncation leaves energy and momentum alone, so that only the phase sees it.
+    """
+
+    step: float
+    rounding: float
+    truncation: float
+    conserves: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """One torque-free motion, as its bounds see it: largest values along it.
+
+    Attributes
+    ----------
+    states, slopes, jacobians : ndarray, shapes (n, 3), (n, 3), (n, 3, 3)
+        Along it: omega (rad/s), its derivative, and the derivative of that by omega.
+    largest : float
+        Largest abs(omega), rad/s.
+    frequency : float
+        Of the motion about the polhode: 2 pi over the period (rad/s).
+    gains : dict
+        By which an error of omega over `largest` enters energy, momentum (both relative) and
+        the frequency (rad/s).
+    turn : float
+        The phase (rad) that an error of omega over `largest` amounts to.
+    """
+
+    states: Array
+    slopes: Array
+    jacobians: Array
+    largest: float
+    frequency: float
+    gains: dict[str, float]
+    turn: float
+
+    def limits(self, noise: Noise, steps: float) -> dict[str, float]:
+        """Return the bounds on energy, momentum and phase after a number of steps."""
+        walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
+        drift = steps * noise.truncation
+        # A result is rounded once more. A, B, C have two roundings each, which moves what is
+        # conserved by no more than four of the energy, whatever the time.
+        found = {
+            name: (walk + (0.0 if noise.conserves else drift) + ROUNDING) * self.gains[name]
+            + 4.0 * ROUNDING
+            for name in ("energy", "momentum")
+        }
+        # An error of step k shifts the frequency for the n - k steps that follow; the sum of
+        # the squares of n - k is n**3 / 3.
+        shear = self.gains["frequency"] * noise.step
+        late = walk * steps / math.sqrt(3.0)
+        if not noise.conserves:
+            late += 0.5 * drift * steps
+        found["phase"] = (walk + drift + ROUNDING) * self.turn + shear * late
+        return found
+
+
+def orbit(scene: Scene) -> Orbit:
+    """Follow a torque-free motion of a scene with moments through two periods."""
+    a = np.array(scene.euler_coefficients)
+    frequency = _frequency(a, np.array(scene.omega))
+    times = np.linspace(0.0, 4.0 * math.pi / frequency, _SAMPLES).tolist()
+    states = floats([torque_free(scene, t, rounded=True) for t in times])
+    largest = float(np.abs(states).max())
+    slopes = a * np.roll(states, -1, 1) * np.roll(states, -2, 1)
+    x, y, z = states.T
+    zero = np.zeros(len(states))
+    jacobians = np.array(
+        [
+            [zero, a[0] * z, a[0] * y],
+            [a[1] * z, zero, a[1] * x],
+            [a[2] * y, a[2] * x, zero],
+        ]
+    ).transpose(2, 0, 1)
+    moments = np.array(scene.moments)
+    turns = frequency * largest * np.abs(slopes).sum(axis=1) / (slopes**2).sum(axis=1)
+    gains = {}
+    for name, power in (("energy", 1), ("momentum", 2)):
+        weight = moments**power
+        total = (weight * states**2).sum(axis=1)
+        part = (weight * np.abs(states)).sum(axis=1) * largest / total
+        # Energy is half of a square, momentum the root of one.
+        gains[name] = float(part.max()) * (2.0 if name == "energy" else 1.0)
+    gains["frequency"] = largest * max(_steepness(a, state) for state in states)
+    return Orbit(states, slopes, jacobians, largest, frequency, gains, float(turns.max()))
+
+
+def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
+    """Return rows in binary64."""
+    return np.array([[float(x) for x in row] for row in rows])
+
+
+def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
+    """Bound the rounding of a step of the Taylor method by a running error analysis.
+
+    Term k is a sum of k products, each with k + 3 roundings at the most, and carries on the
+    errors of the terms below; omega enters without the part that compensated summation holds
+    back, half a unit in the last place. The sum of the terms rounds each three times.
+    """
+    a = np.abs(np.array(scene.euler_coefficients))
+    signed = np.array(scene.euler_coefficients)
+    terms, errors = [body.states], [np.abs(body.states)]
+    for k in range(1, order + 1):
+        value, size, carried = np.zeros((3, *body.states.shape))
+        for j in range(k):
+            for axis in range(3):
+                p, q = (axis + 1) % 3, (axis + 2) % 3
+                x, y = terms[j][:, p], terms[k - 1 - j][:, q]
+                value[:, axis] += x * y
+                size[:, axis] += np.abs(x * y)
+                carried[:, axis] += errors[j][:, p] * np.abs(y)
+                carried[:, axis] += np.abs(x) * errors[k - 1 - j][:, q]
+        terms.append(signed * value * (step / k))
+        errors.append(a * (step / k) * (carried + (k + 3.0) * size))
+    total = sum(e + 3.0 * np.abs(t) for e, t in zip(errors[1:], terms[1:], strict=True))
+    return Noise(step, ROUNDING * float(np.max(total)) / body.largest, left_out, conserves=False)
+
+
+def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
+    """Bound rounding and truncation of a step of Gauss collocation.
+
+    Each node's sum has s + 3 roundings of the rates and one of the state; the iteration carries
+    them on by the inverse of 1 - h A J. Quadratic invariants are conserved whatever the step.
+
+    Truncation is the integral of the propagator times the defect, which vanishes at the nodes:
+    by their orthogonality only the power s of the rest counts, by Leibniz's rule a sum over the
+    derivatives j of the propagator, (h J)**j / j!, and the Taylor terms 2s + 1 - j.
+    """
+    from pyharness.theory.tableau import tableau
+
+    matrix = tableau("collocation", stages, "gauss").matrix
+    rate = float(np.abs(body.slopes).max())
+    stiffness = float(np.abs(body.jacobians).sum(axis=2).max())
+    spread = float(np.abs(matrix).sum(axis=1).max())
+    eye = np.eye(3 * stages)
+    resolvent = max(
+        float(np.abs(np.linalg.inv(eye - step * np.kron(matrix, each))).sum(axis=1).max())
+        for each in body.jacobians[::8]
+    )
+    state = body.largest
+    at_node = step * spread * ((stages + 3.0) * rate + stiffness * state) * resolvent
+    total = step * ((stages + 4.0) * rate + stiffness * (state + at_node))
+    factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2 / (2 * stages + 1)
+    terms = _term_sizes(body, scene, step, 2 * stages + 1)
+    left_out = factor * sum(
+        (step * stiffness) ** j / math.factorial(j) * (2 * stages + 1 - j) * terms[-1 - j]
+        for j in range(stages + 1)
+    )
+    return Noise(step, ROUNDING * total / state, left_out / state, conserves=True)
+
+
+def _term_sizes(body: Orbit, scene: Scene, step: float, order: int) -> list[float]:
+    """Return the largest Taylor terms 0 ... order along the motion, for a step (rad/s)."""
+    a = np.array(scene.euler_coefficients)
+    terms = [body.states]
+    for k in range(1, order + 1):
+        value = np.zeros_like(body.states)
+        for j in range(k):
+            value += np.roll(terms[j], -1, 1) * np.roll(terms[k - 1 - j], -2, 1)
+        terms.append(a * value * (step / k))
+    return [float(np.abs(each).max()) for each in terms]
+
+
+def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, float]:
+    """Return relative errors of energy and momentum, and the error of phase (rad), with sign."""
+    start = [Decimal(w) for w in scene.omega]
+    found = [Decimal(float(w)) for w in omega]
+    moments = [Decimal(i) for i in scene.moments or ()]
+
+    def change(power: int) -> float:
+        before, after = (
+            sum((i**power * w * w for i, w in zip(moments, each, strict=True)), Decimal(0))
+            for each in (start, found)
+        )
+        return float((after - before) / before)
+
+    truth = torque_free(scene, time, rounded=True)
+    error = np.array([float(x - y) for x, y in zip(found, truth, strict=True)])
+    x, y, z = (float(w) for w in truth)
+    slope = np.array(scene.euler_coefficients) * np.array([y * z, z * x, x * y])
+    late = float(error @ slope / (slope @ slope))
+    return {
+        "energy": change(1),
+        "momentum": 0.5 * change(2),
+        "phase": body.frequency * late,
+    }
+
+
+def root_mean_square(found: Array) -> Array:
+    """Return the size of errors over the starts, rows of `found`, for each number of steps.
+
+    A start that did not go so far, NaN, does not count.
+    """
+    return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
+
+
+def exponent(steps: Sequence[float] | Array, found: Array) -> float:
+    """Return the power of the number of steps with which the mean square over the starts grows.
+
+    `found` has a row for each start and a column for each number of steps.
+    """
+    size = np.log(np.maximum(root_mean_square(found), 1e-300))
+    return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
+
+
+def _frequency(a: Array, omega: Array) -> float:
+    """Return 2 pi over the period about the polhode, by the arithmetic-geometric mean."""
+    (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0.0 and a[i] * a[i - 2] < 0.0)
+    squares = [abs(a[i - 1] * a[i - 2]) * omega[i] * omega[i] for i in range(3)]
+    small, large = sorted((squares[odd - 1], squares[odd - 2]))
+    x, y = math.sqrt(large + squares[odd]), math.sqrt(large - small)
+    while abs(x - y) > 1e-15 * x:
+        x, y = 0.5 * (x + y), math.sqrt(x * y)
+    return x
+
+
+def _steepness(a: Array, omega: Array) -> float:
+    """Return the sum of the derivatives of the frequency by omega, without their signs."""
+    total, size = 0.0, 1e-6 * float(np.abs(omega).max())
+    for axis in range(3):
+        shift = np.zeros(3)
+        shift[axis] = size
+        total += abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)
+    return total

@@ -1,0 +1,181 @@
+"""What the flow itself makes of small errors: the yardstick of every bound that is not a method's.
+
+An error made at time s reaches time t multiplied by Phi(t, s), the propagator of the equations
+linearised along the solution. `conditioning` follows it, so that bounds on rounding and on
+tolerances can be written down before a method is tried.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.methods.linearised import growth, jacobians, propagators
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+ROUNDING = 2.0**-53
+# Roundings in a right-hand side: two in each of A, B, C, two products, the sums.
+_ROUNDINGS = 8.0
+_NODES_PER_RADIAN = 12.0
+_FEWEST_NODES = 50
+_MOST_NODES = 400_000
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """How errors made on the way reach the end.
+
+    Attributes
+    ----------
+    amplification : float
+        Largest factor by which an error of any omega made on the way reaches the end, at least 1.
+    rounding : float
+        Error at the end over `largest` if every term of the right-hand side, the start and the
+        result are wrong by a few roundings, each of its own size, in the worst direction.
+    storing : float
+        The same if omega is rounded once a step, for each step.
+    unamplified : float
+        Sum over the way of what `rounding` counts, as it was made: what the invariants see.
+    largest : float
+        Largest abs(omega) of any component on the way (rad/s).
+    """
+
+    amplification: float
+    rounding: float
+    storing: float
+    unamplified: float
+    largest: float
+
+    def limit(self, made: float, steps: float = 0.0) -> float:
+        """Return the error that a method may have, over `largest`.
+
+        Parameters
+        ----------
+        made : float
+            Sum of the errors that the method makes on the way, over `largest`, as its tolerance
+            or its order tells.
+        steps : float
+            Steps after which it rounds omega; 0 where it carries on what rounding took off.
+
+        Returns
+        -------
+        float
+            2, which says nothing, where it would be more.
+        """
+        allowed = made * self.amplification + self.rounding + steps * self.storing
+        # What is no number allows nothing.
+        return 0.0 if math.isnan(allowed) else min(2.0, allowed)
+
+
+def conditioning(scene: Scene, time: float) -> Conditioning:
+    """Follow the linearised flow along the solution from 0 to `time` (s).
+
+    Raises
+    ------
+    InputError
+        Where the solution leaves every bound before, or so long a time would need too many
+        nodes.
+    """
+    times = _nodes(scene, time)
+    omega, complete = _path(scene, times)
+    if not complete:
+        raise InputError(f"conditioning: the solution leaves every bound before t = {time:g} s")
+    return along(scene, times, omega)
+
+
+def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
+    """Follow the linearised flow along a solution that is known.
+
+    Parameters
+    ----------
+    scene : Scene
+        What it solves.
+    times : ndarray, shape (n,)
+        From 0 (s); omega turns by a small angle from each to the next.
+    omega : ndarray, shape (n, 3)
+        The solution there, rad/s.
+
+    Raises
+    ------
+    InputError
+        Where the flow amplifies beyond binary64.
+    """
+    with np.errstate(all="ignore"):
+        found = _along(scene, times, omega)
+    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
+        raise InputError("conditioning: the flow amplifies beyond binary64")
+    return found
+
+
+def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
+    """Return omega at each time, and whether it is there to the end."""
+    from pyharness.methods.plan import closed_form
+    from pyharness.methods.registry import solve
+
+    # Beside the separatrix an integrated path would be another one after a few turns.
+    method = "closed-form" if closed_form(scene) else "taylor"
+    path = solve(scene, times[1:].tolist(), method, 1e-13)
+    return np.vstack([scene.omega, path.omega]), path.ended == "complete"
+
+
+def _nodes(scene: Scene, time: float) -> Array:
+    """Return times between which the solution turns by a small angle."""
+    if time == 0.0:
+        return np.zeros(2)
+    count = _FEWEST_NODES
+    while True:
+        times = np.linspace(0.0, time, count + 1)
+        omega, _ = _path(scene, times)
+        with np.errstate(all="ignore"):
+            largest = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
+        wanted = largest * abs(time) * _NODES_PER_RADIAN
+        # NaN where numbers so large meet that their product has no meaning.
+        if not wanted <= _MOST_NODES:
+            raise InputError("conditioning: too long a time for so fast a motion")
+        if count >= wanted:
+            return times
+        count = math.ceil(wanted)
+
+
+def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
+    steps = np.diff(times)
+    largest = float(np.abs(omega).max()) or 1.0
+    flow = propagators(scene, times, omega)
+    sizes = np.abs(flow)
+    source = magnitudes(scene, times, omega)
+
+    def gathered(made: Array) -> Array:
+        arriving = (sizes @ made[:, :, None])[:, :, 0]
+        return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
+
+    # The start and the result are rounded once, however short the time.
+    ends = sizes[0] @ np.abs(omega[0]) + np.abs(omega[-1])
+    span = abs(float(times[-1])) or 1.0
+    unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
+    return Conditioning(
+        amplification=growth(flow),
+        rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
+        # Not over their product, which may be too small a number.
+        storing=ROUNDING * float(gathered(np.abs(omega)).max()) / span / largest,
+        unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
+        largest=largest,
+    )
+
+
+def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
+    """Return the sum of the sizes of all terms of each right-hand side, shape (n, 3).
+
+    A wave counts with its angle: a rounding of frequency times t is a rounding of that many
+    radians.
+    """
+    products = np.abs(np.array(scene.euler_coefficients)) * np.abs(
+        np.column_stack([omega[:, (i + 1) % 3] * omega[:, (i + 2) % 3] for i in range(3)])
+    )
+    law = scene.torque
+    moments = np.array(scene.moments or (1.0, 1.0, 1.0))
+    torque = np.abs(law.constant) + np.abs(law.rate) * np.abs(times)[:, None]
+    for amplitude, frequency in law.sines + law.cosines:
+        torque = torque + np.abs(amplitude) * (1.0 + np.abs(frequency * times))[:, None]
+    return np.asarray(products + torque / moments)

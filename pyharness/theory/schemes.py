@@ -1,0 +1,259 @@
+"""The schemes behind the programs and the fixed-step methods, once more as mathematics.
+
+A scheme is what a method computes, without rounding and without the code that it judges. It runs
+on numbers and on power series of the step alike: with series, what a step misses of the solution
+comes out term by term, before any method is tried. Torques are constant here.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.theory.collocation_matrices import PARTS
+from pyharness.theory.rational import inverse
+
+# Powers of the step that are kept of a series.
+TERMS = 24
+
+
+class Numbers:
+    """Arithmetic of numbers: omega is an array of shape (..., 3)."""
+
+    def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
+        """Take the scene's equations and a step (s); with `sizes` every term by its size."""
+        self._step = step
+        size = np.abs if sizes else np.positive
+        self._coefficients = size(np.array(scene.euler_coefficients))
+        self._torque = size(np.array(scene.normalized_torque(0.0)))
+
+    def rate(self, omega: Array) -> Array:
+        """Return equations 16-18."""
+        turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
+        return np.asarray(self._torque + self._coefficients * turned * onward)
+
+    def times_step(self, x: Array) -> Array:
+        """Return the step times x."""
+        return self._step * x
+
+
+class Series:
+    """Arithmetic of power series of the step: omega has shape (TERMS, ..., 3)."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Take the scene's equations."""
+        self._coefficients = np.array(scene.euler_coefficients)
+        self._torque = np.array(scene.normalized_torque(0.0))
+
+    def rate(self, omega: Array) -> Array:
+        """Return equations 16-18, by Cauchy products."""
+        turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
+        result = np.zeros(omega.shape)
+        for k in range(TERMS):
+            result[k] = (turned[: k + 1] * onward[k::-1]).sum(axis=0)
+        result *= self._coefficients
+        result[0] += self._torque
+        return result
+
+    def times_step(self, x: Array) -> Array:
+        """Return the step times x."""
+        result = np.zeros(x.shape)
+        result[1:] = x[:-1]
+        return result
+
+    def solution(self, omega: Array) -> Array:
+        """Return the series of the solution through omega of shape (..., 3)."""
+        result = constant(omega)
+        for k in range(TERMS - 1):
+            result[k + 1] = self.rate(result)[k] / (k + 1)
+        return result
+
+
+Arithmetic = Numbers | Series
+Scheme = Callable[[Arithmetic, Array], Array]
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """A method with a fixed step.
+
+    Attributes
+    ----------
+    name : str
+        Of the program or method.
+    order : int
+        The power of the step with which its error falls.
+    scheme : callable
+        ``scheme(arithmetic, omega)`` returns omega after a step.
+    roundings : float
+        Units of 2**-53 of omega by which a step may be wrong for its last additions.
+    """
+
+    name: str
+    order: int
+    scheme: Scheme
+    roundings: float
+
+
+def constant(omega: Array) -> Array:
+    """Return the series that is omega."""
+    result = np.zeros((TERMS, *omega.shape))
+    result[0] = omega
+    return result
+
+
+def collocation(program: str) -> Scheme:
+    """Return that of a collocation program."""
+    parts = PARTS[program]
+    matrix = [[(j + 1) * part**j for j in range(len(parts))] for part in parts]
+    solver = inverse(matrix)
+    weights = [float(sum(row[i] for row in solver)) for i in range(len(parts))]
+
+    def scheme(on: Arithmetic, omega: Array) -> Array:
+        slope = on.times_step(on.rate(omega))
+        result = omega
+        for part, weight in zip(parts, weights, strict=True):
+            result = result + weight * on.times_step(on.rate(omega + float(part) * slope))
+        return result
+
+    return scheme
+
+
+def collocation_singular(program: str) -> Scheme:
+    """Return what a program computes where LEQT1F declares its matrix singular.
+
+    The right-hand sides come back as c1, c2, ..., and stand before t, t**2, ...
+    """
+    parts = PARTS[program]
+
+    def scheme(on: Arithmetic, omega: Array) -> Array:
+        rates = []
+        constant_rate = on.rate(omega)
+        for part in parts:
+            estimate, power = omega, constant_rate
+            for _ in parts:
+                power = float(part) * on.times_step(power)
+                estimate = estimate + power
+            rates.append(on.rate(estimate))
+        result = omega
+        for k, rate in enumerate(rates, 1):
+            for _ in range(k):
+                rate = on.times_step(rate)
+            result = result + rate
+        return result
+
+    return scheme
+
+
+def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
+    """Return a step of equation 31."""
+    first = on.times_step(on.rate(omega))
+    second = on.times_step(on.rate(omega + 0.5 * first))
+    third = on.times_step(on.rate(omega + 0.5 * second))
+    fourth = on.times_step(on.rate(omega + third))
+    return np.asarray(omega + (first + 2.0 * (second + third) + fourth) / 6.0)
+
+
+def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
+    """Return the first step of the Runge-Kutta program as punched."""
+    first = on.times_step(on.rate(omega))
+    at = omega + 0.5 * first
+    second = on.times_step(on.rate(at))
+    at = at + 0.5 * second
+    third = on.times_step(on.rate(at))
+    fourth = on.times_step(on.rate(at + third))
+    return np.asarray(omega + (first + 2.0 * (second + third) + fourth) / 6.0)
+
+
+def improved_euler(on: Arithmetic, omega: Array) -> Array:
+    """Return a step of equation 29."""
+    first = on.times_step(on.rate(omega))
+    return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
+
+
+def taylor_3(on: Arithmetic, omega: Array) -> Array:
+    """Return a step of equation 30.
+
+    The derivative of F along F is half of F(omega + F) - F(omega - F): F is quadratic.
+    """
+    rate = on.rate(omega)
+    along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
+    return omega + on.times_step(rate + 0.5 * on.times_step(along))
+
+
+def gauss(stages: int) -> Scheme:
+    """Return that of Gauss collocation of order 2 stages, iterated until all terms stand."""
+    nodes, weights = legendre.leggauss(stages)
+    nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
+    powers = np.array([[node**k for k in range(stages)] for node in nodes])
+    integrals = np.array([[node ** (k + 1) / (k + 1) for k in range(stages)] for node in nodes])
+    matrix = integrals @ np.linalg.inv(powers)
+
+    def scheme(on: Arithmetic, omega: Array) -> Array:
+        states = [omega] * stages
+        for _ in range(TERMS):
+            slopes = [on.times_step(on.rate(state)) for state in states]
+            states = [
+                omega + sum(a * slope for a, slope in zip(row, slopes, strict=True))
+                for row in matrix
+            ]
+        slopes = [on.times_step(on.rate(state)) for state in states]
+        return np.asarray(omega + sum(b * k for b, k in zip(weights, slopes, strict=True)))
+
+    return scheme
+
+
+FIXED_STEP = {
+    each.name: each
+    for each in (
+        FixedStep("two-term", 2, collocation("two-term"), 2.0),
+        FixedStep("four-term", 2, collocation("four-term"), 4.0),
+        FixedStep("runge-kutta", 4, runge_kutta_4, 1.0),
+        FixedStep("improved-euler", 2, improved_euler, 1.0),
+        FixedStep("taylor-3", 2, taylor_3, 1.0),
+        FixedStep("rk4", 4, runge_kutta_4, 1.0),
+        FixedStep("gauss-1", 2, gauss(1), 1.0),
+        FixedStep("gauss-2", 4, gauss(2), 1.0),
+        FixedStep("gauss-4", 8, gauss(4), 1.0),
+    )
+}
+
+
+def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
+    """Return what a step from omega misses, as a series of the step.
+
+    Parameters
+    ----------
+    scheme : callable
+        See `FixedStep`.
+    scene : Scene
+        Constant torque.
+    omega : ndarray, shape (n, 3)
+        Where the step begins (rad/s).
+
+    Returns
+    -------
+    ndarray, shape (TERMS, n, 3)
+        Result of the step less the solution.
+    """
+    on = Series(scene)
+    return scheme(on, constant(omega)) - on.solution(omega)
+
+
+def spacing(count: int) -> Sequence[Fraction]:
+    """Return weights of the central first difference with `count` pairs of neighbours.
+
+    Exact for polynomials of degree 2 count.
+    """
+    square = math.factorial(count) ** 2
+    return [
+        Fraction(
+            (-1) ** (i + 1) * square, i * math.factorial(count - i) * math.factorial(count + i)
+        )
+        for i in range(1, count + 1)
+    ]

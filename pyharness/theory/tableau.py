@@ -1,0 +1,101 @@
+"""What a correction of the weighted residual family does, in numbers that no step changes.
+
+With f known along the step, the conditions for the c's are linear, and the derivative that they
+give is a projection of f on the polynomials of degree n - 1. It is worked out once on the unit
+interval s = t / h, with Legendre polynomials as basis, so that it is well conditioned. The c's
+themselves are never formed.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from pyharness.model.trajectory import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tableau:
+    """What a correction does on the unit interval; in form it is a Runge-Kutta scheme.
+
+    Attributes
+    ----------
+    nodes : ndarray, shape (m,)
+        Where f is wanted, in parts of the step: the points of collocation, or those of the
+        quadrature of the weighted integrals.
+    matrix : ndarray, shape (m, m)
+        The next estimate at the nodes is omega(0) + h matrix f.
+    weights : ndarray, shape (m,)
+        The result of the step is omega(0) + h weights f.
+    """
+
+    nodes: Array
+    matrix: Array
+    weights: Array
+
+
+@cache
+def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
+    """Solve the weighted residual conditions on the unit interval.
+
+    Parameters
+    ----------
+    weighting, terms, points
+        As in `Member`.
+
+    Returns
+    -------
+    Tableau
+        The quadrature is exact where torques are constant: along a trial function the products
+        of equations 13-15 have degree 2n, the weights have n (Galerkin), n - 1 (least squares)
+        or, in each subdomain, 0; m points of Gauss and Legendre integrate degree 2m - 1. With
+        torques that vary it is in error by the power 2n + 1 of the step or a higher one, which
+        is above every order of the family.
+    """
+    n = terms
+    if weighting == "collocation":
+        nodes = grid(points, n)
+        projection = np.linalg.inv(basis(nodes, n))
+    else:
+        if weighting == "subdomain":
+            part, quadrature = _gauss(n + 1)
+            nodes = ((np.arange(n)[:, None] + part) / n).ravel()
+            quadrature = np.tile(quadrature / n, n)
+            tests = np.repeat(np.eye(n), n + 1, axis=0)
+        else:
+            degree = 3 * n if weighting == "galerkin" else 3 * n - 1
+            nodes, quadrature = _gauss(degree // 2 + 1)
+            # Polynomials that span the same weights as t ... t**n, or 1 ... t**(n-1).
+            tests = basis(nodes, n)
+            if weighting == "galerkin":
+                tests = tests * nodes[:, None]
+        weighted = (tests * quadrature[:, None]).T
+        projection = np.linalg.solve(weighted @ basis(nodes, n), weighted)
+    return Tableau(nodes, _integrals(nodes, n) @ projection, projection[0])
+
+
+def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
+    """Return the points of collocation, in parts of the step."""
+    if points == "gauss":
+        return _gauss(n)[0]
+    if points is None or points == "thesis":
+        return np.arange(1, n + 1) / (n + 1)
+    return np.array(points, dtype=float)
+
+
+def _gauss(m: int) -> tuple[Array, Array]:
+    """Return nodes and weights of Gauss and Legendre on the unit interval."""
+    x, w = legendre.leggauss(m)
+    return np.asarray((x + 1.0) / 2.0, dtype=float), np.asarray(w / 2.0, dtype=float)
+
+
+def basis(s: Array, n: int) -> Array:
+    """Return the Legendre polynomials 0 ... n - 1 of the unit interval at `s`, shape (m, n)."""
+    return np.asarray(legendre.legvander(2.0 * s - 1.0, n - 1), dtype=float)
+
+
+def _integrals(s: Array, n: int) -> Array:
+    """Return their integrals from 0 to `s`, shape (m, n); to 1 they are 1, 0, 0 ..."""
+    antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
+    return np.asarray(legendre.legval(2.0 * s - 1.0, antiderivatives).T, dtype=float)

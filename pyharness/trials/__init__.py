@@ -1,1 +1,0 @@
-"""The trials of `stress`, one to a module; each has a `TRIAL`."""

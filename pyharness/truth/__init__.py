@@ -1,0 +1,1 @@
+"""The solution of a scene, with its error."""

@@ -1,0 +1,76 @@
+"""A symmetric body whose torque acts along its own axis: known at any time, in decimal arithmetic.
+
+The spin is the integral of the torque; the other two components turn by the integral of the spin.
+Tested against the reference.
+"""
+
+import decimal
+from collections.abc import Sequence
+from decimal import Decimal
+
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.truth.decimal_functions import sine_cosine
+
+DIGITS = 50
+
+Row = list[Decimal]
+
+
+def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
+    """Return omega of a body with I1 = I2 whose torque acts along axis 3 alone.
+
+    The spin is the integral of the torque; the other two turn by the integral of the spin.
+
+    Raises
+    ------
+    InputError
+        For any other scene.
+    """
+    law, moments = scene.torque, scene.moments
+    vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
+    if moments is None or moments[0] != moments[1] or any(v[0] or v[1] for v in vectors):
+        raise InputError("axial top: allowed are I1 = I2 and torque along axis 3 alone")
+    waves = law.sines + law.cosines
+    with _arithmetic(times, scene.omega, [f for _, f in waves] + [1.0]):
+        moment = Decimal(moments[2])
+        ratio = (Decimal(moments[0]) - moment) / Decimal(moments[0])
+        first, second, third = (Decimal(w) for w in scene.omega)
+        rows = []
+        for each in times:
+            t = Decimal(each)
+            spin = Decimal(law.constant[2]) * t + Decimal(law.rate[2]) * t * t / 2
+            angle = Decimal(law.constant[2]) * t**2 / 2 + Decimal(law.rate[2]) * t**3 / 6
+            for sign, (amplitude, frequency) in (
+                *((1, wave) for wave in law.sines),
+                *((0, wave) for wave in law.cosines),
+            ):
+                size, rate = Decimal(amplitude[2]), Decimal(frequency)
+                if rate == 0:
+                    spin += 0 if sign else size * t
+                    angle += 0 if sign else size * t * t / 2
+                    continue
+                sine, cosine = sine_cosine(rate * t)
+                if sign:
+                    spin += size * (1 - cosine) / rate
+                    angle += size * (t - sine / rate) / rate
+                else:
+                    spin += size * sine / rate
+                    angle += size * (1 - cosine) / (rate * rate)
+            sine, cosine = sine_cosine(ratio * (third * t + angle / moment))
+            rows.append(
+                [
+                    first * cosine + second * sine,
+                    second * cosine - first * sine,
+                    third + spin / moment,
+                ]
+            )
+    return rows
+
+
+def _arithmetic(*sizes: Sequence[float]) -> "decimal._ContextManager":
+    """Return a context with digits enough for angles of the product of these sizes."""
+    context = decimal.Context(Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
+    largest = [max(map(abs, each), default=1.0) for each in sizes]
+    context.prec = DIGITS + sum(max(0, Decimal(x).adjusted() + 1) for x in largest)
+    return decimal.localcontext(context)

@@ -1,0 +1,147 @@
+"""Torque-free motion in decimal arithmetic, by Jacobi's elliptic functions: the trials' truth.
+
+Unlike a series it loses no digit on the way, so that many flips beside the separatrix cost no
+more than a short time. It shares no code with the method that it judges: other arithmetic,
+Landen's transformation.
+"""
+
+import decimal
+import itertools
+from collections.abc import Sequence
+from decimal import Decimal
+
+from pyharness.model.scene import Scene
+from pyharness.truth.decimal_functions import sine_cosine
+from pyharness.truth.reference import exact_coefficients
+
+# Beside those that small components take by their squares.
+_DIGITS = 90
+
+Row = list[Decimal]
+
+
+def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
+    """Return omega of a scene without torque at `time` (s), in rad/s.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without torque; its motion has to be bounded, as it is where A, B and C belong to moments.
+    time : float
+        s.
+    rounded : bool
+        Whether A, B and C are those that binary64 holds, and not the exact ones.
+    """
+    with decimal.localcontext() as context:
+        context.prec = _DIGITS
+        context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
+        omega = [Decimal(w) for w in scene.omega]
+        coefficients = exact_coefficients(scene)
+        context.prec += 2 * _decades(omega) + 2 * _decades(coefficients)
+        coefficients = exact_coefficients(scene)
+        if rounded:
+            coefficients = [Decimal(x) for x in scene.euler_coefficients]
+        return _solution(coefficients, omega, Decimal(time))
+
+
+def _decades(values: Row) -> int:
+    """Return how many powers of ten lie between the largest and the smallest, zeros aside."""
+    powers = [value.adjusted() for value in values if value]
+    return max(powers) - min(powers) if powers else 0
+
+
+def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: Decimal) -> Row:
+    if not any(coefficients):
+        return list(start)
+    # The axis of the odd sign becomes the second, its sign minus: turning all omega turns the
+    # signs of all coefficients.
+    for first, sign in itertools.product(range(3), (1, -1)):
+        axes = [first, (first + 1) % 3, (first + 2) % 3]
+        a = [sign * coefficients[axis] for axis in axes]
+        if a[0] >= 0 > a[1] and a[2] >= 0:
+            break
+    else:
+        raise ValueError("the motion is not bounded")
+    omega = [sign * start[axis] for axis in axes]
+    if not (a[0] and a[2]):
+        found = _turned(a, omega, time)
+    else:
+        s1, s2, s3 = (abs(each) for each in a)
+        factors = [(s2 * s3).sqrt(), (s1 * s3).sqrt(), (s1 * s2).sqrt()]
+        scaled = [f * w for f, w in zip(factors, omega, strict=True)]
+        found = [x / f for f, x in zip(factors, _normal(scaled, time), strict=True)]
+    result = [Decimal(0)] * 3
+    for axis, value in zip(axes, found, strict=True):
+        result[axis] = sign * value
+    return result
+
+
+def _turned(a: Sequence[Decimal], omega: Row, time: Decimal) -> Row:
+    """Solve where one coefficient is zero: the other two omegas turn in an ellipse."""
+    axis = 0 if not a[0] else 2
+    other = 2 - axis
+    # other' = a[other] w2 w, w2' = a[1] other w, and w of `axis` stays.
+    w = omega[axis]
+    upper, lower = a[other] * w, a[1] * w
+    rate = (-upper * lower).sqrt()
+    row = list(omega)
+    if rate:
+        sine, cosine = sine_cosine(rate * time)
+        row[other] = omega[other] * cosine + upper * omega[1] * sine / rate
+        row[1] = omega[1] * cosine + lower * omega[other] * sine / rate
+    return row
+
+
+def _normal(start: Row, time: Decimal) -> Row:
+    """Solve x' = y z, y' = -z x, z' = x y by the addition theorems of sn, cn, dn."""
+    x, y, z = start
+    p, q = x * x + y * y, z * z + y * y
+    if q < p:
+        return _normal([z, y, x], time)[::-1]
+    if not p:
+        return list(start)
+    sign = -1 if z < 0 else 1
+    root_p, root_q = p.sqrt(), q.sqrt()
+    # x = root_p cn, y = -sign root_p sn, z = sign root_q dn.
+    s0, c0, d0 = -sign * y / root_p, x / root_p, abs(z) / root_q
+    k2 = p / q
+    s, c, d = jacobi(root_q * time, (q - p) / q)
+    under = 1 - k2 * s0 * s0 * s * s
+    sn = (s0 * c * d + s * c0 * d0) / under
+    cn = (c0 * c - s0 * s * d0 * d) / under
+    dn = (d0 * d - k2 * s0 * c0 * s * c) / under
+    return [root_p * cn, -sign * root_p * sn, sign * root_q * dn]
+
+
+def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
+    """Return sn, cn, dn of `u`; `comodulus` is the square of the complementary modulus.
+
+    Descending Landen transformation: Abramowitz and Stegun 16.12.
+    """
+    if not comodulus:
+        e = (-abs(u)).exp()
+        cn = 2 * e / (1 + e * e)
+        return ((1 - e * e) / (1 + e * e)).copy_sign(u), cn, cn
+    levels = []
+    complement = comodulus.sqrt()
+    least = Decimal(1).scaleb(-decimal.getcontext().prec - 5)
+    while True:
+        # k1 = (1 - k') / (1 + k'), from k**2 = 1 - k'**2 without cancellation.
+        k1 = (1 - complement) / (1 + complement)
+        if k1 * k1 < least:
+            break
+        levels.append(k1)
+        u = u / (1 + k1)
+        complement = 2 * complement.sqrt() / (1 + complement)
+    # What is left of the modulus, some 1e-65, counts by its square.
+    sn, cn = sine_cosine(u / (1 + k1))
+    dn = Decimal(1)
+    levels.append(k1)
+    for k1 in reversed(levels):
+        square = k1 * sn * sn
+        sn, cn, dn = (
+            (1 + k1) * sn / (1 + square),
+            cn * dn / (1 + square),
+            (1 - square) / (1 + square),
+        )
+    return sn, cn, dn

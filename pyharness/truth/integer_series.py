@@ -1,0 +1,264 @@
+"""A second reference, which shares no code with the first: Taylor series in whole numbers.
+
+A number is an integer over 2**BITS, in units in which the time asked for is 1 and the largest omega
+about 1. Sines and cosines of the torque are unknowns of the series as omega is, so that nothing
+comes from a library of functions.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from operator import mul
+
+import numpy as np
+
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+BITS = 160
+_ORDER = 36
+_LAST = 60  # bits of the last terms of a step: 2**-100 of the unit
+_CLOCK = 64  # steps are multiples of 2**-64 of the time asked for
+_MOST_STEPS = 20_000
+# The unit of omega is guessed; so many powers of two beside the largest omega it will do.
+_ABOVE, _BELOW = 8, 24
+_MOST_GUESSES = 16
+_LEAST_POWER = -1200  # below it everything is 0 in binary64
+_INSIDE = 24  # places in a step at which the path is seen
+
+Series = list[int]
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The true solution, at the times asked for and on the way to them.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        As asked for, s.
+    omega : ndarray, shape (n, 3)
+        Rounded to binary64, rad/s.
+    nodes : ndarray, shape (m,)
+        Times from 0 to the last one, close to each other, s.
+    way : ndarray, shape (m, 3)
+        omega at the nodes, in binary64 arithmetic, rad/s.
+    """
+
+    time: Array
+    omega: Array
+    nodes: Array
+    way: Array
+
+
+class _OtherUnitError(Exception):
+    """Omega is far from 1: it needs a unit that is 2**power times as large."""
+
+    def __init__(self, power: int) -> None:
+        super().__init__()
+        self.power = power
+
+
+def integer_series(scene: Scene, times: Sequence[float], most_steps: int = _MOST_STEPS) -> Path:
+    """Return the true solution of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to solve; its step size plays no part.
+    times : sequence of float, shape (n,)
+        Strictly monotonic, away from 0 on one side, none of them 0 (s).
+    most_steps : int
+        Each takes a third of a millisecond.
+
+    Returns
+    -------
+    Path
+        Before rounding good to some 1e-29 of the largest omega, times the growth of a small
+        difference.
+
+    Raises
+    ------
+    InputError
+        Where omega leaves every bound before, or too many steps would be needed.
+    """
+    power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
+    for _ in range(_MOST_GUESSES):
+        try:
+            return _march(scene, times, power, most_steps)
+        except _OtherUnitError as other:
+            power += other.power
+    raise InputError("integer series: omega leaves every bound")
+
+
+def _guess(scene: Scene, span: Fraction) -> Fraction:
+    """Return the largest omega that the start or the torque alone would give."""
+    law = scene.torque
+    found = [abs(Fraction(w)) for w in scene.omega]
+    for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
+        push = abs(Fraction(law.constant[axis])) + abs(Fraction(law.rate[axis])) * span
+        push += sum(abs(Fraction(amplitude[axis])) for amplitude, _ in law.sines + law.cosines)
+        found.append(push * span / Fraction(moment))
+    return max(found)
+
+
+def _power_of(size: Fraction) -> int:
+    return size.numerator.bit_length() - size.denominator.bit_length() if size else 0
+
+
+def _march(scene: Scene, times: Sequence[float], power: int, most_steps: int) -> Path:
+    """Step from 0 to the last time with omega in units of 2**power rad/s."""
+    span = Fraction(times[-1])
+    wanted = [Fraction(t) / span for t in times]
+    equations = _Equations(scene, span, Fraction(2) ** power)
+    state = equations.start
+    whole = 1 << _CLOCK
+    begin, length = 0, whole
+    rows: list[list[Fraction]] = []
+    nodes, way = [np.zeros(1)], [np.array([scene.omega])]
+    inside = np.arange(1, _INSIDE + 1) / _INSIDE
+    powers = inside[:, None] ** np.arange(_ORDER + 1)
+    largest = max(map(abs, state[:3]))
+    for _ in range(most_steps):
+        length = min(length, whole - begin)
+        while True:
+            terms = equations.expand(state, begin, length)
+            last = max(abs(term) for each in terms for term in each[-4:])
+            excess = (last.bit_length() - _LAST) / _ORDER
+            if excess <= 0.0 or length == 1:
+                break
+            length = max(1, int(length * 2.0 ** (-excess - 0.05)))
+        if length == 1 < whole - begin:
+            raise InputError("integer series: omega leaves every bound")
+        while len(rows) < len(times) and wanted[len(rows)] * whole <= begin + length:
+            part = (wanted[len(rows)] * whole - begin) / length
+            rows.append([_at(each, part) for each in terms[:3]])
+        state = [sum(each) for each in terms]
+        dense = powers @ (np.array([list(map(float, each)) for each in terms[:3]]) * 2.0**-BITS).T
+        largest = max(largest, *map(abs, state[:3]), int(np.abs(dense).max() * 2.0**BITS))
+        with np.errstate(over="ignore"):
+            way.append(np.ldexp(dense, power))
+        nodes.append((begin + inside * length) / whole * times[-1])
+        begin += length
+        beside = largest.bit_length() - BITS
+        if beside > _ABOVE:
+            raise _OtherUnitError(beside)
+        if begin == whole:
+            if beside < -_BELOW and (largest or equations.acts) and power > _LEAST_POWER:
+                raise _OtherUnitError(beside)
+            unit = Fraction(2) ** power
+            try:
+                omega = np.array([[float(x * unit) for x in row] for row in rows])
+            except OverflowError:
+                raise InputError("integer series: omega is beyond binary64") from None
+            return Path(np.array(times, dtype=float), omega, np.hstack(nodes), np.vstack(way))
+        length = int(length * 2.0 ** min(1.0, -excess - 0.02)) or 1
+    raise InputError(f"integer series: more than {most_steps} steps would be needed")
+
+
+def _at(terms: Series, part: Fraction) -> Fraction:
+    """Return a series at a part of its step."""
+    fixed = _fixed(part)
+    total = 0
+    for term in reversed(terms):
+        total = (total * fixed >> BITS) + term
+    return Fraction(total, 1 << BITS)
+
+
+def _fixed(value: Fraction) -> int:
+    return (value.numerator << BITS) // value.denominator
+
+
+@dataclass(frozen=True)
+class _Wave:
+    """Waves of one frequency: unknowns sine over `unit` and cosine.
+
+    A slow sine is kept over its angle, so that a large amplitude finds all its digits.
+    """
+
+    to_sine: int  # derivative of the unknown `sine` is `to_sine` times the cosine
+    to_cosine: int  # and that of the cosine this times the unknown
+    on_sine: Series
+    on_cosine: Series
+
+
+class _Equations:
+    """Equations 13-15 in units of the time asked for and of omega, as recurrences of terms."""
+
+    def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
+        law = scene.torque
+        moments = [Fraction(x) for x in scene.moments or (1, 1, 1)]
+        if scene.coefficients is not None:
+            products = [Fraction(x) for x in scene.coefficients]
+        else:
+            products = [(moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)]
+        push = [span / (moment * unit) for moment in moments]
+        self._products = [_fixed(x * span * unit) for x in products]
+        self._constant = [_fixed(Fraction(x) * p) for x, p in zip(law.constant, push, strict=True)]
+        self._rate = [_fixed(Fraction(x) * p * span) for x, p in zip(law.rate, push, strict=True)]
+        self._waves = []
+        for frequency in {abs(f) for _, f in law.sines + law.cosines}:
+            angle = Fraction(frequency) * span
+            slow = abs(angle) < 1
+            sines, cosines = [Fraction(0)] * 3, [Fraction(0)] * 3
+            for amplitude, f in law.sines:
+                if abs(f) == frequency:
+                    sign = -1 if f < 0.0 else 1
+                    sines = [x + sign * Fraction(a) for x, a in zip(sines, amplitude, strict=True)]
+            for amplitude, f in law.cosines:
+                if abs(f) == frequency:
+                    cosines = [x + Fraction(a) for x, a in zip(cosines, amplitude, strict=True)]
+            on_sine = [x * p * (angle if slow else 1) for x, p in zip(sines, push, strict=True)]
+            on_cosine = [x * p for x, p in zip(cosines, push, strict=True)]
+            self._waves.append(
+                _Wave(
+                    _fixed(Fraction(1) if slow else angle),
+                    _fixed(-angle * angle if slow else -angle),
+                    [_fixed(x) for x in on_sine],
+                    [_fixed(x) for x in on_cosine],
+                )
+            )
+        self.acts = not law.is_zero
+        self.start = [_fixed(Fraction(w) / unit) for w in scene.omega]
+        self.start += [0, 1 << BITS] * len(self._waves)
+
+    def expand(self, state: Series, begin: int, length: int) -> list[Series]:
+        """Return the terms 0 ... order of all unknowns, the powers of the step in them."""
+
+        def stepped(x: int) -> int:
+            return x * length >> _CLOCK
+
+        a, b, c = map(stepped, self._products)
+        series = [[x] for x in state]
+        torques = [
+            [stepped(m + (r * begin >> _CLOCK)), stepped(stepped(r))]
+            for m, r in zip(self._constant, self._rate, strict=True)
+        ]
+        torques = [each + [0] * (_ORDER - 2) for each in torques]
+        for n, wave in enumerate(self._waves):
+            sine, cosine = series[3 + 2 * n], series[4 + 2 * n]
+            forth, back = stepped(wave.to_sine), stepped(wave.to_cosine)
+            for k in range(_ORDER):
+                sine.append((forth * cosine[k] >> BITS) // (k + 1))
+                cosine.append((back * sine[k] >> BITS) // (k + 1))
+            for m, on_sine, on_cosine in zip(torques, wave.on_sine, wave.on_cosine, strict=True):
+                if on_sine or on_cosine:
+                    s, t = stepped(on_sine), stepped(on_cosine)
+                    for k in range(_ORDER):
+                        m[k] += (s * sine[k] + t * cosine[k]) >> BITS
+        x, y, z = series[:3]
+        for k in range(_ORDER):
+            backward = z[::-1]
+            yz, xz, xy = (
+                sum(map(mul, y, backward)),
+                sum(map(mul, x, backward)),
+                sum(map(mul, x, y[::-1])),
+            )
+            for each, factor, total, m in (
+                (x, a, yz, torques[0]),
+                (y, b, xz, torques[1]),
+                (z, c, xy, torques[2]),
+            ):
+                each.append(((factor * total >> 2 * BITS) + m[k]) // (k + 1))
+        return series

@@ -1,0 +1,1 @@
+"""Bits between languages, error against the truth, and what changed since recorded."""

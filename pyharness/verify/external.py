@@ -1,0 +1,316 @@
+"""Every method against published figures that were not computed here.
+
+A check passes if a method is as near to the print as the print reaches, plus what the method
+itself may be wrong by, plus what rounding the numbers of the problem to binary64 does to it.
+"""
+
+import math
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from typing import Any, TypeVar
+
+import numpy as np
+
+from pyharness.compare.checks import REFUSED, Check, bounded, may_hold, selected
+from pyharness.methods.plan import closed_form
+from pyharness.methods.prepared import prepare
+from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, finest, solve
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.trajectory import Array
+from pyharness.verify.external_file import UNITS, Problem, Value, problems, read_problem
+
+__all__ = ["Problem", "external_checks", "problems", "read_problem"]
+
+# The finest that a method claims, except where no one would wait for it.
+_TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
+_SOLVED = (
+    "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
+    "quick", "dop853", "lsoda", "radau", "rk45",
+)  # fmt: skip
+_FEWEST_STEPS, _MOST_STEPS = 4, 2**16
+_HALF_ULP = 2.0**-53
+# A number is rounded when it is read, and once more in what a method makes of it.
+_ROUNDING = 2.0 * _HALF_ULP
+_STEP_ASIDE = 2.0**-30
+# These answer wherever a method does: a choice of method, and a formula.
+_MAY_NOT_REFUSE = ("auto", "closed-form")
+
+_Row = TypeVar("_Row")
+
+
+@dataclass(frozen=True)
+class _Result:
+    """What a method gives at one time (rad/s): omega, and by how much each may be wrong."""
+
+    omega: Array
+    error: Array
+
+
+def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
+    """Hold every method that can take a problem against its published figures.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        From `problems` or `read_problem`.
+    only : sequence of str
+        Names of checks, or their leading parts; all where none is given.
+
+    Yields
+    ------
+    Check
+        ``external/<problem>/<time>/<method>``; value and limit in the problem's unit, of the
+        component that is worst against its limit.
+
+    Raises
+    ------
+    NotBuiltError
+        Where the extension is not built.
+    """
+    for problem in problems:
+        # Times on one side are solved together: a replay of one gives the same bits.
+        for side in (1.0, -1.0):
+            values = sorted(
+                (value for value in problem.values if float(value.time) * side > 0.0),
+                key=lambda value: abs(float(value.time)),
+            )
+            if any(may_hold(f"external/{problem.name}/{value.time}", only) for value in values):
+                yield from _side(problem, values, only)
+
+
+def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
+    scene = problem.scene
+    times = [float(value.time) for value in values]
+    rounding = _rounding(scene, values)
+    given = problem.path is not None
+    for method in (*_SOLVED, *PROGRAMS):
+        ids = [f"external/{problem.name}/{value.time}/{method}" for value in values]
+        if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
+            continue
+        results, refusal = _as_far_as_solved(_solver(problem, method), values)
+        for row, (id, value) in enumerate(zip(ids, values, strict=True)):
+            if not selected(id, only):
+                continue
+            replay = _replay(problem, id)
+            if row >= len(results):
+                # The figures of a file may be for a time that takes a method too long.
+                may = bool(refusal) and given and method not in _MAY_NOT_REFUSE
+                note = f"{REFUSED}{refusal}" if refusal else f"ended before t = {times[row]:g} s"
+                yield Check(id, may, None, None, replay, note)
+            elif (result := results[row]) is not None:
+                yield _check(id, problem.unit, value, result, rounding[value.time], replay)
+            else:
+                # In the problems that come with the project LEQT1F solves the longest steps.
+                note = "no step long enough for the linear equations"
+                yield Check(id, given, None, None, replay, note)
+
+
+def _as_far_as_solved(
+    solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
+) -> tuple[list[_Row], str]:
+    """Return a row for each value, and why there are no more; all are solved together.
+
+    Where that is refused they are solved one by one up to the first that is refused: what takes
+    too long to the furthest time may not to the nearest.
+    """
+    try:
+        return solve(values), ""
+    except InputError as refusal:
+        if len(values) == 1:
+            return [], str(refusal)
+    rows: list[_Row] = []
+    for value in values:
+        try:
+            found = solve([value])
+        except InputError as refusal:
+            return rows, str(refusal)
+        if not found:
+            break
+        rows += found
+    return rows, ""
+
+
+def _solver(problem: Problem, method: str) -> Callable[[Sequence[Value]], list[_Result | None]]:
+    """Return what solves a problem by a method, to the times of the values that it is given."""
+    scene = problem.scene
+
+    def solve(values: Sequence[Value]) -> list[_Result | None]:
+        if method in PROGRAMS:
+            return [
+                _program(scene, float(value.time), method, _accuracy(problem, value))
+                for value in values
+            ]
+        return [*_solved(scene, [float(value.time) for value in values], method)]
+
+    return solve
+
+
+def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
+    """Whether a method takes the problem at all; programs run forward only."""
+    if method == "closed-form":
+        return closed_form(scene) is not None
+    if method == "quick":
+        solver = prepare(scene, method, _TOLERANCES[method])
+        solver(np.array(scene.omega), times[0])
+        return solver.status != "refused"
+    return method not in PROGRAMS or times[0] > 0.0
+
+
+def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Result]:
+    tolerance = _TOLERANCES.get(method, 0.0)
+    if method != "quick":
+        tolerance = max(tolerance, finest(method, scene, times[-1]))
+    if method == "quick":
+        solver, start = prepare(scene, method, tolerance), np.array(scene.omega)
+        found = []
+        for time in times:
+            found.append(solver(start, time))
+            if solver.status in ("refused", "gave up"):
+                raise InputError(f"{method} {solver.status}")
+        rows = np.array(found)
+    else:
+        rows = solve(scene, times, method, tolerance).omega
+    for omega in rows:
+        yield _Result(omega, np.full(3, tolerance * _scale(scene, omega)))
+
+
+def _program(scene: Scene, time: float, program: str, accuracy: float) -> _Result | None:
+    """Run a mended program in steps that are halved until the print is met or rounding reigns.
+
+    The error is taken from the last halving, and twice that for safety; rounding may add half a
+    unit in the last place a step. None where no step is long enough for its linear equations.
+    """
+    run = PROGRAM_REGISTRY[program].run
+    order = PROGRAM_REGISTRY[program].order
+    result, before, steps, ended = None, None, _FEWEST_STEPS, ""
+    previous = 0.0
+    while steps <= _MOST_STEPS:
+        stepped = replace(scene, step_size=time / steps, steps=steps)
+        rows = run(stepped, corrected(program), may_stop=False, velocity=False)
+        if rows.ier is not None and rows.ier.any():
+            # LEQT1F takes the matrices of tiny steps for singular and leaves a step of order 1.
+            break
+        # In steps far too long a motion overflows that in shorter ones does not.
+        ended = rows.ended
+        omega = rows.omega[-1] if ended == "complete" else None
+        if omega is not None and before is not None:
+            halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
+            rounding = steps * _HALF_ULP * _scale(scene, omega)
+            result = _Result(omega, np.full(3, halving + rounding))
+            # Two coarse runs may agree by accident: only where halving helps is it believed.
+            if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
+                break
+            previous = halving
+        before = omega
+        steps *= 2
+    if ended not in ("", "complete"):
+        raise InputError(f"{program} in steps of {time / _MOST_STEPS:g} s: {ended}")
+    return result
+
+
+def _check(
+    id: str, unit: str, value: Value, result: _Result, rounding: Array, replay: str
+) -> Check:
+    factor = UNITS[unit]
+    judged = []
+    for axis, figure in enumerate(value.omega):
+        if figure is not None:
+            # Subtracted in decimals: the print may have more digits than binary64.
+            distance = abs(float(Decimal(float(result.omega[axis]) / factor) - figure.value))
+            limit = figure.accuracy + float(result.error[axis] + rounding[axis]) / factor
+            judged.append((distance, limit, f"w{axis + 1}, {unit}"))
+    # NaN is the worst of all, and no comparison shows it.
+    worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
+    distance, limit, note = worst
+    return bounded(id, distance, limit, replay, note)
+
+
+def _accuracy(problem: Problem, value: Value) -> float:
+    """Return the accuracy of the finest print (rad/s)."""
+    finest = min(figure.accuracy for figure in value.omega if figure is not None)
+    return finest * UNITS[problem.unit]
+
+
+def _scale(scene: Scene, omega: Array) -> float:
+    """Return the largest angular velocity at both ends: no more than the largest on the way."""
+    return max(*map(abs, scene.omega), float(np.abs(omega).max()))
+
+
+def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
+    """Return by how much rounding the numbers of a scene moves omega, by time (rad/s).
+
+    Nothing where that can't be solved, and so not be excused: the method's own check tells.
+    """
+
+    def solve(values: Sequence[Value]) -> list[Array]:
+        times = [float(value.time) for value in values]
+        try:
+            return [*_moves(scene, times, "taylor")]
+        except InputError:
+            # A closed form goes further than a series.
+            return [*_moves(scene, times, "auto")]
+
+    rows, _ = _as_far_as_solved(solve, values)
+    nothing = np.zeros(3)
+    return {
+        value.time: rows[row] if row < len(rows) else nothing for row, value in enumerate(values)
+    }
+
+
+def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
+    """Return by how much rounding the numbers of a scene and its times moves omega (rad/s).
+
+    The sum over all numbers of what each moves alone, to first order; nothing in the rows that
+    the motion does not have.
+    """
+    moved = np.zeros((len(times), 3))
+    here = solve(scene, times, method, METHODS[method].finest).omega
+    for other in _moved(scene):
+        there = solve(other, times, method, METHODS[method].finest).omega
+        rows = min(len(here), len(there))
+        moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
+    slope = scene.right_hand_side()
+    for row, (time, omega) in enumerate(zip(times, here, strict=False)):
+        moved[row] += np.abs(slope(time, omega.tolist())) * abs(time) * _ROUNDING
+    return moved
+
+
+def _moved(scene: Scene) -> Iterator[Scene]:
+    """Yield the scene with one of its numbers after the other moved by a small part of itself."""
+    for name in ("moments", "coefficients", "omega"):
+        for triple in _triples(getattr(scene, name)):
+            yield _with(scene, name, triple)
+    law = scene.torque
+    for name in ("constant", "rate"):
+        for triple in _triples(getattr(law, name)):
+            yield replace(scene, torque=_with(law, name, triple))
+    for name in ("sines", "cosines"):
+        waves = getattr(law, name)
+        for place, (amplitude, frequency) in enumerate(waves):
+            others = [(triple, frequency) for triple in _triples(amplitude)]
+            others.append((amplitude, frequency * (1.0 + _STEP_ASIDE)))
+            for wave in others:
+                changed = (*waves[:place], wave, *waves[place + 1 :])
+                yield replace(scene, torque=_with(law, name, changed))
+
+
+def _with(whole: Scene | TorqueLaw, name: str, part: object) -> Any:
+    changes: dict[str, Any] = {name: part}
+    return replace(whole, **changes)
+
+
+def _triples(triple: Triple | None) -> Iterator[Triple]:
+    for axis, x in enumerate(triple or ()):
+        if x and triple:
+            changed = [*triple]
+            changed[axis] = x * (1.0 + _STEP_ASIDE)
+            yield changed[0], changed[1], changed[2]
+
+
+def _replay(problem: Problem, id: str) -> str:
+    given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
+    return f"python -m pyharness verify{given} --only {id}"

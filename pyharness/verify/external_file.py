@@ -1,0 +1,214 @@
+"""External problems: published figures that were not computed here, from files of one form.
+
+A file holds a scene in the words of the scene file, where the figures stand, and the digits as
+printed; how far the digits reach is read off the print.
+"""
+
+import math
+import re
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pyharness.model.errors import InputError, kind_of, printable, unknown
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import check_keys, read_toml, scene_of
+from pyharness.model.values import number
+
+UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
+
+_FOLDER = Path(__file__).parent.parent / "data" / "external"
+_TEXTS = ("title", "source", "where", "conditions")
+_SCENE = ("body", "initial", "torque")
+_PRINTED = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?")
+_LONGEST_PRINT = 100
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number as it is printed.
+
+    Attributes
+    ----------
+    print : str
+        Its digits.
+    value : Decimal
+        What they say.
+    accuracy : float
+        How far it may be from the truth: half a unit of the last printed digit, or what the
+        source states where that is more.
+    """
+
+    print: str
+    value: Decimal
+    accuracy: float
+
+
+@dataclass(frozen=True)
+class Value:
+    """What is published for one time.
+
+    Attributes
+    ----------
+    time : str
+        Time as given (s); exact.
+    omega : tuple of three Figure or None
+        Angular velocity in the unit of the problem, None where nothing is printed.
+    """
+
+    time: str
+    omega: tuple[Figure | None, ...]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A published problem.
+
+    Attributes
+    ----------
+    name : str
+        The name of its file.
+    title, source, where, conditions : str
+        What it is, who published it, where it stands there, what its figures belong to.
+    unit : str
+        Of the printed omega, one of `UNITS`.
+    scene : Scene
+        Its equations and start; the step size plays no part.
+    values : tuple of Value
+        The figures.
+    path : str or None
+        The user's file; None for a problem that comes with the package.
+    """
+
+    name: str
+    title: str
+    source: str
+    where: str
+    conditions: str
+    unit: str
+    scene: Scene
+    values: tuple[Value, ...]
+    path: str | None = None
+
+
+def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
+    """Return a printed number and how far it reaches.
+
+    Parameters
+    ----------
+    where : str
+        What to name in an error.
+    text : str
+        The digits, with or without an exponent of ten.
+    good_to : float
+        The error that the source admits.
+
+    Raises
+    ------
+    InputError
+        Where that is no number in text, or too large for binary64.
+
+    Examples
+    --------
+    >>> figure("", "0.606").accuracy
+    0.0005
+    """
+    if not isinstance(text, str):
+        raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")
+    if len(text) > _LONGEST_PRINT or not _PRINTED.fullmatch(text):
+        shown = text if len(text) <= 30 else text[:27] + "..."
+        raise InputError(f"{where}: '{shown}'; allowed: a printed number, '-0.606' or '6.06e-01'")
+    value = Decimal(text)
+    if math.isinf(float(value)):
+        raise InputError(f"{where}: '{text}' is too large for binary64")
+    exponent = value.as_tuple().exponent
+    assert isinstance(exponent, int)
+    half_unit = float(Decimal(5).scaleb(exponent - 1))
+    return Figure(text, value, max(half_unit, good_to, math.ulp(0.0)))
+
+
+def read_problem(path: str | Path) -> Problem:
+    """Return the problem of a user's file, in the form that docs/external.md describes.
+
+    Raises
+    ------
+    InputError
+        Where the file can't be read, or something in it is missing, unknown or no number.
+    """
+    return _read(path, str(path))
+
+
+@cache
+def problems() -> tuple[Problem, ...]:
+    """Return the problems that come with the package, by name."""
+    return tuple(_read(path, None) for path in sorted(_FOLDER.glob("*.toml")))
+
+
+def _read(path: str | Path, given: str | None) -> Problem:
+    where = f"external file '{path}'"
+    data = read_toml(path, where)
+    try:
+        return _problem(data, Path(path).stem, given)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
+    check_keys(data, (*_TEXTS, "unit", *_SCENE, "value"), "top level")
+    if not re.fullmatch(r"[\w.-]+", name):
+        raise InputError("the name of the file names its checks; allowed: letters, digits, - _ .")
+    texts = {}
+    for key in _TEXTS:
+        text = data.get(key)
+        if not isinstance(text, str) or not text.strip():
+            raise InputError(f"{key} is missing; give it as text")
+        texts[key] = printable(" ".join(text.split()))
+    unit = data.get("unit", "rad/s")
+    if not isinstance(unit, str) or unit not in UNITS:
+        raise unknown("unit", str(unit), UNITS)
+    for table in ("body", "initial"):
+        if table not in data:
+            raise InputError(f"[{table}] is missing")
+    scene = scene_of({key: data[key] for key in _SCENE if key in data}, texts["title"])
+    first, second, third = (w * UNITS[unit] for w in scene.omega)
+    entries = data.get("value")
+    if not isinstance(entries, list) or not entries:
+        raise InputError("[[value]] is missing; give at least one, with time and omega")
+    values: dict[float, Value] = {}
+    for entry in entries:
+        value = _value(entry)
+        if float(value.time) in values:
+            raise InputError(f"[[value]] time {value.time} is given twice")
+        values[float(value.time)] = value
+    return Problem(
+        name=name,
+        **texts,
+        unit=unit,
+        scene=replace(scene, omega=(first, second, third)),
+        values=tuple(values.values()),
+        path=given,
+    )
+
+
+def _value(entry: object) -> Value:
+    if not isinstance(entry, dict):
+        raise InputError(f"[[value]] is {kind_of(entry)}; it must be a table")
+    check_keys(entry, ("time", "omega", "good_to"), "[[value]]")
+    time = figure("[[value]] time", entry.get("time", "")).print
+    if float(time) == 0.0:
+        raise InputError("[[value]] time is 0: that is where it starts; give another")
+    where = f"[[value]] time {time}"
+    good_to = number(f"{where}: good_to", entry.get("good_to", 0.0))
+    if not (math.isfinite(good_to) and good_to >= 0.0):
+        raise InputError(f"{where}: good_to is {good_to:g}; allowed: an error in the print's unit")
+    prints = entry.get("omega")
+    if not isinstance(prints, list) or len(prints) != 3:
+        raise InputError(f"{where}: omega must be a list of three texts, '' where none is printed")
+    omega = tuple(
+        None if text == "" else figure(f"{where}: omega", text, good_to) for text in prints
+    )
+    if not any(omega):
+        raise InputError(f"{where}: omega has nothing printed; give at least one number")
+    return Value(time, omega)

@@ -1,0 +1,84 @@
+"""Verify: bits between languages, error against the truth, and what changed since it was recorded.
+
+Each kind of check is the first part of its name:
+
+cells
+    program x case x listing x reading: Fortran against twin, bit for bit over the whole
+    trajectory, counters and stop.
+schemes
+    every step of the mended programs against its scheme, to rounding.
+stops
+    where and why the Runge-Kutta program stops, against the formula of its test.
+methods, prepared
+    modern methods against the reference, within the tolerance that they were given.
+orders
+    mended programs against `solve_ivp`, fixed-step methods against the reference: the power with
+    which the error falls as the step is halved.
+random
+    all of these in scenes drawn from a seed, half of them nasty.
+external
+    published figures that nobody here computed.
+golden
+    trajectories as they were recorded.
+"""
+
+from collections.abc import Callable, Iterator
+
+from pyharness.compare.checks import Check
+from pyharness.model.errors import InputError
+from pyharness.verify.external import external_checks, problems
+from pyharness.verify.golden import golden
+from pyharness.verify.methods import methods, orders, prepared
+from pyharness.verify.programs import cells, random_programs
+from pyharness.verify.random_methods import random_methods
+from pyharness.verify.schemes import schemes
+from pyharness.verify.selection import Selection, replay
+from pyharness.verify.stops import stops
+
+
+def _random(chosen: Selection) -> Iterator[Check]:
+    yield from random_programs(chosen)
+    yield from random_methods(chosen)
+
+
+def _external(chosen: Selection) -> Iterator[Check]:
+    asked = problems() if chosen.problems is None else chosen.problems
+    for check in external_checks(asked, _THIN_EXTERNAL if chosen.thin else chosen.only):
+        if chosen.asks(check.id):
+            yield check
+
+
+_THIN_EXTERNAL = [
+    f"external/detest-b5/20/{name}" for name in ("reference", "taylor", "gauss-4", "runge-kutta")
+]
+
+KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
+    "cells": cells,
+    "schemes": schemes,
+    "stops": stops,
+    "methods": methods,
+    "prepared": prepared,
+    "orders": orders,
+    "random": _random,
+    "external": _external,
+    "golden": golden,
+}
+
+
+# What these read is the user's.
+_OF_THE_USER = ("external", "golden")
+
+
+def verify(chosen: Selection) -> Iterator[Check]:
+    """Make the checks asked for, one after another."""
+    for kind, checks in KINDS.items():
+        if not chosen.may_ask(kind):
+            continue
+        try:
+            yield from checks(chosen)
+        except InputError as refusal:
+            if kind in _OF_THE_USER:
+                raise
+            # Something refused what it has to take: a fault, and none of the user's.
+            note = f"ended here: {refusal}"
+            yield Check(f"{kind}/refused", False, None, None, replay(kind), note)

@@ -1,0 +1,236 @@
+"""Methods against the truth: within their tolerance, and with their order."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pyharness.bench.contenders import FIXED_STEP
+from pyharness.compare.agreement import ulps
+from pyharness.compare.checks import REFUSED, Check, bounded
+from pyharness.compare.orders import Order, measured_order, order_of
+from pyharness.methods.kernels import extension, normalized
+from pyharness.methods.plan import closed_form
+from pyharness.methods.prepared import prepare
+from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, finest, solve
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.trajectory import Array
+from pyharness.theory.conditioning import Conditioning, conditioning
+from pyharness.truth.reference import Reference, reference
+from pyharness.verify.selection import Selection, replay
+
+_TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
+# Of solve_ivp no more is asked than it answers in a second.
+_SCIPY_TOLERANCES = (1e-6, 1e-9)
+_LATER = 3.0
+_ENDS = (1.0, 3.0, -1.0)
+_PREPARED = ("auto", "taylor", "quick", "closed-form")
+_FINEST_QUICK = 1e-7
+_GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
+# The truth that solve_ivp gives is asked for as finely as it goes.
+_IVP = "dop853"
+# Halvings in which an order has to show, one after another, and what may be missing in the last;
+# .006 is at the most.
+_PAIRS = 4
+_ORDER_SLACK = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Standard:
+    """The truth at some times, and what no method can be blamed for.
+
+    Attributes
+    ----------
+    truth : Reference
+        Its last time is the furthest from 0.
+    flow : Conditioning
+        What becomes of small errors, the truth's own among them.
+    """
+
+    truth: Reference
+    flow: Conditioning
+
+
+def methods(chosen: Selection) -> Iterator[Check]:
+    """Hold every method that states an error against the reference, in every case."""
+    for case in (4, 5) if chosen.thin else case_numbers():
+        names = [
+            (name, tolerance, id)
+            for name, method in METHODS.items()
+            if method.finest < 1.0 and name != "reference"
+            for tolerance in _tolerances(name, method.finest, chosen.thin)
+            if chosen.asks(id := f"methods/{name}/case-{case}/{tolerance:.1e}")
+        ]
+        if names:
+            scene = case_scene(case)
+            # All results of the case, close together, and one far from them.
+            standard = _standard(scene, (*scene.times(), _LATER))
+            for name, tolerance, id in names:
+                yield _held(id, replay(id), scene, name, tolerance, standard)
+
+
+def prepared(chosen: Selection) -> Iterator[Check]:
+    """Hold prepared solvers against the reference, forward and backward."""
+    for case in (4, 5) if chosen.thin else case_numbers():
+        scene = case_scene(case)
+        forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
+        for t_end in _ENDS:
+            names = [
+                (name, tolerance, id)
+                for name in forms
+                for tolerance in ((1e-6,) if chosen.thin else _TOLERANCES)
+                if not (name == "quick" and tolerance < _FINEST_QUICK)
+                and chosen.asks(id := f"prepared/{name}/case-{case}/{t_end:g}/{tolerance:.1e}")
+            ]
+            if names:
+                standard = _standard(scene, (t_end,))
+                for name, tolerance, id in names:
+                    yield _held_prepared(id, replay(id), scene, name, tolerance, standard)
+        yield from _same_steps(chosen, scene, case)
+
+
+def _same_steps(chosen: Selection, scene: Scene, case: int) -> Iterator[Check]:
+    """Hold prepared solvers in the scene's own steps to the bits of the kernel itself."""
+    for name in (*FIXED_STEP, *_GAUSS):
+        id = f"prepared/{name}/case-{case}/bits"
+        if not chosen.asks(id):
+            continue
+        time = 100.0 * scene.step_size
+        found = prepare(scene, name)(np.array(scene.omega), time)
+        if name in FIXED_STEP:
+            wanted = solve(scene, [time], name, 1.0).omega[0]
+        else:
+            stages = int(name.partition("-")[2])
+            rows = extension().gauss_solution(
+                *normalized(scene), scene.omega, [time], stages, scene.step_size
+            )[0]
+            wanted = rows[:, 0]
+        yield bounded(id, ulps(found, np.ascontiguousarray(wanted)), 0.0, replay(id))
+
+
+def orders(chosen: Selection) -> Iterator[Check]:
+    """Measure the order of mended programs against `solve_ivp`, of methods against the reference.
+
+    That of the programs' velocity too, against the reference: no other method has one. The value
+    is what is missing to the order that is due.
+    """
+    for case in (5,) if chosen.thin else case_numbers():
+        scene = case_scene(case)
+        asks = {name: chosen.asks(f"orders/{name}/case-{case}") for name in _ORDERED}
+        if any(asks[name] for name in PROGRAMS):
+            truth = _by_ivp(scene)
+            for name in filter(asks.get, PROGRAMS):
+                program = PROGRAM_REGISTRY[name]
+                found = measured_order(scene, program, corrected(name), truth, _PAIRS)
+                yield _order(f"orders/{name}/case-{case}", found)
+        moves = {name: chosen.asks(f"orders/{name}/case-{case}/velocity") for name in PROGRAMS}
+        if any(moves.values()):
+            truth = reference(scene, scene.times(), velocity=True)
+            for name in filter(moves.get, PROGRAMS):
+                due = PROGRAM_REGISTRY[name].order
+                found = order_of(scene, _velocity_of(name), due, truth, "velocity", _PAIRS)
+                yield _order(f"orders/{name}/case-{case}/velocity", found)
+        if any(asks[name] for name in FIXED_STEP):
+            truth = reference(scene, scene.times())
+            for name in filter(asks.get, FIXED_STEP):
+                due = FIXED_STEP[name][0]
+                found = order_of(scene, _steps_of(name), due, truth, pairs=_PAIRS)
+                yield _order(f"orders/{name}/case-{case}", found)
+
+
+_ORDERED = (*PROGRAMS, *FIXED_STEP)
+
+
+def _standard(scene: Scene, times: Sequence[float]) -> Standard:
+    """Return the truth at `times` with its limits.
+
+    In the cases a tolerance is meant as it stands: nothing but rounding is granted to the flow.
+    """
+    flow = conditioning(scene, times[-1])
+    # The reference's steps are good to 1e-22: where the flow amplifies more, more is asked.
+    truth = reference(scene, times, precise=flow.amplification > 1e3)
+    rounding = flow.rounding + truth.error / flow.largest
+    return Standard(truth, replace(flow, amplification=1.0, rounding=rounding))
+
+
+def _held(
+    id: str, again: str, scene: Scene, name: str, tolerance: float, standard: Standard
+) -> Check:
+    """Return the check that a method keeps a tolerance at all times of the truth.
+
+    A closed form has to refuse where there is none.
+    """
+    has_form = name != "closed-form" or closed_form(scene) is not None
+    times = standard.truth.time
+    try:
+        run = solve(scene, times.tolist(), name, tolerance)
+    except InputError as refusal:
+        return Check(id, not has_form, None, None, again, f"{REFUSED}{refusal}")
+    if not has_form:
+        return Check(id, False, None, None, again, "solved what has no closed form")
+    if run.ended != "complete" or not np.array_equal(run.time, times):
+        return Check(id, False, None, None, again, f"{run.ended}, other times than asked for")
+    error = float(np.abs(run.omega - standard.truth.omega).max()) / standard.flow.largest
+    return bounded(id, error, standard.flow.limit(tolerance), again)
+
+
+def _held_prepared(
+    id: str, again: str, scene: Scene, name: str, tolerance: float, standard: Standard
+) -> Check:
+    """Return the check that a prepared solver keeps a tolerance at the end."""
+    solver = prepare(scene, name, tolerance)
+    start, t_end = np.array(scene.omega), float(standard.truth.time[-1])
+    # Another start before it: nothing of that may be left.
+    solver(start[::-1].copy(), 0.5 * t_end)
+    found = solver(start, t_end)
+    if name == "quick" and solver.status in ("refused", "gave up"):
+        # Its unknowns need three products.
+        may = solver.status == "refused" and not all(scene.euler_coefficients)
+        return Check(id, may, None, None, again, f"{REFUSED}{solver.status}")
+    error = float(np.abs(found - standard.truth.omega[-1]).max()) / standard.flow.largest
+    note = solver.status if math.isnan(error) else ""
+    return bounded(id, error, standard.flow.limit(tolerance), again, note)
+
+
+def _tolerances(name: str, finest: float, thin: bool) -> list[float]:
+    if name in SCIPY_METHODS:
+        return [_SCIPY_TOLERANCES[0]] if thin else list(_SCIPY_TOLERANCES)
+    if thin:
+        return [max(finest, 1e-9)]
+    return [*(each for each in _TOLERANCES if each > finest), finest]
+
+
+def _order(id: str, found: Order) -> Check:
+    """Return the check that the order is as due; what the cases can't judge fails."""
+    missing = None if found.value is None else found.due - found.value
+    passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
+    return Check(id, passed, missing, _ORDER_SLACK, replay(id), str(found))
+
+
+def _steps_of(name: str) -> Callable[[Scene], Array]:
+    def run(scene: Scene) -> Array:
+        return solve(scene, scene.times(), name, 1.0).omega
+
+    return run
+
+
+def _velocity_of(program: str) -> Callable[[Scene], Array]:
+    def run(scene: Scene) -> Array:
+        velocity = PROGRAM_REGISTRY[program].run(scene, corrected(program), may_stop=False).velocity
+        # None is as good as no rows: nothing settles.
+        return np.empty((0, 3)) if velocity is None else velocity
+
+    return run
+
+
+def _by_ivp(scene: Scene) -> Reference:
+    """Return what `solve_ivp` takes for the truth, good to its tolerance."""
+    times = scene.times()
+    tolerance = 1.01 * finest(_IVP, scene, times[-1])
+    run = solve(scene, times, _IVP, tolerance)
+    largest = float(np.abs(run.omega).max())
+    return Reference(run.time, run.omega, None, "solve_ivp", tolerance * largest)

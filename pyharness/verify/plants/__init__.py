@@ -1,0 +1,1 @@
+"""Faults that are planted, so that each check is seen to fail."""

@@ -1,0 +1,66 @@
+"""Twins with one fault: a copy of their text in which one place is another."""
+
+import importlib
+import itertools
+import shutil
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from pyharness import original
+from pyharness.methods.registry import PROGRAM_REGISTRY, Program
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+_COUNT = itertools.count()
+
+
+@dataclass(frozen=True)
+class PlantedTwin(Program):
+    """A program with a faulty twin, which also stands for the compiled program where `both`."""
+
+    module: ModuleType
+    both: bool = True
+
+    def run(
+        self,
+        scene: Scene,
+        listing: Listing,
+        implementation: str = "fortran",
+        lipschitz: float = 500.0,
+        may_stop: bool = True,
+        velocity: bool = True,
+        effort: float = 1.0,
+    ) -> Trajectory:
+        """Run the faulty twin, or the compiled program as it is."""
+        if self.both or implementation == "python":
+            trajectory: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
+            return trajectory
+        return super().run(scene, listing, implementation, lipschitz, may_stop, velocity, effort)
+
+
+def plant_in_twin(
+    program: str, file: str, old: str, new: str, folder: Path, both: bool = True
+) -> PlantedTwin:
+    """Copy the twins into `folder`, replace `old` by `new` in one file, import the copy."""
+    package = f"planted_{next(_COUNT)}"
+    target = folder / package
+    ignore = shutil.ignore_patterns("__pycache__")
+    assert original.__file__ is not None
+    shutil.copytree(Path(original.__file__).parent, target, ignore=ignore)
+    for path in target.glob("*.py"):
+        text = path.read_text().replace("pyharness.original", package)
+        if path.name == file:
+            assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times in {file}"
+            text = text.replace(old, new)
+        path.write_text(text)
+    sys.path.insert(0, str(folder))
+    try:
+        importlib.invalidate_caches()
+        module = importlib.import_module(f"{package}.{program.replace('-', '_')}")
+    finally:
+        sys.path.remove(str(folder))
+    known = PROGRAM_REGISTRY[program]
+    return PlantedTwin(known.name, known.order, known.source, module, both)

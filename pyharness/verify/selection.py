@@ -1,0 +1,62 @@
+"""What to verify: which checks, which random draws, which record."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pyharness.compare.checks import may_hold, selected
+from pyharness.compare.random_scenes import weekly_seed
+
+if TYPE_CHECKING:
+    from pyharness.verify.external_file import Problem
+
+DRAWS = 1000
+RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What to verify.
+
+    Attributes
+    ----------
+    only : sequence of str
+        Leading parts of names, as in ``cells/two-term``; all where empty.
+    seed : str
+        Of the random draws; by default the week.
+    draws : int
+        How many of them.
+    record : Path
+        The folder of the golden record, by default that of the checkout.
+    problems : sequence of Problem or None
+        With published figures; None for those that come with the project.
+    thin : bool
+        A part that touches every kind, for `verify --self-test`.
+    """
+
+    only: Sequence[str] = ()
+    seed: str = field(default_factory=weekly_seed)
+    draws: int = DRAWS
+    record: Path = RECORD
+    problems: Sequence["Problem"] | None = None
+    thin: bool = False
+
+    def asks(self, id: str) -> bool:
+        """Whether the check of that name is asked for."""
+        return selected(id, self.only)
+
+    def may_ask(self, id: str) -> bool:
+        """Whether a check below that name may be asked for."""
+        return may_hold(id, self.only)
+
+    def replay_of_draw(self, id: str) -> str:
+        """Return the command that repeats a check of a random draw."""
+        draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
+        return f"{replay(id)}{draws} --seed {shlex.quote(self.seed)}"
+
+
+def replay(id: str) -> str:
+    """Return the command that repeats one check."""
+    return f"python -m pyharness verify --only {id}"

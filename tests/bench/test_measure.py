@@ -1,0 +1,417 @@
+"""The benchmark: known times and errors give the expected table; nothing asserts seconds."""
+
+import csv
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness.bench import measure as bench
+from pyharness.bench.compiled_peers import _compiled, _steps_source
+from pyharness.bench.contenders import Contender, Maker, Outcome, Ready, RefusedError, own
+from pyharness.bench.measure import (
+    Finding,
+    Refusal,
+    Row,
+    Workload,
+    ladder,
+    measure,
+    relative_error,
+    workloads,
+)
+from pyharness.bench.peers import installed, peers
+from pyharness.bench.pictures import _slopes
+from pyharness.bench.report import bench_markdown, bench_record, bench_rows, bench_table, ratio
+from pyharness.bench.scores import groups, means, scores, yardstick
+from pyharness.cli.main import main
+from pyharness.cli.verbs.bench import chosen
+from pyharness.compare import timing as bench_timing
+from pyharness.model.build import build, machine
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene_file import case_scene
+from pyharness.truth.reference import reference
+
+Capture = pytest.CaptureFixture[str]
+SHORT = Workload("5", case_scene(5), 3.0)
+OTHER = Workload("6", case_scene(6), 3.0)
+LONG = Workload("4L", case_scene(4), 100.0)
+
+
+def _row(load: Workload, method: str, seconds: float | None, error: float | None) -> Row:
+    note = "" if error is not None else "overflow"
+    return Row(load, method, "tolerance", 1e-6, seconds, error, 7, note)
+
+
+def _finding(*rows: Row, refused: list[Refusal] | None = None) -> Finding:
+    loads = list(dict.fromkeys(row.workload for row in rows))
+    doubt = {load.label: 1e-16 for load in loads}
+    return Finding(loads, list(rows), refused or [], {(5, "heyoka"): 0.5}, doubt)
+
+
+# Microseconds and errors, made up.
+KNOWN = _finding(
+    _row(SHORT, "auto", 1e-6, 5e-4),
+    _row(SHORT, "auto", 2e-6, 1e-6),
+    _row(SHORT, "auto", 4e-6, 2e-13),
+    _row(SHORT, "auto", 9e-6, 1e-13),
+    _row(SHORT, "slow", None, None),
+    _row(SHORT, "slow", 1e-2, 1.1e-6),
+    _row(SHORT, "heyoka", 4e-6, 1e-7),
+    _row(SHORT, "heyoka", 6e-6, 3e-16),
+    _row(OTHER, "auto", 1e-6, 1e-13),
+    _row(OTHER, "slow", 1e-2, 1e-2),
+    _row(OTHER, "heyoka", 8e-6, 1e-13),
+    refused=[Refusal(SHORT, "slow", 1e-15, "no tolerance below 2.2e-14")],
+)
+
+
+def test_time_to_an_error_is_that_of_the_fastest_setting_that_reaches_it() -> None:
+    first, auto, slow = scores(KNOWN, SHORT)
+    assert first.method == "heyoka"
+    assert first.seconds == (4e-6, 4e-6, 6e-6, 6e-6)
+    assert first.ratios == (1.0, 1.0, 1.0, 1.0)
+    assert first.best == 3e-16
+    assert auto.seconds == (1e-6, 2e-6, 4e-6, 4e-6)
+    assert auto.ratios == pytest.approx((4.0, 2.0, 1.5, 1.5))
+    assert slow.seconds == (1e-2, None, None, None)
+    assert slow.ratios[0] == pytest.approx(4e-4)
+    assert slow.best == 1.1e-6
+
+
+def test_means_are_geometric_and_need_every_case_of_the_group() -> None:
+    (name, loads), *rest = groups(KNOWN).items()
+    assert (name, rest) == ("torque, T = 3", [])
+    by_name = {each.method: each.ratios for each in means(KNOWN, loads)}
+    assert by_name["auto"] == pytest.approx([math.sqrt(r * 8.0) for r in (4.0, 2.0, 1.5, 1.5)])
+    assert by_name["slow"] == (None, None, None, None)
+
+
+def test_yardstick_is_heyoka_then_solve_ivp_then_whoever_is_there() -> None:
+    others = [row for row in KNOWN.rows if row.method != "heyoka"]
+    assert yardstick(_finding(*others)) == "auto"
+    assert yardstick(_finding(*others, _row(SHORT, "solve_ivp-dop853", 1.0, 0.1))) == (
+        "solve_ivp-dop853"
+    )
+    assert yardstick(Finding([], [], [], {}, {})) is None
+
+
+def test_groups_part_torque_from_none_and_short_from_long() -> None:
+    found = Finding(workloads(), [], [], {}, {})
+    labels = {name: [load.label for load in loads] for name, loads in groups(found).items()}
+    assert labels == {
+        "torque, T = 3": ["5", "6", "7"],
+        "torque-free, T = 3": ["2", "3", "4"],
+        "T = 100": ["3L", "4L"],
+    }
+    assert [load.label for load in workloads(5)] == ["5"]
+    assert [load.horizon for load in workloads(3)] == [3.0, 100.0]
+    assert [load.horizon for load in workloads(3, 7.5)] == [7.5]
+
+
+def test_table_shows_ratios_refusals_and_fits() -> None:
+    text = bench_table(KNOWN)
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 100
+    at = next(i for i, line in enumerate(lines) if line.startswith("us per solve"))
+    assert lines[at + 1].split() == [
+        "heyoka", "4.00", "1.00", "4.00", "1.00", "6.00", "1.00", "6.00", "1.00", "3.0e-16",
+    ]  # fmt: skip
+    assert lines[at + 3].split() == [
+        "slow", "10000", "0.00040", "-", "-", "-", "-", "-", "-", "1.1e-6",
+    ]  # fmt: skip
+    assert "slow: no tolerance below 2.2e-14 (case 5 at 1e-15)" in lines
+    assert "slow: overflow (case 5 at 1e-06)" in lines
+    assert "slow: refused (case 5 at 1e-15, case 6)" in bench_table(
+        replace(
+            KNOWN,
+            refused=[
+                Refusal(SHORT, "slow", 1e-15, "refused"),
+                Refusal(OTHER, "slow", None, "refused"),
+            ],
+        )
+    )
+    assert "above 1 is faster" in text
+    assert "heyoka 0.50" in text
+
+
+def test_markdown_page_tells_machine_versions_and_the_command() -> None:
+    command = "pyharness bench --format markdown"
+    text = bench_markdown(KNOWN, machine(["numpy"]), build(), command)
+    assert f"`{command}`" in text
+    assert "| processor | " in text
+    assert "| numpy | " in text
+    assert "| auto | 1.00 | 4.00 | 2.00 | 2.00 |" in text
+
+
+def test_record_is_as_contracted_and_csv_has_every_row() -> None:
+    record = bench_record(KNOWN, {}, build())
+    assert record["schema"] == 1
+    contract = ["case", "horizon", "method", "setting", "seconds", "error", "evaluations"]
+    for row in record["rows"]:
+        assert list(row)[:7] == contract
+    failed = record["rows"][4]
+    assert (failed["seconds"], failed["error"], failed["note"]) == (None, None, "overflow")
+    assert record["refused"][0]["reason"] == "no tolerance below 2.2e-14"
+    assert record["compile_seconds"] == [{"case": 5, "method": "heyoka", "seconds": 0.5}]
+    json.dumps(record, allow_nan=False)
+    head, rows = bench_rows(KNOWN)
+    assert list(head)[:3] == contract[:3]
+    assert len(rows) == len(KNOWN.rows)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "-"), (1.0, "1.00"), (123.4, "123"), (12.34, "12.3"), (0.01234, "0.0123"),
+     (9.999, "10.0"), (0.000012, "0.00001")],
+)  # fmt: skip
+def test_ratio_has_three_digits_in_seven_characters(value: float | None, text: str) -> None:
+    assert ratio(value) == text
+
+
+def test_error_is_relative_to_the_largest_component() -> None:
+    truth = reference(case_scene(3), [3.0])
+    omega = truth.omega[0].copy()
+    # Half a unit in the last place of the largest component is the error of the truth rounded.
+    assert 0.0 < (relative_error(omega, truth) or 0.0) <= 2.0**-53
+    assert relative_error(omega, replace(truth, remainder=None)) == 0.0
+    omega[0] += 1e-5
+    assert relative_error(omega, truth) == pytest.approx(1e-5 / abs(truth.omega[0]).max())
+    assert relative_error([math.nan, 0.0, 0.0], truth) is None
+
+
+def test_ladder_begins_too_coarse_for_anyone_and_has_rungs_between_powers_of_two() -> None:
+    by_name = {each.name: each for each in own()}
+    assert list(ladder(by_name["gauss-8"], case_scene(7), 3.0))[:4] == [2.0, 3.0, 4.0, 6.0]
+    assert list(ladder(by_name["taylor-3"], case_scene(7), 3.0))[:3] == [2.0, 4.0, 8.0]
+    assert next(ladder(by_name["rk4"], case_scene(4), 100.0)) == 64.0
+    assert next(ladder(by_name["auto"], case_scene(4), 3.0)) == 0.5
+
+
+def _fake(answer: Callable[[float], Outcome]) -> Callable[[Scene], Maker]:
+    def prepare(scene: Scene) -> Maker:
+        def make(horizon: float, setting: float) -> Ready:
+            if setting < 1e-9:
+                raise RefusedError("too fine")
+            return Ready(lambda: setting, answer)
+
+        return make
+
+    return prepare
+
+
+def _refuses(scene: Scene) -> Maker:
+    raise RefusedError("not this scene")
+
+
+@pytest.fixture
+def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench_timing, "ROUNDS", 2)
+    monkeypatch.setattr(bench_timing, "_BATCH", 1e-5)
+    monkeypatch.setattr(bench, "_LARGEST_STEPS", 64)
+
+
+@pytest.mark.usefixtures("hurried")
+def test_measure_judges_refuses_and_goes_on() -> None:
+    truth = reference(SHORT.scene, [3.0], precise=True).omega[0]
+
+    def answer(setting: float) -> Outcome:
+        if setting > 1e-4:
+            return Outcome(None, None, "stopped")
+        return Outcome((truth[0], truth[1], truth[2] * (1.0 + setting)), 11)
+
+    settings = (1e-3, 1e-6, 1e-12)
+    told: list[str] = []
+    found = measure(
+        [SHORT],
+        [
+            Contender("exact", "peer", "tolerance", _fake(answer), settings),
+            Contender("picky", "peer", "none", _refuses, (0.0,)),
+        ],
+        told.append,
+    )
+    stopped, good = found.rows
+    assert (stopped.error, stopped.seconds, stopped.note) == (None, None, "stopped")
+    assert good.error == pytest.approx(1e-6, rel=1e-3)
+    assert good.seconds is not None
+    assert good.evaluations == 11
+    assert [(each.method, each.setting, each.reason) for each in found.refused] == [
+        ("exact", 1e-12, "too fine"),
+        ("picky", None, "not this scene"),
+    ]
+    assert found.doubt["5"] < 1e-15
+    assert any("exact" in text for text in told)
+
+
+@pytest.mark.usefixtures("hurried")
+def test_every_contender_of_ours_meets_its_order_or_tolerance() -> None:
+    # Case 3 has a closed form, and every method takes it.
+    found = measure([Workload("3", case_scene(3), 3.0)], own())
+    names = {row.method for row in found.rows if row.error is not None}
+    assert names >= {each.name for each in own()} - {"runge-kutta-original"}
+    for row in found.rows:
+        if row.method in ("auto", "taylor", "closed-form"):
+            assert row.error is not None
+            assert row.error <= max(row.setting or 0.0, 5e-15), row
+    by_steps = {row.setting: row.error for row in found.rows if row.method == "gauss-2"}
+    coarse, fine = by_steps[32.0], by_steps[64.0]
+    assert coarse is not None
+    assert fine is not None
+    assert coarse / fine == pytest.approx(16.0, rel=0.2)
+
+
+@pytest.mark.usefixtures("hurried")
+def test_evaluations_are_counted() -> None:
+    chosen_ones = [each for each in own() if each.name in ("rk4", "runge-kutta-corrected")]
+    chosen_ones += [each for each in peers() if each.package == "scipy"][:2]
+    found = measure([Workload("4", case_scene(4), 3.0)], chosen_ones)
+    for row in found.rows:
+        if row.kind == "steps" and row.error is not None:
+            assert row.evaluations == 4 * (row.setting or 0.0)
+        elif row.error is not None:
+            assert row.evaluations is not None
+            assert row.evaluations > 10
+    assert any("100 eps" in each.reason for each in found.refused)
+
+
+def test_slow_contenders_are_left_out_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter(float(t) for t in range(1000))
+    monkeypatch.setattr(bench, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(bench_timing, "ROUNDS", 1)
+    truth = reference(SHORT.scene, [3.0], precise=True).omega[0]
+    made = _fake(lambda setting: Outcome(list(truth)))
+    slow = Contender("slow", "peer", "tolerance", made, (1e-3, 1e-4))
+    found = measure([SHORT], [slow])
+    assert [row.setting for row in found.rows] == [1e-3]
+    assert found.refused[0].setting == 1e-4
+    assert "left out, a call would take about 1 s" in found.refused[0].reason
+
+
+LAWS = [case_scene(n) for n in range(1, 8)]
+LAWS.append(
+    Scene(
+        "every term", (0.3, -0.2, 0.5), coefficients=(0.5, -0.7, 0.2),
+        torque=TorqueLaw((0.1, 0.0, 0.2), (0.0, 0.3, 0.0), (((0.1, 0.2, 0.0), 2.0),),
+                         (((0.0, 0.3, 0.1), 3.0),)),
+    )
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("scene", LAWS, ids=lambda scene: scene.name)
+def test_source_written_for_numba_is_runge_kutta_of_the_scene(scene: Scene) -> None:
+    from pyharness.methods.prepared import prepare
+
+    stages = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]]
+    weights, nodes = [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0.0, 0.5, 0.5, 1.0]
+    function = _compiled(_steps_source(scene, stages, weights, nodes))
+    omega0, omega = np.array(scene.omega), np.empty(3)
+    function(omega0, 1.0, 100, omega)
+    ours = prepare(scene, "rk4")(omega0, 1.0)
+    assert omega == pytest.approx(ours, rel=1e-11, abs=1e-11)
+
+
+@pytest.mark.external
+@pytest.mark.parametrize("name", ["heyoka", "numba-dop8", "numbalsoda-dop853", "numbalsoda-lsoda"])
+@pytest.mark.filterwarnings("ignore")
+def test_peer_solves_every_law(name: str) -> None:
+    peer = next(each for each in peers() if each.name == name)
+    if not installed(peer):
+        pytest.skip(f"{peer.package} is not installed")
+    for scene in (LAWS[4], LAWS[-1]):
+        ready = peer.prepare(scene)(2.0, 1000.0 if peer.setting == "steps" else 1e-12)
+        for _ in range(2):
+            outcome = ready.read(ready.run())
+            assert outcome.omega is not None
+            error = relative_error(outcome.omega, reference(scene, [2.0]))
+            assert error is not None
+            assert error < 1e-10
+
+
+ONLY = ["bench", "--case", "4", "--methods", "auto,rk4", "--peers", "none"]
+
+
+@pytest.mark.usefixtures("hurried")
+def test_verb_writes_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
+    assert main([*ONLY, "--horizon", "1", "--format", "json"]) == 0
+    captured = capsys.readouterr()
+    record: dict[str, Any] = json.loads(captured.out, parse_constant=pytest.fail)
+    assert captured.err == ""
+    assert {row["method"] for row in record["rows"]} == {"auto", "rk4"}
+    assert {row["horizon"] for row in record["rows"]} == {1.0}
+    assert record["machine"]["cores"]
+    picture = tmp_path / "bench.svg"
+    assert main([*ONLY, "--horizon", "3", "--plot", str(picture), "--format", "csv"]) == 0
+    assert b"<svg" in picture.read_bytes()
+    shown = list(csv.reader(capsys.readouterr().out.splitlines()))
+    beside = list(csv.reader((tmp_path / "bench.csv").read_text().splitlines()))
+    assert shown == beside
+    assert len(shown) > 10
+
+
+MISTAKES = [
+    (["--methods", "tailor"], "unknown method 'tailor'; did you mean 'taylor'"),
+    (["--peers", "heyoca"], "unknown peer 'heyoca'; did you mean 'heyoka'"),
+    (["--methods", "none", "--peers", "none"], "no method and no peer is left"),
+    (
+        ["--case", "5", "--methods", "closed-form", "--peers", "none"],
+        "nothing could be measured: closed-form: closed-form can't take this scene: it has torque",
+    ),
+    (["--horizon", "0"], "--horizon: 0; allowed: a number above 0"),
+    (["--horizon", "-3"], "--horizon: -3; allowed"),
+    (["--horizon", "nan"], "not finite"),
+    (["--horizon", "1e9"], "--horizon: 1e+09; allowed"),
+    (["--case", "8"], "unknown case '8'"),
+    (["--plot", "x.gif"], "unknown picture format"),
+    (["--format", "printer"], "unknown format 'printer'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), MISTAKES, ids=range(len(MISTAKES)))
+def test_mistake_is_one_line(arguments: list[str], words: str, capsys: Capture) -> None:
+    assert main(["bench", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert words in captured.err
+
+
+def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    absent = partial(lambda contender: contender.package != "heyoka")
+    monkeypatch.setattr("pyharness.cli.verbs.bench.installed", absent)
+    assert main(["bench", "--peers", "heyoka"]) == 2
+    assert "heyoka needs heyoka, which is not installed" in capsys.readouterr().err
+    monkeypatch.setattr(
+        "pyharness.cli.verbs.bench.peers",
+        lambda: [each for each in peers() if each.name in ("heyoka", "odeint")],
+    )
+    monkeypatch.setattr(bench, "_BUDGET", dict.fromkeys(("tolerance", "steps", "none"), 0.0))
+    assert main(["bench", "--case", "4", "--horizon", "1", "--methods", "closed-form"]) == 0
+    assert "heyoka: not installed" in capsys.readouterr().out
+
+
+def test_a_package_stands_for_its_contenders() -> None:
+    names = [each.name for each in chosen(peers(), "numba,odeint", "peer", "--peers")]
+    assert names == ["numba-rk4", "numba-dop8", "odeint"]
+
+
+@pytest.mark.parametrize("order", [2, 4, 8])
+def test_slopes_stand_where_no_curve_does(order: int) -> None:
+    figure_module = pytest.importorskip("matplotlib.figure")
+    axes = figure_module.Figure().subplots()
+    count = np.geomspace(50.0, 1e6, 500)
+    error = 0.5 * (count / 43.0) ** -float(order)
+    axes.loglog(count[error > 1e-15], error[error > 1e-15])
+    axes.set_xlim(20.0, 2e6)
+    axes.set_ylim(1e-17, 1.0)
+    _slopes(axes)
+    axes.figure.draw_without_rendering()
+    curve = axes.transData.transform(axes.lines[0].get_xydata())
+    for label in axes.texts:
+        box = label.get_window_extent()
+        assert box.x1 <= axes.bbox.x1
+        assert not any(box.contains(x, y) for x, y in curve), label.get_text()

@@ -1,0 +1,298 @@
+"""Files are written whole or not at all, whatever interrupts; stderr has no say in the result."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import pytest
+
+from pyharness import InputError
+from pyharness.cli import output
+from pyharness.cli.main import main
+from pyharness.cli.output import write_files, write_folder
+
+RUN = ["run", "--case", "3", "--program", "two-term", "--format", "csv"]
+
+
+def _tree(folder: Path) -> dict[str, bytes | None]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+OLD = {"a": b"old a", "c": b"old c"}
+NEW = {"a": b"new a", "b": b"new b", "c": b"new c"}
+
+
+def _three(folder: Path) -> None:
+    write_files({str(folder / name): content for name, content in NEW.items()}, "--out")
+
+
+def _one(folder: Path) -> None:
+    write_files({str(folder / "a"): NEW["a"]}, "--out")
+
+
+def _into(folder: Path) -> None:
+    write_folder(str(folder), NEW, "--out")
+
+
+def _made(folder: Path) -> None:
+    write_folder(str(folder / "made"), NEW, "--out")
+
+
+# What writes, and what is there afterwards.
+WRITERS: dict[str, tuple[Callable[[Path], None], dict[str, bytes | None]]] = {
+    "three": (_three, {**NEW}),
+    "one": (_one, {**OLD, "a": NEW["a"]}),
+    "into": (_into, {**NEW}),
+    "made": (_made, {**OLD, "made": None, **{f"made/{k}": v for k, v in NEW.items()}}),
+}
+
+
+def _folder(tmp_path: Path) -> Path:
+    """Return a new folder with what was there before."""
+    folder = Path(tempfile.mkdtemp(dir=tmp_path))
+    for name, content in OLD.items():
+        (folder / name).write_bytes(content)
+    return folder
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+def test_what_is_written(writer: str, tmp_path: Path) -> None:
+    write, after = WRITERS[writer]
+    folder = _folder(tmp_path)
+    write(folder)
+    assert _tree(folder) == after
+    mask = os.umask(0)
+    os.umask(mask)
+    assert (folder / "a").stat().st_mode & 0o777 == (0o666 & ~mask if writer != "made" else 0o644)
+
+
+class _Failing:
+    """A function that fails once: before it has done anything, or when it is `done`."""
+
+    def __init__(
+        self, real: Callable[..., Any], number: int, done: bool, error: type[BaseException]
+    ) -> None:
+        self.real, self.number, self.done, self.error = real, number, done, error
+        self.calls = 0
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        self.calls += 1
+        if self.calls != self.number:
+            return self.real(*given, **named)
+        if self.done:
+            result = self.real(*given, **named)
+            if result is not None:
+                result.close()
+        raise self.error(28, "No space left on device")
+
+    def __get__(self, instance: object, _: object) -> Callable[..., Any]:
+        return partial(self, instance) if isinstance(instance, Path) else self
+
+
+CALLS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
+    "open": (output, "open", open),
+    "link": (os, "link", os.link),
+    "replace": (os, "replace", os.replace),
+    "mkdir": (Path, "mkdir", Path.mkdir),
+}
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError, OSError])
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("writer", WRITERS)
+def test_nothing_is_left_behind_by_a_call_that_fails(
+    writer: str,
+    call: str,
+    error: type[BaseException],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each call in turn: before it has done anything, and when it is done."""
+    write, after = WRITERS[writer]
+    owner, name, real = CALLS[call]
+    for number, done in ((number, done) for number in range(4) for done in (False, True)):
+        folder = _folder(tmp_path)
+        failing = _Failing(real, number + 1, done, error)
+        with monkeypatch.context() as patch:
+            patch.setattr(owner, name, failing, raising=False)
+            try:
+                write(folder)
+            except (KeyboardInterrupt, MemoryError, InputError):
+                pass
+            else:
+                # There are not so many calls, or there is a way round.
+                assert failing.calls <= number or call == "link"
+                assert _tree(folder) == after
+                continue
+        # A single rename that is done is all that there was to do.
+        assert _tree(folder) in ((OLD, after) if writer == "one" else (OLD,))
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt: a shell's background job ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.parametrize("writer", WRITERS)
+def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path) -> None:
+    """The signal itself, at each line of the room in turn."""
+    write, after = WRITERS[writer]
+    outcomes = []
+    for number in range(400):
+        folder = _folder(tmp_path)
+        lines = 0
+
+        def trace(frame: FrameType, event: str, _: object, number: int = number) -> Any:
+            nonlocal lines
+            if frame.f_code.co_filename != output.__file__:
+                return None
+            if event == "line":
+                lines += 1
+                if lines == number + 1:
+                    signal.raise_signal(signal.SIGINT)
+            return trace
+
+        before, interrupted = sys.gettrace(), False
+        sys.settrace(trace)
+        try:
+            write(folder)
+        except KeyboardInterrupt:
+            interrupted = True
+        finally:
+            sys.settrace(before)
+        found = _tree(folder)
+        assert found in (OLD, after), number
+        outcomes.append((interrupted, found == after))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if not interrupted:
+            break
+    assert outcomes[-1] == (False, True)
+    assert outcomes.count((False, True)) == 1
+    assert {(True, False), (True, True)} <= set(outcomes)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_a_ctrl_c_while_files_are_written_gives_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*given: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return open(*given)
+
+    monkeypatch.setattr(output, "open", interrupted, raising=False)
+    for write, _ in WRITERS.values():
+        folder = _folder(tmp_path)
+        with pytest.raises(KeyboardInterrupt):
+            write(folder)
+        assert _tree(folder) == OLD
+
+
+def _other_file_system(tmp_path: Path) -> Path:
+    """Return a folder on another file system than `tmp_path`; skips where there is none."""
+    shared = Path("/dev/shm")
+    if not os.access(shared, os.W_OK) or shared.stat().st_dev == tmp_path.stat().st_dev:
+        pytest.skip("no other file system here")
+    return Path(tempfile.mkdtemp(dir=shared))
+
+
+@pytest.fixture(params=["same", "other"])
+def elsewhere(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
+    if request.param == "same":
+        (tmp_path / "elsewhere").mkdir()
+        yield tmp_path / "elsewhere"
+        return
+    import shutil
+
+    folder = _other_file_system(tmp_path)
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_link_is_followed_wherever_it_leads(there: bool, elsewhere: Path, tmp_path: Path) -> None:
+    link, target = tmp_path / "link", elsewhere / "target"
+    if there:
+        target.write_text("old")
+    link.symlink_to(target)
+    assert main([*RUN, "--out", str(link)]) == 0
+    assert link.is_symlink()
+    assert target.read_text().startswith("time,")
+    assert [path.name for path in elsewhere.iterdir()] == ["target"]
+    assert {path.name for path in tmp_path.iterdir()} <= {"link", "elsewhere"}
+
+
+def test_a_link_that_leads_nowhere_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "lost").symlink_to(tmp_path / "no folder" / "file")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "folder").symlink_to(tmp_path)
+    for name, words in (
+        ("lost", "there is no folder"), ("loop", "leads back to itself"), ("folder", "is a folder"),
+    ):  # fmt: skip
+        assert main([*RUN, "--out", str(tmp_path / name)]) == 2
+        err = capsys.readouterr().err
+        assert words in err
+        assert err.count("\n") == 1
+
+
+IMPOSSIBLE = "[body]\nmoments=[200,10,20]\n[initial]\nomega=[0.1,1,0.2]\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        ("run --case 99 --method auto", 2),
+        ("run --scene impossible.toml --program two-term --steps 2 --out /dev/stdout", 0),
+        ("run --case 3 --program two-term >/dev/full", 2),
+    ],
+)
+def test_a_stderr_that_is_full_or_closed_has_no_say(
+    arguments: str, code: int, tmp_path: Path
+) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full here")
+    (tmp_path / "impossible.toml").write_text(IMPOSSIBLE)
+    command = f"{sys.executable} -m pyharness {arguments}"
+    wanted, *found = (
+        subprocess.run(
+            ["sh", "-c", f"{command} {redirection}"], cwd=tmp_path, capture_output=True, check=False
+        )
+        for redirection in ("", "2>/dev/full", "2>&-")
+    )
+    assert wanted.returncode == code
+    assert wanted.stderr.count(b"\n") == 1
+    for each in found:
+        assert (each.returncode, each.stdout, each.stderr) == (code, wanted.stdout, b"")
+
+
+def test_progress_falls_silent_where_the_terminal_goes_away(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from pyharness.cli.options import progress, warn
+
+    class Gone:
+        def isatty(self) -> bool:
+            return True
+
+        def write(self, _: str) -> int:
+            raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(sys, "stderr", Gone())
+    progress("1 of 2")
+    progress("2 of 2")
+    warn("what no one reads")

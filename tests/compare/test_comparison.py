@@ -1,0 +1,260 @@
+"""`compare`: what it finds, when it objects, and that its views say the same."""
+
+import csv
+import io
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, case_scene
+from pyharness.compare import comparison as room
+from pyharness.compare.agreement import accuracy, differences, distance, ulps
+from pyharness.compare.comparison import compare, listings_for
+from pyharness.compare.report import (
+    comparison_markdown,
+    comparison_rows,
+    comparison_table,
+    verdict,
+)
+from pyharness.methods.registry import PROGRAM_REGISTRY, SCIPY_METHODS
+from pyharness.model.build import build
+from pyharness.model.listing import corrected, original, subset
+from pyharness.model.trajectory import Trajectory
+from pyharness.truth.reference import reference
+from pyharness.views.pictures import comparison_picture
+from pyharness.views.records import comparison_record, json_text, run_record
+from pyharness.views.text import csv_text
+
+
+@pytest.fixture(scope="module")
+def case_2() -> room.Comparison:
+    return compare(case_scene(2), listings_for())
+
+
+def test_all_is_as_expected_in_every_case() -> None:
+    for case in range(1, 8):
+        found = compare(case_scene(case), listings_for())
+        assert found.unexpected == ()
+        assert [each.ulps for each in found.programs] == [0.0] * 6
+        for line in comparison_table(found).splitlines():
+            assert len(line) <= 100, line
+        assert found.not_judged == ()
+        assert " ".join(verdict(found)).startswith("as expected: Fortran = Python bit for bit in 6")
+
+
+def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> None:
+    """Case 2 as punched: step 25, by V2."""
+    lines = comparison_table(case_2).splitlines()
+    row = next(line for line in lines if line.startswith("runge-kutta") and "original" in line)
+    assert row.split()[2:5] == ["25", "V2", "3305>500"]
+
+
+def test_table_of_what_failed_and_of_large_quotients_fits() -> None:
+    found = compare(replace(case_scene(3), step_size=1e-5, steps=3), listings_for())
+    why = "Radau gave up at t = 49.568 s after 250000 right-hand sides; take a shorter time or less"
+    failed = replace(found.methods[-1], trajectory=None, accuracy=None, failure=why)
+    text = comparison_table(replace(found, methods=(*found.methods[:-1], failed)))
+    assert "U2 2.4e5>500" in text
+    assert f"failed: {failed.method}: {why}" in " ".join(text.split())
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_drift_only_without_torque(case_2: room.Comparison) -> None:
+    assert all(each.accuracy.energy is not None for each in case_2.programs)
+    found = compare(case_scene(5), listings_for(["runge-kutta"]))
+    assert found.programs[0].accuracy.momentum is None
+
+
+def test_methods_keep_to_their_tolerance_and_the_reference_to_its_error(
+    case_2: room.Comparison,
+) -> None:
+    assert [each.method for each in case_2.methods] == list(SCIPY_METHODS)
+    for each in case_2.methods:
+        assert each.accuracy is not None
+        assert 0.0 < max(each.accuracy.omega) <= 1e-8 * 10.0
+    assert case_2.reference.error < 3e-15
+
+
+def test_listings_for_the_options() -> None:
+    def labels(**options: object) -> list[tuple[str, str]]:
+        rows = listings_for(**options)  # type: ignore[arg-type]
+        return [(each.program, each.label) for each in rows]
+
+    assert len(labels()) == 6
+    assert labels(base="corrected") == [(p, "corrected") for p in PROGRAM_REGISTRY]
+    assert labels(programs=["four-term"], fix=["torque-held"]) == [
+        ("four-term", "original"),
+        ("four-term", "custom"),
+        ("four-term", "corrected"),
+    ]
+    # A defect goes to the programs that have it.
+    assert ("four-term", "custom") not in labels(fix=["stage-base"])
+    assert ("runge-kutta", "custom") in labels(fix=["stage-base"])
+    chosen = listings_for(readings=["c1-for-c"])
+    assert {each.program for each in chosen if each.readings} == {"two-term"}
+    with pytest.raises(InputError, match="unknown defect 'nonsense'"):
+        listings_for(fix=["nonsense"])
+    with pytest.raises(InputError, match="both --fix and --keep"):
+        listings_for(fix=["stage-base"], keep=["stage-base"])
+
+
+def _trajectory(omega: np.ndarray) -> Trajectory:
+    time = np.arange(1.0, len(omega) + 1.0)
+    return Trajectory(time, time, omega, None, len(omega), 0)
+
+
+def test_ulps_count_representable_values() -> None:
+    one = np.array([1.0])
+    assert ulps(one, one) == 0
+    assert ulps(one, np.nextafter(one, 2)) == 1
+    assert ulps(np.array([-1.0]), np.nextafter([-1.0], 0)) == 1
+    assert ulps(np.array([5e-324]), np.array([-5e-324])) == 3  # through -0 and +0
+    assert ulps(np.array([0.0]), np.array([-0.0])) == 1
+    assert ulps(np.array([np.nan]), np.array([np.nan])) == 0
+    assert ulps(np.array([np.nan]), one) == math.inf
+    assert ulps(np.array([np.inf]), np.array([np.finfo(float).max])) == 1
+    assert ulps(-one, one) == 2.0 * 0x3FF0000000000000 + 1
+
+
+def test_accuracy_against_known_numbers() -> None:
+    scene = replace(case_scene(4), steps=2)
+    truth = reference(scene, scene.times())
+    found = accuracy(scene, _trajectory(truth.omega + np.array([1e-3, -2e-3, 0.0])), truth)
+    np.testing.assert_allclose(found.omega, (1e-3, 2e-3, 0.0), rtol=1e-9, atol=1e-18)
+    np.testing.assert_allclose(found.error, [2e-3, 2e-3], rtol=1e-9)
+    stretched = accuracy(scene, _trajectory(truth.omega * 1.01), truth)
+    assert stretched.energy == pytest.approx(0.0201)
+    assert stretched.momentum == pytest.approx(0.0201)
+    # Along axis 3 alone: the drifts are its shares of I w**2 and of I**2 w**2.
+    along = accuracy(scene, _trajectory(truth.omega * [1.0, 1.0, 1.01]), truth)
+    for drift, weights in (
+        (along.energy, np.array(scene.moments)),
+        (along.momentum, np.array(scene.moments) ** 2),
+    ):
+        parts = weights * np.square(truth.omega[-1])
+        assert drift == pytest.approx(0.0201 * parts[2] / parts.sum(), rel=1e-3)
+
+
+def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exit code 1 hangs on this: plant a difference of one bit, and a program of no order."""
+    program = PROGRAM_REGISTRY["runge-kutta"]
+    real = type(program).run
+
+    def off_by_one_bit(self: object, *args: object, **kwargs: object) -> Trajectory:
+        run = real(self, *args, **kwargs)  # type: ignore[arg-type]
+        if "python" in args:
+            omega = run.omega.copy()
+            omega[7, 1] = np.nextafter(omega[7, 1], 0.0)
+            return replace(run, omega=omega)
+        return run
+
+    monkeypatch.setattr(type(program), "run", off_by_one_bit)
+    found = compare(case_scene(3), [corrected("runge-kutta")])
+    assert found.unexpected == ("runge-kutta corrected: Fortran and twin differ in omega",)
+    assert found.programs[0].ulps == 1
+    assert "UNEXPECTED" in comparison_table(found)
+
+    def wrong(self: object, *args: object, **kwargs: object) -> Trajectory:
+        run = real(self, *args, **kwargs)  # type: ignore[arg-type]
+        return replace(run, omega=run.omega * 1.0001)
+
+    monkeypatch.setattr(type(program), "run", wrong)
+    found = compare(case_scene(3), [corrected("runge-kutta")])
+    assert len(found.unexpected) == 1
+    assert "misses the reference" in found.unexpected[0]
+
+
+def test_views_carry_the_same_numbers(case_2: room.Comparison) -> None:
+    head, rows = comparison_rows(case_2)
+    table = list(csv.DictReader(io.StringIO(csv_text(head, rows))))
+    record = json.loads(json_text(comparison_record(case_2, build())))
+    assert record["schema"] == 1
+    assert len(table) == len(record["programs"]) + len(record["methods"]) == 10
+    for row, entry, each in zip(table, record["programs"], case_2.programs, strict=False):
+        assert row["method"] == entry["program"] == each.listing.program
+        assert float(row["error_w1"]) == entry["error"][0] == each.accuracy.omega[0]
+        assert int(row["steps"]) == entry["steps"] == each.trajectory.steps
+    assert table[4]["stop_variable"] == record["programs"][4]["stop"]["variable"] == "V2"
+    markdown = comparison_markdown(case_2).splitlines()
+    assert sum(line.startswith("| two-term") for line in markdown) == 2
+
+
+def test_number_that_is_not_finite_is_null() -> None:
+    text = json_text({"a": [1.0, math.inf, {"b": math.nan}], "c": (2.5,), "d": "x"})
+    assert json.loads(text) == {"a": [1.0, None, {"b": None}], "c": [2.5], "d": "x"}
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_picture_and_its_numbers(case_2: room.Comparison, suffix: str, tmp_path: Path) -> None:
+    files = comparison_picture(case_2, str(tmp_path / f"x.{suffix}"))
+    picture, numbers = files.values()
+    starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+    assert picture.startswith(starts[suffix])
+    assert str(tmp_path / "x.csv") in files
+    rows = list(csv.DictReader(io.StringIO(numbers.decode())))
+    # reference, five complete runs and one that stopped at step 25
+    assert len(rows) == 100 + 5 * 100 + 25
+    first = next(row for row in rows if row["method"] == "four-term")
+    assert float(first["omega1"]) == case_2.programs[2].trajectory.omega[0, 0]
+
+
+def test_diverging_program_leaves_the_picture_whole(tmp_path: Path) -> None:
+    """Case 6 reaches 1e111; no warning, no empty frame."""
+    found = compare(case_scene(6), listings_for())
+    assert len(comparison_picture(found, str(tmp_path / "x.png"))) == 2
+
+
+def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its order is nobody's due, and its steps are those that were run."""
+    monkeypatch.setattr(room, "_seconds", lambda run: 1.0)
+    listings = [corrected("two-term", ["c1-for-c"]), original("runge-kutta")]
+    reading, punched = compare(case_scene(2), listings).programs
+    assert reading.listing.label == "corrected"
+    assert reading.order is None
+    assert reading.seconds_per_step == 1.0 / 100.0
+    assert (punched.trajectory.steps, punched.seconds_per_step) == (25, 1.0 / 25.0)
+    with pytest.raises(InputError, match="'dt-accumulates' is given to both"):
+        subset("two-term", None, ["dt-accumulates"], ["dt-accumulates"])
+
+
+def test_bits_of_all_that_a_program_returns_are_held() -> None:
+    run = PROGRAM_REGISTRY["runge-kutta"].run(case_scene(2), original("runge-kutta"))
+    assert run.velocity is not None
+    assert run.stop is not None
+    assert differences(run, run) == []
+    assert distance(run, run) == 0.0
+    velocity = run.velocity.copy()
+    velocity[3, 1] = np.nextafter(velocity[3, 1], math.inf)
+    stop = replace(run.stop, quotient=np.nextafter(run.stop.quotient, math.inf))
+    for changed, name, ulp in (
+        (replace(run, velocity=velocity), "velocity", 1.0),
+        (replace(run, stop=stop), "stop", 0.0),
+        (replace(run, recorded_time=np.nextafter(run.recorded_time, 9.0)), "TIME", 1.0),
+        (replace(run, time=np.nextafter(run.time, 9.0)), "time", 0.0),
+    ):
+        assert differences(run, changed) == [name]
+        assert distance(run, changed) == ulp
+    shorter = _trajectory(np.ones((3, 3)))
+    assert distance(shorter, _trajectory(np.ones((2, 3)))) == math.inf
+    printed = PROGRAM_REGISTRY["two-term"].run(case_scene(2), corrected("two-term"))
+    assert printed.ier is not None
+    assert differences(printed, replace(printed, ier=printed.ier + 129)) == ["IER"]
+
+
+def test_largest_error_of_a_row_is_that_of_its_worst_component() -> None:
+    scene = replace(case_scene(4), steps=2)
+    truth = reference(scene, scene.times())
+    off = np.array([[1e-3, 0.0, 0.0], [0.0, -2e-3, 1e-4]])
+    found = accuracy(scene, _trajectory(truth.omega + off), truth)
+    np.testing.assert_allclose(found.error, [1e-3, 2e-3], rtol=1e-9)
+
+
+def test_record_of_a_run_has_the_time_that_the_program_recorded() -> None:
+    listing = original("two-term")
+    run = PROGRAM_REGISTRY["two-term"].run(case_scene(5), listing)
+    found = run_record(case_scene(5), "two-term", listing, run, build())["trajectory"]
+    assert found["recorded_time"] == run.recorded_time.tolist() != run.time.tolist()

@@ -1,0 +1,145 @@
+"""Random command lines: verbs and options as they are declared, values right, wrong and absurd."""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from random import Random
+
+from pyharness.cli.main import VERBS
+from pyharness.cli.options import FORMATS, Parser
+from pyharness.history.ablation import entries
+from pyharness.methods.prepared import PREPARED
+from pyharness.methods.registry import METHODS
+from pyharness.model.listing import PROGRAMS, names_of
+from tests.fuzz.strategies import mutated_word, number, scene_bytes, scene_text, tolerance
+
+# Verbs of which a valid command takes milliseconds. Any other, also one that is yet to come, gets
+# a mistake in every command line, and must find it.
+QUICK_VERBS = ("run", "plan", "defects", "doctor")
+
+# Files of every folder in which a command line is tried; what is not there is missing on purpose.
+GOOD, BAD, LONG_NAME = "good.toml", "bad.toml", "n" * 300
+_SPECIAL = (
+    "", ".", "..", "folder", "missing/x", "\0", "a\0b", "-", "--", LONG_NAME, "\udcff.toml",
+    "/dev/null", "/dev/full", "/dev/zero", "/dev/stdin", "pipe", "locked", "/proc/self/mem",
+)  # fmt: skip
+_NUMBERS = (
+    "", " ", "0", "-0", "1", "-1", "1e400", "-1e400", "nan", "inf", "-inf", "1e-400", "5e-324",
+    "1e308", "0x10", "1_0", "\uff11", "٣", "1,2,3", "1,,2", ",", "1e", "--1", "1.5", "9" * 400,
+    "9" * 5000, "1" + "0" * 4000, "true", "NULL", "1;2;3", "1 2 3",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class CommandLine:
+    """Arguments, the scene file that they may name, and whether they hold a sure mistake."""
+
+    arguments: tuple[str, ...]
+    scene: bytes
+    mistaken: bool
+
+
+def command_line(random: Random) -> CommandLine:
+    """Return a command line of a few options, most often of a verb that there is."""
+    verb = random.choice(list(VERBS))
+    if random.random() < 0.5:
+        verb = random.choice(QUICK_VERBS)
+    content = scene_bytes(random) if random.random() < 0.5 else scene_text(random).encode()
+    if random.random() < 0.03:
+        words = [mutated_word(random, verb), *(mutated_word(random, "x") for _ in range(2))]
+        return CommandLine(tuple(each for each in words if each not in VERBS), content, False)
+    arguments = [verb]
+    parser = _parser(verb)
+    for option in _usual(random, verb):
+        arguments += _given(random, parser, option)
+    names = [name for name in parser.option_names() if name != "--help"]
+    for _ in range(random.choice((0, 0, 0, 1, 1, 2, 6))):
+        arguments += _given(random, parser, random.choice(names))
+    if random.random() < 0.1:
+        place = random.randrange(1, len(arguments) + 1)
+        arguments.insert(place, mutated_word(random, random.choice((*names, "x", "--help"))))
+    if random.random() < 0.03:
+        arguments[1:] = random.sample(arguments[1:], len(arguments) - 1)
+    mistaken = verb not in QUICK_VERBS
+    if mistaken:
+        arguments.append(random.choice(("--no-such-option", "--format=no-such-format")))
+    # A path of the machine's own is no place to write to by chance.
+    harmless = [each for each in arguments if "/" not in each or each in _SPECIAL]
+    return CommandLine(tuple(harmless), content, mistaken and harmless[-1] == arguments[-1])
+
+
+def furnish(folder: Path, content: bytes) -> None:
+    """Make the files that command lines name."""
+    (folder / GOOD).write_text("[body]\nmoments=[4,3,2]\n[initial]\nomega=[0,1,2]\n[run]\nsteps=3")
+    (folder / BAD).write_bytes(content)
+    if not (folder / "folder").exists():
+        (folder / "folder").mkdir()
+        os.mkfifo(folder / "pipe")
+        (folder / "locked").touch(mode=0)
+
+
+def _parser(verb: str) -> Parser:
+    parser = Parser(verb, "")
+    import_module(f"pyharness.cli.verbs.{verb}").declare(parser)
+    return parser
+
+
+def _usual(random: Random, verb: str) -> list[str]:
+    """Return the options without which a verb has nothing to do."""
+    usual = {"run": ["--scene", "--program"], "plan": ["--scene"], "compare": ["--case"]}
+    options = usual.get(verb, [])
+    if random.random() < 0.4:
+        options = [each.replace("--scene", "--case") for each in options]
+    if random.random() < 0.4:
+        options = [each.replace("--program", "--method") for each in options]
+    return options if random.random() < 0.95 else []
+
+
+def _given(random: Random, parser: Parser, option: str) -> list[str]:
+    action = parser._option_string_actions[option]
+    if action.nargs == 0:
+        return [option]
+    value = _plausible(random, option)
+    kind = random.random()
+    if kind < 0.10:
+        value = mutated_word(random, value)
+    elif kind < 0.18:
+        value = random.choice(_NUMBERS)
+    elif kind < 0.20:
+        return [option]
+    return [f"{option}={value}"] if random.random() < 0.2 else [option, value]
+
+
+def _plausible(random: Random, option: str) -> str:
+    """Return a value that the option might take."""
+
+    def listed(names: tuple[str, ...] | list[str]) -> str:
+        return ",".join(random.choice(names) for _ in range(random.choice((1, 1, 2, 3))))
+
+    def numbers(count: int) -> str:
+        return ",".join(f"{number(random, 0.2):.6g}" for _ in range(count))
+
+    defects, readings = names_of("defect"), names_of("reading")
+    choices: dict[str, Callable[[], str]] = {
+        "--case": lambda: str(random.randint(0, 8)),
+        "--scene": lambda: random.choice((GOOD, GOOD, BAD, BAD, random.choice(_SPECIAL))),
+        "--omega0": lambda: numbers(random.choice((3, 3, 3, 2))),
+        "--step-size": lambda: numbers(1),
+        "--steps": lambda: str(random.choice((1, 2, 3, 7, 30, 0, -1))),
+        "--program": lambda: random.choice(PROGRAMS),
+        "--method": lambda: random.choice((*METHODS, *METHODS, *PREPARED)),
+        "--implementation": lambda: random.choice(("fortran", "python")),
+        "--listing": lambda: random.choice(("original", "corrected")),
+        "--fix": lambda: listed(defects),
+        "--keep": lambda: listed(defects),
+        "--reading": lambda: listed(readings),
+        "--format": lambda: random.choice((*FORMATS, "printer", "tape5")),
+        "--out": lambda: random.choice(("out.txt", "out.txt", *_SPECIAL)),
+        "--plot": lambda: random.choice(("x.gif", "x", ".png", *_SPECIAL)),
+        "--tolerance": lambda: f"{tolerance(random):.3g}",
+        "--times": lambda: numbers(random.choice((1, 2, 3))),
+        "--kind": lambda: str(random.choice(entries())["kind"]),
+    }
+    return choices.get(option, lambda: random.choice(("1", "2", "x")))()

@@ -1,0 +1,374 @@
+"""Random inputs of every kind, from one generator each: the test-suite and the campaign share them.
+
+A generator takes a `random.Random`: hypothesis hands in one that it can shrink, the campaign one
+that a seed and a number make again.
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+from pyharness import InputError, Scene, TorqueLaw
+from pyharness.methods.prepared import PREPARED
+from pyharness.methods.registry import METHODS
+from pyharness.model.listing import PROGRAMS, Listing, names_of
+from pyharness.model.scene import Triple, Wave
+
+_CORNERS = (
+    0.0, -0.0, 1.0, -1.0, 0.5, 1 / 3, 5e-324, -5e-324, 2.2250738585072014e-308, 1e-300, 1e-160,
+    1e-155, 2.0**-53, 1e15, 1e16, 1e154, 1e155, 1e300, 1e308, 1.7976931348623157e308, -1e308,
+)  # fmt: skip
+_WORDS = (
+    "",
+    "text",
+    "ü",
+    "日本",
+    "\U0001f600",
+    "a b",
+    "0",
+    "-",
+    "--",
+    "None",
+    "é" * 40,
+    "x" * 3000,
+)
+
+
+def _sign(random: Random) -> float:
+    return random.choice((-1.0, 1.0))
+
+
+def violent(random: Random) -> float:
+    """Return a finite number of any size."""
+    kind = random.randrange(4)
+    if kind == 0:
+        return random.choice(_CORNERS)
+    if kind == 1:
+        return _sign(random) * math.pow(10.0, random.uniform(-308.0, 308.0))
+    if kind == 2:
+        return _sign(random) * math.pow(10.0, random.uniform(-9.0, 9.0))
+    value: float = struct.unpack("<d", random.getrandbits(64).to_bytes(8, "little"))[0]
+    return value if abs(value) < float("inf") else 0.0
+
+
+def tame(random: Random) -> float:
+    """Return a number that a user might give."""
+    kind = random.randrange(3)
+    if kind == 0:
+        return float(random.randint(-10, 10))
+    return random.uniform(-10.0, 10.0) * (1.0 if kind == 1 else 10.0 ** random.uniform(-3.0, 3.0))
+
+
+def number(random: Random, violence: float) -> float:
+    """Return a finite number, violent as often as `violence` says."""
+    return violent(random) if random.random() < violence else tame(random)
+
+
+def _triple(random: Random, violence: float) -> Triple:
+    if random.random() < 0.15:
+        return 0.0, 0.0, 0.0
+    first, second, third = (number(random, violence) for _ in range(3))
+    if random.random() < 0.15:
+        second = first
+    return first, second, third
+
+
+def _waves(random: Random, violence: float) -> tuple[Wave, ...]:
+    count = random.choice((0, 0, 0, 1, 1, 2, 5))
+    return tuple((_triple(random, violence), number(random, violence)) for _ in range(count))
+
+
+def scene(random: Random, most_steps: int = 12) -> Scene:
+    """Return a scene that is valid, tame or violent in part or altogether."""
+    while True:
+        violence = random.choice((0.0, 0.1, 0.3, 1.0))
+        law = TorqueLaw()
+        if random.random() < 0.6:
+            waves = random.random() < 0.5
+            law = TorqueLaw(
+                _triple(random, violence),
+                _triple(random, violence) if random.random() < 0.5 else (0.0, 0.0, 0.0),
+                _waves(random, violence) if waves else (),
+                _waves(random, violence) if waves else (),
+            )
+        first, second, third = body = _triple(random, violence)
+        by_moments = random.random() < 0.6
+        moments = (abs(first) or 1.0, abs(second) or 1.0, abs(third) or 1.0)
+        step_size = 0.01 if random.random() < 0.5 else abs(number(random, violence)) or 0.1
+        try:
+            return Scene(
+                "random",
+                _triple(random, violence),
+                moments=moments if by_moments else None,
+                coefficients=None if by_moments else body,
+                torque=law,
+                step_size=step_size,
+                steps=random.randint(1, most_steps),
+            )
+        except InputError:
+            continue
+
+
+@dataclass(frozen=True)
+class ProgramInput:
+    """A run of a program, in both languages."""
+
+    scene: Scene
+    listing: Listing
+    lipschitz: float
+    may_stop: bool
+
+
+def program_input(random: Random) -> ProgramInput:
+    """Return a scene, any listing, and a stop test."""
+    program = random.choice(PROGRAMS)
+    readings = [name for name in names_of("reading", program) if random.random() < 0.3]
+    defects = [name for name in names_of("defect", program) if random.random() < 0.5]
+    return ProgramInput(
+        scene(random),
+        Listing(program, frozenset(defects), frozenset(readings)),
+        abs(number(random, 0.5)) or 500.0,
+        random.random() < 0.5,
+    )
+
+
+@dataclass(frozen=True)
+class MethodInput:
+    """A call of `solve` by a method of the registry."""
+
+    scene: Scene
+    times: tuple[float, ...]
+    method: str
+    tolerance: float
+
+
+def tolerance(random: Random) -> float:
+    """Return a tolerance, most often one that is allowed."""
+    if random.random() < 0.1:
+        return random.choice((violent(random), float("nan"), float("inf"), 1.0, 1e-15, 1e-16))
+    return math.pow(10.0, random.uniform(-15.0, 0.0))
+
+
+def times(random: Random) -> tuple[float, ...]:
+    """Return times, most often in order, on one side of 0 or on both."""
+    violence = random.choice((0.0, 0.0, 0.2, 1.0))
+    values = [abs(number(random, violence)) for _ in range(random.choice((1, 1, 2, 5)))]
+    if random.random() < 0.05:
+        return random.choice(
+            ((), (1.0, 1.0), (-1.0, 1.0), (float("nan"),), (float("inf"),), (1.0, 3.0, 2.0))
+        )
+    sign = _sign(random)
+    turned = random.random() < 0.1
+    if random.random() < 0.2:
+        values = [_sign(random) * t for t in values]
+    return tuple(sign * t for t in sorted(set(values), reverse=turned))
+
+
+def method_input(random: Random) -> MethodInput:
+    """Return a scene, times, and any method with any tolerance."""
+    method = random.choice(list(METHODS))
+    asked = tolerance(random)
+    if METHODS[method].finest == 1.0 and random.random() < 0.9:
+        asked = 1.0
+    found, wanted = scene(random), times(random)
+    rate = max(map(abs, found.euler_coefficients)) * max(map(abs, found.omega))
+    longest = max(map(abs, wanted), default=0.0)
+    if random.random() < 0.85 and 0.0 < rate * longest < float("inf"):
+        # Most often so short that no method gives up, which takes some of them ten seconds.
+        shrink = min(1.0, 10.0 ** random.uniform(-3.0, 3.0) / (rate * longest))
+        wanted = tuple(t * shrink for t in wanted)
+    return MethodInput(found, wanted, method, asked)
+
+
+@dataclass(frozen=True)
+class PreparedInput:
+    """A prepared solver and a call of it."""
+
+    scene: Scene
+    method: str
+    tolerance: float
+    omega0: Triple
+    t_end: float
+
+
+def prepared_input(random: Random) -> PreparedInput:
+    """Return a scene, any method that can be prepared, and what it is called with."""
+    found = scene(random)
+    omega0 = found.omega if random.random() < 0.5 else _triple(random, 0.3)
+    t_end = number(random, random.choice((0.0, 0.3, 1.0)))
+    if random.random() < 0.05:
+        odd = random.choice((float("nan"), float("inf"), -float("inf")))
+        omega0, t_end = random.choice((((odd, 1.0, 2.0), t_end), (omega0, odd)))
+    return PreparedInput(found, random.choice(PREPARED), tolerance(random), omega0, t_end)
+
+
+@dataclass(frozen=True)
+class ListingInput:
+    """What --program, --listing, --fix, --keep and --reading say."""
+
+    program: str
+    base: str | None
+    fix: tuple[str, ...]
+    keep: tuple[str, ...]
+    readings: tuple[str, ...]
+
+
+def listing_input(random: Random) -> ListingInput:
+    """Return names, known or not, in any combination."""
+
+    def several(kind: str) -> tuple[str, ...]:
+        known = [*names_of("defect"), *names_of("reading")] if kind == "any" else names_of(kind)
+        count = random.choice((0, 0, 1, 1, 2, 3))
+        return tuple(
+            mutated_word(random, random.choice(known))
+            if random.random() < 0.15
+            else random.choice(known)
+            for _ in range(count)
+        )
+
+    kind = random.choice(("defect", "defect", "defect", "any"))
+    return ListingInput(
+        mutated_word(random, random.choice(PROGRAMS))
+        if random.random() < 0.05
+        else random.choice(PROGRAMS),
+        random.choice((None, None, "original", "corrected", "", "mended")),
+        several(kind),
+        several(kind),
+        several("reading" if kind == "defect" else kind),
+    )
+
+
+def mutated_word(random: Random, word: str) -> str:
+    """Return a word with a typing error, or another one; none has a path's separator."""
+    kind = random.randrange(6)
+    place = random.randrange(len(word) + 1)
+    if kind == 0:
+        result = word[:place] + word[place + 1 :]
+    elif kind == 1:
+        result = word[:place] + chr(random.choice((0x20, 0x2C, 0xFC, 0x1B, 0xA, 0x2028))) + word
+    elif kind == 2:
+        result = word.upper()
+    elif kind == 3:
+        result = random.choice(_WORDS)
+    elif kind == 4:
+        result = "".join(chr(random.randrange(1, 0x3000)) for _ in range(random.randrange(12)))
+    else:
+        result = word + chr(random.choice((0xDC80, 0xDCFF, 0x301, 0x1F600)))
+    return result.replace("/", "|")
+
+
+def scene_text(random: Random) -> str:
+    """Return a valid scene file."""
+    found = scene(random, 200)
+    body = "moments" if found.moments else "coefficients"
+    lines = [f'name = "{random.choice(("brick", "ü", "a b", ""))}"'] * (random.random() < 0.5)
+    lines += ["[body]", f"{body} = {_list(found.moments or found.coefficients or ())}"]
+    lines += ["[initial]", f"omega = {_list(found.omega)}"]
+    if random.random() < 0.6:
+        law = found.torque
+        lines += ["[torque]", f"constant = {_list(law.constant)}", f"rate = {_list(law.rate)}"]
+        for kind, waves in (("sines", law.sines), ("cosines", law.cosines)):
+            entries = [f"{{ amplitude = {_list(a)}, frequency = {f!r} }}" for a, f in waves]
+            lines.append(f"{kind} = [{', '.join(entries)}]")
+    if random.random() < 0.6:
+        lines += ["[run]", f"step_size = {found.step_size!r}", f"steps = {found.steps}"]
+    return "\n".join(lines) + "\n"
+
+
+def _list(values: Any) -> str:
+    return "[" + ", ".join(map(repr, values)) + "]"
+
+
+_VALUES = (
+    "1e400", "-1e400", "1e-400", "inf", "-inf", "nan", "1979-05-27", "07:32:00",
+    "1979-05-27T07:32:00Z", "true", '"text"', "'x'", "[]", "{}", "[[1]]", "[1,2]", "[1,2,3,4]",
+    "{a=1}", "[{}]", "[1,[2],3]", "0x10", "0b1", "0o7", "1_000", "-0.0", "5e-324", "+1",
+    "01", "1.", ".5", "1e", "", "''' '''", '"\\u0000"', '"\\ud800"', "0", "-1", "1.5", "[0,0,0]",
+)  # fmt: skip
+_KEYS = (
+    "name", "body", "initial", "torque", "run", "moments", "coefficients", "omega", "constant",
+    "rate", "sines", "cosines", "amplitude", "frequency", "step_size", "steps", "x", '""', '"ü"',
+)  # fmt: skip
+
+
+def scene_bytes(random: Random) -> bytes:
+    """Return a scene file with faults: in its values, its keys, its syntax, its bytes."""
+    text = scene_text(random)
+    for _ in range(random.choice((0, 1, 1, 1, 2, 4))):
+        text = _mutated_text(random, text)
+    content = text.encode("utf-8", "surrogatepass")
+    for _ in range(random.choice((0, 0, 0, 1, 1, 3))):
+        content = _mutated_bytes(random, content, text)
+    return content
+
+
+def _value(random: Random) -> str:
+    kind = random.randrange(12)
+    if kind == 0:
+        return random.choice("123456789") + "0" * random.choice((20, 309, 400, 4000, 5000))
+    if kind == 1:
+        return "0x" + "F" * random.choice((16, 300, 5000))
+    if kind == 2:
+        return "[" * random.choice((3, 200, 5000)) + "1"
+    if kind == 3:
+        depth = random.choice((3, 100, 400))
+        return "[" * depth + "1" + "]" * depth
+    if kind == 4:
+        return "{a=" * 50 + "1" + "}" * 50
+    if kind == 5:
+        return "[" + "1.0," * random.choice((4, 3000)) + "]"
+    if kind == 6:
+        return repr(number(random, 0.7))
+    return random.choice(_VALUES)
+
+
+def _mutated_text(random: Random, text: str) -> str:
+    lines = text.split("\n")
+    place = random.randrange(len(lines))
+    kind = random.randrange(10)
+    if kind <= 3:
+        key, separator, _ = lines[place].partition(" = ")
+        lines[place] = key + separator + _value(random) if separator else lines[place]
+    elif kind == 4:
+        lines.insert(place, lines[random.randrange(len(lines))])
+    elif kind == 5:
+        del lines[place]
+    elif kind == 6:
+        lines.insert(place, f"{random.choice(_KEYS)} = {_value(random)}")
+    elif kind == 7:
+        lines.insert(
+            place, "[" + ".".join([random.choice(_KEYS)] * random.choice((1, 2, 500))) + "]"
+        )
+    elif kind == 8:
+        lines.insert(place, f"[[{random.choice(_KEYS)}]]")
+    else:
+        random.shuffle(lines)
+    return "\n".join(lines)
+
+
+def _mutated_bytes(random: Random, content: bytes, text: str) -> bytes:
+    place = random.randrange(len(content) + 1)
+    kind = random.randrange(11)
+    if kind == 0:
+        return content[:place]
+    if kind == 1:
+        return content[:place] + bytes([random.randrange(256)]) + content[place + 1 :]
+    if kind == 2:
+        return content[:place] + random.randbytes(random.randrange(20)) + content[place:]
+    if kind == 3:
+        return content[:place] + b"\0" + content[place:]
+    if kind == 4:
+        return b"\xef\xbb\xbf" + content
+    if kind == 5:
+        return text.encode(random.choice(("utf-16", "utf-32", "utf-7")), "replace")
+    if kind == 6:
+        return text.replace("brick", "ü").encode("latin-1", "replace")
+    if kind == 7:
+        return content.replace(b"\n", random.choice((b"\r\n", b"\r", b"\n\n", b"\0")))
+    if kind == 8:
+        return content[:place] + content[:place] + content[place:]
+    if kind == 9:
+        return content + b"#" * random.choice((10, 999_000, 1_100_000))
+    return b""

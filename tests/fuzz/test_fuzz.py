@@ -1,0 +1,292 @@
+"""Random input of every kind, and what it has found: no traceback, no hang, no crash."""
+
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pyharness import InputError, Scene, TorqueLaw, prepare, read_scene, solve
+from pyharness.cli.main import main
+from pyharness.history.limits import limit
+from pyharness.methods.prepared import PREPARED
+from pyharness.model.errors import printable
+from pyharness.model.trajectory import Trajectory
+from tests.fuzz import campaign as fuzz
+from tests.fuzz.checks import KINDS, tried
+
+# The campaign (`python -m tests.fuzz`) tries more.
+EXAMPLES = {
+    "scene-file": 150, "program": 150, "method": 0, "prepared": 60, "listing": 150, "command": 60,
+    "process": 2,
+}  # fmt: skip
+BODY = "[body]\nmoments=[3,2,1]\n[initial]\nomega=[1,2,3]\n"
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("kind", [kind for kind, count in EXAMPLES.items() if count])
+def test_random_input_is_solved_or_refused_in_one_line(kind: str, tmp_path: Path) -> None:
+    checks = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
+
+    # The same examples each time, so that what fails here fails again; the campaign varies.
+    @settings(
+        max_examples=EXAMPLES[kind], deadline=None, database=None, derandomize=True,
+        suppress_health_check=checks,
+    )  # fmt: skip
+    @given(st.randoms(use_true_random=False))
+    def every(random: Random) -> None:
+        tried(kind, KINDS[kind].make(random), tmp_path)
+
+    every()
+
+
+def test_every_kind_is_in_the_suite_and_in_the_campaign() -> None:
+    assert set(EXAMPLES) == set(fuzz.SHARES) == set(KINDS)
+    assert sum(fuzz.SHARES.values()) == 1000
+
+
+def test_input_is_the_same_for_the_same_seed_and_number() -> None:
+    for kind in KINDS:
+        assert repr(fuzz.made(kind, 1, 2)) == repr(fuzz.made(kind, 1, 2))
+        assert repr(fuzz.made(kind, 1, 2)) != repr(fuzz.made(kind, 2, 2))
+
+
+FAULTS: dict[str, tuple[str, str, Callable[..., object]]] = {
+    "traceback": ("listing", "tests.fuzz.checks.subset", lambda *_: _raised(KeyError())),
+    "lines": ("scene-file", "tests.fuzz.checks.read_scene", lambda _: _raised(ValueError("a\nb"))),
+    "nan": ("method", "tests.fuzz.checks.solve", lambda s, t, *_: _not_a_number(s, t)),
+    "bits": ("program", "tests.fuzz.checks.differences", lambda *_: ["omega"]),
+    "code": ("command", "tests.fuzz.checks.main", lambda _: 3),
+    "silence": ("command", "tests.fuzz.checks.main", lambda _: 2),
+}
+
+
+def _raised(error: Exception) -> None:
+    raise error
+
+
+def _not_a_number(scene: Scene, times: tuple[float, ...]) -> Trajectory:
+    time = np.array(times)
+    return Trajectory(time, time, np.full((len(times), 3), math.nan), None, 0, 0)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_seen(fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every check fails where what it checks is wrong."""
+    kind, name, planted = FAULTS[fault]
+    monkeypatch.setattr(name, planted)
+    given_input = next(
+        found for n in range(99) if getattr(found := fuzz.made(kind, 1, n), "times", True)
+    )
+    with pytest.raises(AssertionError, match="input: "):
+        tried(kind, given_input, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("os.kill(os.getpid(), 11)", "ended with -11"),
+        ("time.sleep(60)", "no end within"),
+    ],
+)
+def test_worker_that_dies_or_hangs_is_a_fault_of_its_input(
+    fault: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A campaign whose worker is replaced by one that does not come back."""
+    worker = tmp_path / "python"
+    code = f"import os, time; print('at 7', flush=True); {fault}"
+    worker.write_text(f'#!/bin/sh\nexec {sys.executable} -c "{code}"\n')
+    worker.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(worker))
+    monkeypatch.setattr(fuzz, "PATIENCE", 1.0)
+    go_on, faults = fuzz._watched("listing", 1, 5, 9)
+    assert go_on == 8
+    assert len(faults) == 1
+    assert "--number 7" in faults[0]
+    assert words in faults[0]
+
+
+# What the campaign, or the reading before it, found.
+
+
+@pytest.mark.parametrize("steps", ["1" + "0" * 400, "0x" + "F" * 5000])
+def test_number_of_steps_beyond_every_float(steps: str, tmp_path: Path) -> None:
+    """OverflowError, and ValueError where Python would not write so many digits."""
+    (tmp_path / "scene.toml").write_text(BODY + f"[run]\nsteps={steps}\n")
+    with pytest.raises(InputError, match="a number of more than 18 digits"):
+        read_scene(tmp_path / "scene.toml")
+    if steps.isdigit():
+        assert main(["run", "--case", "3", "--program", "two-term", "--steps", steps]) == 2
+
+
+def test_message_is_one_line_that_a_terminal_can_show() -> None:
+    """Names with line feeds, escapes and 4000 letters were given back as they were."""
+    assert str(InputError("a\nb\x1b[1m\udcff")) == "a b\\x1b[1m\\udcff"
+    assert len(str(InputError("where: " + "x" * 5000 + "; allowed: y"))) < 1000
+    assert str(InputError("x" * 5000 + "; allowed: y")).endswith("; allowed: y")
+    assert printable("ü 日本") == "ü 日本"
+
+
+def test_pipe_without_another_end_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both hung: a scene from a pipe that no one writes, a result to one that no one reads."""
+    monkeypatch.setattr("pyharness.model.pipes.PATIENCE", 0.05)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert main(["plan", "--scene", str(pipe)]) == 2
+    assert "nothing came within 0.05 s" in capsys.readouterr().err
+    assert main(["doctor", "--out", str(pipe)]) == 2
+    assert "no one read it within 0.05 s" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_scene_comes_through_a_pipe() -> None:
+    command = f"printf '{BODY}' | {sys.executable} -m pyharness plan --scene /dev/stdin"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=True)
+    assert "I = (3, 2, 1) kg m2" in done.stdout
+
+
+@pytest.mark.parametrize("arguments", [["doctor"], ["--help"]])
+def test_standard_output_that_is_full_or_closed(arguments: list[str]) -> None:
+    """Both ended in a traceback."""
+    for place, words in ((">/dev/full", "No space left"), (">&-", "closed")):
+        command = f"{sys.executable} -m pyharness {' '.join(arguments)} {place}"
+        done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        assert done.stderr.startswith("pyharness: standard output")
+        assert words in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+def test_name_that_the_terminal_or_the_picture_can_not_write(tmp_path: Path) -> None:
+    """UnicodeEncodeError; and a name with dollars was read as a formula by the picture."""
+    path = tmp_path / "\udcff ü.toml"
+    path.write_text(BODY + "[run]\nsteps=3\n")
+    command = [sys.executable, "-m", "pyharness", "run", "--program", "two-term", "--scene"]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run([*command, str(path)], capture_output=True, env=environment, check=True)
+    assert done.stdout.startswith(b"\\udcff \\xfc\n")
+    assert done.stderr == b""
+    path.write_text('name = "$\\\\frac$ \\u0007"\n' + BODY + "[run]\nsteps=3\n")
+    picture = tmp_path / "x.svg"
+    arguments = ["run", "--scene", str(path), "--program", "two-term", "--plot", str(picture)]
+    assert main([*arguments, "--out", str(tmp_path / "x.txt")]) == 0
+    assert picture.exists()
+
+
+def test_two_dashes_are_no_value(capsys: pytest.CaptureFixture[str]) -> None:
+    """Argparse makes an empty list of them, where text is expected: TypeError."""
+    assert main(["defects", "--out=--"]) in (0, 2)
+    assert main(["doctor", "--format=--"]) == 2
+    assert capsys.readouterr().err.endswith("allowed: table, json\n") or sys.version_info < (3, 13)
+
+
+def test_torque_over_a_tiny_moment_is_refused() -> None:
+    """NumPy warned of an overflow, on stderr."""
+    scene = Scene(
+        "", (1.0, 2.0, 3.0), moments=(1.0, 5e-324, 1.0), torque=TorqueLaw((1.0, 1.0, 1.0))
+    )
+    for call in (lambda: prepare(scene, "taylor"), lambda: solve(scene, [1.0], "gauss-4")):
+        with pytest.raises(InputError, match="not finite"):
+            call()
+
+
+@pytest.mark.parametrize("method", PREPARED)
+def test_start_that_is_not_finite_is_not_complete(method: str) -> None:
+    """At time 0 it came back as it was, and the status was `complete`."""
+    law = TorqueLaw() if method == "closed-form" else TorqueLaw((0.0, 0.0, 1.0))
+    solver = prepare(Scene("", (1.0, 2.0, 3.0), moments=(0.5, 0.7, 1.0), torque=law), method, 1e-3)
+    for start in (math.nan, math.inf):
+        assert np.isnan(solver(np.array([start, 1.0, 2.0]), 0.0)).all()
+        assert solver.status != "complete"
+
+
+def test_many_steps_are_given_up_before_they_are_taken() -> None:
+    """A minute and more: the limits did not know what a wave costs."""
+    law = TorqueLaw(sines=(((1.0, 2.0, 3.0), 17.0),) * 40)
+    scene = Scene("", (1.0, 2.0, 3.0), moments=(4.0, 3.0, 2.0), torque=law, step_size=1e-6)
+    for method, longest in (("rk4", 6.0), ("improved-euler", 6.0), ("gauss-2", 6.0)):
+        solver = prepare(scene, method)
+        solver(np.array(scene.omega), longest)
+        assert (solver.status, solver.steps) == ("gave up", 0)
+
+
+@pytest.mark.parametrize("stages", [1, 3, 5])
+def test_gauss_that_blows_up_before_the_first_time(stages: int) -> None:
+    """ValueError: the largest of no rows."""
+    scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))  # infinite at t = 1
+    found = solve(scene, [2.0, 3.0], f"gauss-{stages}", 1e-6)
+    assert (found.ended, len(found.time)) == ("overflow", 0)
+
+
+def test_gauss_does_not_take_growth_for_a_blow_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From rest, ever faster, and too far for it: it has to give up, not to tell of infinity."""
+    monkeypatch.setattr("pyharness.methods.gauss._MOST_EVALUATIONS", 1_000_000)
+    law = TorqueLaw((-0.5, 6.0, -9.8))
+    scene = Scene("", (0.0, 0.0, 0.0), coefficients=(-1.67, -1.2, 3.0), torque=law)
+    with pytest.raises(InputError, match="gave up"):
+        solve(scene, [3000.0], "gauss-1", 1e-2)
+
+
+def test_gauss_at_time_0_of_a_motion_beyond_every_rate() -> None:
+    """ZeroDivisionError: no step is small enough."""
+    scene = Scene("", (1e300, -3e16, 1e16), coefficients=(1e100, -1e100, 1.0))
+    assert solve(scene, [0.0], "gauss-1", 1e-6).omega.tolist() == [[1e300, -3e16, 1e16]]
+    with pytest.raises(InputError, match="gave up"):
+        solve(scene, [1.0], "gauss-1", 1e-6)
+
+
+def test_taylor_row_on_the_way_to_an_overflow_is_finite() -> None:
+    law = TorqueLaw((1.0, 1.0, 2e-308), (1.7976931348623157e308, 2e5, -8e-147))
+    scene = Scene("", (7e-63, 5e-242, -3e-86), coefficients=(1.2e5, 1.5e183, 2.5e297), torque=law)
+    found = solve(scene, [-0.0, -10.0], "taylor", 1e-10)
+    assert found.ended == "overflow"
+    assert np.isfinite(found.omega).all()
+
+
+def test_scipy_meets_no_infinity_where_there_is_none_and_says_so_where_there_is() -> None:
+    """Radau: ValueError from a matrix of infinities; LSODA: a warning on stderr."""
+    law = TorqueLaw((-4.8e-92, -7.5e113, 2.2e165))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    found = solve(scene, [0.09], "radau", 1e-7).omega[0]
+    np.testing.assert_allclose(found, 0.09 * np.array(law.constant), rtol=1e-7, atol=1e157)
+    assert solve(scene, [1e200], "radau", 1e-7).ended == "overflow"
+    law = TorqueLaw((0.0, 0.0, 0.0), (-10.0, -76.0, 4.6e272))
+    scene = Scene("", (0.0, 0.0, 9.0), coefficients=(-3.0, -4.0, -7.0), torque=law)
+    assert solve(scene, [-0.48, -2353.0], "lsoda", 5e-7).ended == "overflow"
+
+
+def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A right-hand side of Radau costs more than that of the others: half a minute and more."""
+    monkeypatch.setattr("pyharness.methods.scipy_ivp._MOST_EVALUATIONS", 3_000)
+    waves = (((1.0, 2.0, 3.0), 1e4),) * 8
+    for law, method, most in (
+        (TorqueLaw((1e42, 0.0, 0.0)), "dop853", 3000),
+        (TorqueLaw((1e42, 0.0, 0.0)), "radau", 1500),
+        (TorqueLaw((1e42, 0.0, 0.0), sines=waves), "dop853", 1500),
+    ):
+        scene = Scene("", (1.0, 1.0, 9.0), moments=(4.0, 7.0, 8.5), torque=law)
+        with pytest.raises(InputError, match=f"after {most} right-hand"):
+            solve(scene, [0.7], method, 1e-9)
+
+
+def test_reference_as_a_method_gives_up_in_time() -> None:
+    """It took minutes; whoever asks `pyharness.truth.reference` may wait as long."""
+    scene = Scene("", (0.01, 7.0, -9.7), moments=(9.85, 2.99, 1800.0))
+    with pytest.raises(InputError, match="more than 20000 Taylor steps"):
+        solve(scene, [1000.0], "reference", 1e-10)
+
+
+def test_limits_of_a_scene_that_its_solver_can_not_begin() -> None:
+    """AttributeError: no rows are a list, not an array."""
+    coefficients = (1.1e-16, 1.1e-16, 4.4e17)
+    scene = Scene("", (0.005, -5.0, -1.6), coefficients=coefficients, step_size=0.6, steps=4)
+    assert math.isnan(limit("two-term", scene, 1).order)

@@ -1,0 +1,225 @@
+"""Ctrl-C: it ends every kernel at once, and leaves the interpreter as it was."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.integrate  # noqa: F401  (what Ctrl-C meets within its import may be lost)
+
+from pyharness.methods import kernels
+from pyharness.methods.kernels import extension, run
+from pyharness.methods.prepared import prepare, solve
+from pyharness.model.listing import corrected
+from pyharness.model.scene import Scene, TorqueLaw, Wave
+
+# An idle machine needs some hundredths of a second; each call would take many seconds.
+PATIENCE = 1.5
+
+FREE = Scene("free", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0))
+PUSHED = replace(FREE, torque=TorqueLaw(constant=(1.0, 2.0, 3.0)))
+
+
+def _waves(count: int) -> tuple[Wave, ...]:
+    return tuple(((1.0 / count, 0.5 / count, 0.0), 1.0 + n / count) for n in range(count))
+
+
+DRIVEN = replace(FREE, torque=TorqueLaw(sines=_waves(3)))
+CROWDED = replace(FREE, torque=TorqueLaw(sines=_waves(15_000)))
+SPHERE = replace(CROWDED, moments=(40.0, 40.0, 40.0))
+BUSY = replace(FREE, torque=TorqueLaw(cosines=_waves(300)), step_size=1e-6, steps=1_000_000)
+TIMES = [0.001 * n for n in range(1, 50_000)]
+
+
+def _method(scene: Scene, name: str, time: float, tolerance: float = 1e-12) -> Callable[[], object]:
+    return lambda: solve(scene, [time], name, tolerance, effort=1e6)
+
+
+def _prepared(scene: Scene, name: str, time: float, tolerance: float) -> Callable[[], object]:
+    solver = prepare(scene, name, tolerance, effort=1e6)
+    return lambda: solver(np.array(scene.omega), time)
+
+
+def _program(name: str) -> Callable[[], object]:
+    return lambda: run(BUSY, corrected(name), may_stop=False)
+
+
+def _linear() -> object:
+    matrix = np.eye(2500, order="F") + 0.001
+    return kernels.extension().solve_linear(matrix, matrix[:, :1])
+
+
+LONG: dict[str, Callable[[], object]] = {
+    "taylor": _method(PUSHED, "taylor", 1e5),
+    "taylor-waves": _method(CROWDED, "taylor", 1e5),
+    "quick": _prepared(FREE, "quick", 1e6, 1e-6),
+    "quick-waves": _prepared(DRIVEN, "quick", 1e6, 1e-6),
+    "prepared-series": _prepared(CROWDED, "auto", 1e6, 1e-12),
+    "rk4": _method(replace(PUSHED, step_size=1e-7), "rk4", 1e3, 1.0),
+    "rk4-waves": _method(replace(CROWDED, step_size=1e-4), "rk4", 1e3, 1.0),
+    "improved-euler": _method(replace(DRIVEN, step_size=1e-7), "improved-euler", 1e3, 1.0),
+    "rk4-short-steps": lambda: solve(replace(CROWDED, step_size=1.0), TIMES, "rk4", 1.0, 1e6),
+    "gauss-1": _method(DRIVEN, "gauss-1", 1e3, 1e-8),
+    "gauss-8": _method(CROWDED, "gauss-8", 1e5),
+    "sphere": lambda: solve(SPHERE, TIMES, "closed-form", 1e-12, effort=1e6),
+    "two-term": _program("two-term"),
+    "four-term": _program("four-term"),
+    "runge-kutta": _program("runge-kutta"),
+    "linear-solver": _linear,
+    "dop853": _method(PUSHED, "dop853", 1e4, 1e-3),
+    "lsoda": _method(PUSHED, "lsoda", 1e4, 1e-3),
+    "radau": _method(PUSHED, "radau", 1e4, 1e-3),
+    "reference": _method(PUSHED, "reference", 1e4),
+}
+# Of SciPy, in Python, or prepared before.
+WITHOUT_A_DOOR = (
+    "dop853", "lsoda", "radau", "reference", "quick", "quick-waves", "prepared-series",
+)  # fmt: skip
+
+
+class _Keyboard:
+    """Presses Ctrl-C, from another thread, a while after it was told to; stands for the kernels.
+
+    The first call of one of them tells it, so that what is done before does not count.
+    """
+
+    def __init__(self) -> None:
+        self.pressed = 0.0
+        self._timer = threading.Timer(0.05, self._press)
+
+    def _press(self) -> None:
+        self.pressed = time.perf_counter()
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def start(self) -> None:
+        if not self._timer.is_alive():
+            self._timer.start()
+
+    def leave(self) -> None:
+        """Press no more: what ended by itself is not to be interrupted in another test."""
+        self._timer.cancel()
+
+    def __getattr__(self, kernel: str) -> Callable[..., object]:
+        def call(*arguments: object, **named: object) -> object:
+            self.start()
+            result: object = getattr(extension(), kernel)(*arguments, **named)
+            return result
+
+        return call
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_kernel_ends_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    keyboard = _Keyboard()
+    for room in ("kernels", "gauss"):
+        monkeypatch.setattr(f"pyharness.methods.{room}.extension", lambda: keyboard)
+    if name in WITHOUT_A_DOOR:
+        keyboard.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            LONG[name]()
+    finally:
+        keyboard.leave()
+    assert time.perf_counter() - keyboard.pressed < PATIENCE
+
+
+def test_interpreter_and_solver_go_on() -> None:
+    """The same bits afterwards, from the very solver that was interrupted."""
+    solver = prepare(PUSHED, "taylor", effort=1e6)
+    wanted = solver(np.array(PUSHED.omega), 2.0).copy()
+    _Keyboard().start()
+    with pytest.raises(KeyboardInterrupt):
+        solver(np.array(PUSHED.omega), 1e5)
+    np.testing.assert_array_equal(solver(np.array(PUSHED.omega), 2.0), wanted)
+    assert solver.status == "complete"
+
+
+def test_other_threads_are_not_disturbed() -> None:
+    """A signal is the main thread's: a kernel elsewhere runs on to its end."""
+    wanted = solve(PUSHED, [5e3], "taylor")
+    found = []
+    ended = threading.Event()
+
+    def work() -> None:
+        found.append(solve(PUSHED, [5e3], "taylor"))
+        ended.set()
+
+    threading.Thread(target=work).start()
+    _Keyboard().start()
+    with pytest.raises(KeyboardInterrupt):
+        time.sleep(60.0)
+    assert ended.wait(60.0)
+    np.testing.assert_array_equal(found[0].omega, wanted.omega)
+
+
+def test_handler_that_does_not_raise_runs_on_the_way() -> None:
+    wanted = solve(PUSHED, [5e3], "taylor")
+    calls = []
+    before = signal.signal(signal.SIGALRM, lambda *_: calls.append(time.perf_counter()))
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+        found = solve(PUSHED, [5e3], "taylor")
+        end = time.perf_counter()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert calls
+    assert end - calls[0] > 0.01
+    np.testing.assert_array_equal(found.omega, wanted.omega)
+
+
+def test_command_line_says_so_in_a_line(tmp_path: Path) -> None:
+    """All of them side by side, each some time after it has begun."""
+    # In few letters: a scene file has a largest size.
+    lines = "".join(
+        f"{{amplitude=[{a[0]:.1e},{a[1]:.1e},0],frequency={f:.5f}}},\n" for a, f in _waves(15_000)
+    )
+    path = tmp_path / "crowded.toml"
+    path.write_text(
+        "[body]\nmoments = [40.0, 30.0, 20.0]\n[initial]\nomega = [0.3, 1.1, 2.7]\n"
+        f"[torque]\nsines = [{lines}]\n[run]\nsteps = 100000\n"
+    )
+    commands = [
+        ["run", "--scene", str(path), "--program", "four-term", "--effort", "1e6"],
+        ["run", "--case", "5", "--method", "taylor", "--times", "1e5", "--effort", "1e6"],
+        ["run", "--case", "5", "--method", "lsoda", "--times", "1e5", "--effort", "1e6"],
+        ["compare", "--case", "5", "--steps", "100000", "--effort", "1e6"],
+        ["stress", "--only", "threads"],
+    ]
+    start = "print(flush=True); from pyharness.__main__ import start; start()"
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-c", start, *command],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )
+        for command in commands
+    ]  # fmt: skip
+    for each in running:
+        assert each.stdout is not None
+        each.stdout.readline()
+    time.sleep(0.5)
+    pressed = time.perf_counter()
+    for each in running:
+        each.send_signal(signal.SIGINT)
+    for command, each in zip(commands, running, strict=True):
+        _, said = each.communicate(timeout=60)
+        assert (each.returncode, said) == (130, "pyharness: interrupted\n"), command
+        assert time.perf_counter() - pressed < 2.0 * PATIENCE, command
+
+
+def test_interrupted_while_the_command_line_is_read_in() -> None:
+    """An import may run text, where Python remembers the signal and would die by it."""
+    code = (
+        "import sys, pyharness.__main__ as m; from types import ModuleType\n"
+        "def main(): exec('raise KeyboardInterrupt')\n"
+        "sys.modules['pyharness.cli.main'] = cli = ModuleType('cli'); cli.main = main; m.start()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "pyharness: interrupted\n")

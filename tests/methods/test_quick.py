@@ -1,0 +1,232 @@
+"""Runge-Kutta for few digits: within its tolerance, also on scenes that it was not tuned on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
+from pyharness.methods.kernels import extension, normalized
+from pyharness.model.same_motion import scaled
+from pyharness.model.trajectory import Array
+from pyharness.truth.reference import reference
+from tests.random_scenes import NASTY, plain, triple
+
+
+def _ratios(
+    scene: Scene, t_end: float, tolerance: float, truth: Array
+) -> dict[str, tuple[float, str]]:
+    """Return error over tolerance, and status; the last row of the truth is the end."""
+    scale = max(np.abs(truth).max(), max(map(abs, scene.omega))) or 1.0
+    found = {}
+    for method in ("quick", "auto"):
+        solver = prepare(scene, method, tolerance)
+        error = np.abs(solver(np.array(scene.omega), t_end) - truth[-1]).max()
+        found[method] = float(error / (scale * tolerance)), solver.status
+    return found
+
+
+def test_tolerance_holds_on_random_scenes() -> None:
+    generator = np.random.default_rng(1982)
+    ratios = []
+    for _ in range(45):
+        scene, t_end = plain(generator)
+        truth = reference(scene, [t_end * k / 10.0 for k in range(1, 11)]).omega
+        for tolerance in (1e-2, 1e-3, 1e-4, 1e-6):
+            for ratio, status in _ratios(scene, t_end, tolerance, truth).values():
+                assert status == "complete"
+                ratios.append(ratio)
+    assert max(ratios) <= 1.0
+    # And it is no series in disguise: errors are not far below what was asked for.
+    assert np.percentile(ratios, 90) > 1e-3
+
+
+@pytest.mark.parametrize("kind", NASTY)
+def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
+    """Against the series to 1e-14: where the two agree, neither is wrong by what they share."""
+    generator = np.random.default_rng([1982, list(NASTY).index(kind)])
+    complete = runs = 0
+    for number in range(80):
+        scene, t_end = NASTY[kind](generator)
+        times = np.linspace(0.0, t_end, 33)[1:]
+        rows, n_rows, _, _ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-14)
+        if n_rows < len(times):
+            continue
+        for tolerance in (1e-2, 1e-3, 1e-4, 1e-6):
+            ratios = _ratios(scene, t_end, tolerance, rows.T)
+            runs += 1
+            complete += ratios["quick"][1] == "complete"
+            for method, (ratio, status) in ratios.items():
+                what = f"{kind} {number}, {method} to {tolerance:g}: {ratio:.3g}"
+                assert ratio <= 1.0 or status in ("refused", "gave up"), what
+    assert complete >= 0.9 * runs > 200
+
+
+def _drawn(kind: str, number: int) -> tuple[Scene, float]:
+    generator = np.random.default_rng([7, list(NASTY).index(kind)])
+    for _ in range(number):
+        NASTY[kind](generator)
+    return NASTY[kind](generator)
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "tolerance"),
+    [
+        ("nearly symmetric", 46, 3e-2),
+        ("near the separatrix", 146, 1e-2),
+        ("violent torque", 149, 3e-2),
+        ("resonant", 13, 1e-2),
+        ("resonant", 27, 1e-6),
+        ("resonant", 28, 1e-3),
+        ("resonant", 143, 1e-2),
+        ("resonant", 39, 1e-2),
+        ("fast waves", 8, 1e-4),
+        ("fast waves", 37, 1e-6),
+        ("fast waves", 95, 1e-2),
+        ("no body", 78, 1e-2),
+        ("long", 27, 1e-3),
+        ("long", 37, 1e-3),
+    ],
+)
+def test_gaps_that_are_small_by_chance_are_not_believed(
+    kind: str, number: int, tolerance: float
+) -> None:
+    """Of 15 000 draws those where one gap, or too large a share, would have been believed first.
+
+    The share that the gap may have is a third of the tolerance, and the result is better than the
+    gap by its extrapolation: so a fifth of the tolerance is much.
+    """
+    scene, t_end = _drawn(kind, number)
+    times = np.linspace(0.0, t_end, 33)[1:].tolist()
+    truth = solve(scene, times, "taylor", 1e-13).omega
+    ratio, status = _ratios(scene, t_end, tolerance, truth)["quick"]
+    assert status == "complete"
+    assert ratio <= 0.2
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+@pytest.mark.parametrize("case", [3, 4, 5, 6])
+def test_result_is_extrapolated(case: int, tolerance: float) -> None:
+    """Without its leading term the error is far below that of as many plain steps (eq. 31)."""
+    scene = case_scene(case)
+    solver = prepare(scene, "quick", tolerance)
+    found = solver(np.array(scene.omega), 3.0).copy()
+    plainly = prepare(replace(scene, step_size=3.0 / solver.steps), "rk4")
+    steps = plainly(np.array(scene.omega), 3.0)
+    assert plainly.steps == solver.steps
+    truth = reference(scene, [3.0]).omega[0]
+    assert np.abs(found - truth).max() < 0.5 * np.abs(steps - truth).max()
+
+
+def test_more_steps_than_were_planned_by_far_are_no_way_out() -> None:
+    """Small differences grow here until rounding rules: it is said, and soon."""
+    law = TorqueLaw(sines=(((3.0, 1.0, -2.0), 4.0),), cosines=(((0.0, 2.0, 1.0), 1.3),))
+    scene = Scene("", (0.3, 1.0, 0.2), moments=(3.0, 2.0, 1.2), torque=law)
+    solver = prepare(scene, "quick", 1e-6)
+    assert np.isnan(solver(np.array(scene.omega), 50.0)).all()
+    assert solver.status == "gave up"
+    assert solver.steps < 50_000
+
+
+def test_steps_that_tell_nothing_are_not_trusted() -> None:
+    """Long steps damp this motion to nothing, steps of four times the length run away."""
+    torque = TorqueLaw(
+        cosines=(((-50000.0, 2000.0, 50000.0), 93.9),), sines=(((0.0, 0.0, -300.0), 148.0),)
+    )
+    scene = Scene("", (-0.2, 0.0, -0.3), moments=(7.8, 9.3, 1.6), torque=torque)
+    truth = solve(scene, [0.4, 0.8], "taylor", 1e-13).omega
+    for ratio, _ in _ratios(scene, 0.8, 1e-2, truth).values():
+        assert not ratio > 1.0
+
+
+def test_every_instruction_set(level: int) -> None:
+    for case in (3, 4, 5, 6, 7):
+        scene = case_scene(case)
+        truth = reference(scene, [1.5])
+        for tolerance in (1e-2, 1e-4, 1e-6):
+            found = prepare(scene, "quick", tolerance)(np.array(scene.omega), 1.5)
+            assert np.abs(found - truth.omega[0]).max() <= tolerance * np.abs(truth.omega).max()
+
+
+def test_fast_weak_waves_are_averaged_and_their_integral_is_exact() -> None:
+    """Case 7 to 1e-3: a few steps for 300 radians of torque."""
+    scene = case_scene(7)
+    solver = prepare(scene, "quick", 1e-3)
+    found = solver(np.array(scene.omega), 3.0)
+    truth = reference(scene, [3.0]).omega[0]
+    assert solver.steps < 20
+    assert np.abs(found - truth).max() < 1e-3 * np.abs(truth).max()
+    # For more digits the waves are resolved.
+    finer = prepare(scene, "quick", 1e-7)
+    finer(np.array(scene.omega), 3.0)
+    assert finer.steps > 150
+
+
+def test_strong_or_resonant_waves_are_not_averaged() -> None:
+    """A wave in step with the precession pumps it: averaging would miss all of it."""
+    law = TorqueLaw(sines=(((20.0, 0.0, 0.0), 5.0),))
+    scene = Scene("", (0.0, 1.0, 10.0), moments=(40.0, 40.1, 20.0), torque=law)
+    truth = reference(scene, [5.0]).omega[0]
+    found = prepare(scene, "quick", 1e-4)(np.array(scene.omega), 5.0)
+    assert np.abs(found - truth).max() < 1e-4 * np.abs(truth).max()
+
+
+def test_body_that_can_not_be_scaled_is_left_to_the_series() -> None:
+    """A symmetric body has a zero coefficient: quick refuses, auto goes on."""
+    scene = Scene("", (0.0, 1.0, 2.0), moments=(3.0, 3.0, 1.0), torque=TorqueLaw((1.0, 0.0, 0.0)))
+    quick = prepare(scene, "quick", 1e-3)
+    assert np.isnan(quick(np.array(scene.omega), 1.0)).all()
+    assert quick.status == "refused"
+    auto = prepare(scene, tolerance=1e-3)
+    truth = reference(scene, [1.0]).omega[0]
+    np.testing.assert_allclose(auto(np.array(scene.omega), 1.0), truth, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "signs", [(1, 1, 1), (-1, -1, -1), (1, -1, 1), (-1, 1, -1), (1, 1, -1), (-1, 1, 1)]
+)
+def test_every_pattern_of_signs(signs: tuple[int, int, int]) -> None:
+    coefficients = triple(np.array([0.3, 0.7, 0.5]) * signs)
+    law = TorqueLaw((0.2, -0.1, 0.3), (0.0, 0.1, 0.0), (((0.1, 0.2, 0.3), 2.0),))
+    for torque in (law, TorqueLaw((0.2, -0.1, 0.3))):
+        scene = Scene("", (0.4, -0.3, 0.2), coefficients=coefficients, torque=torque)
+        for t_end in (1.0, -1.0):
+            truth = reference(scene, [t_end]).omega[0]
+            found = prepare(scene, "quick", 1e-5)(np.array(scene.omega), t_end)
+            assert np.abs(found - truth).max() < 1e-5 * max(np.abs(truth).max(), 0.4)
+
+
+def test_run_away_is_an_overflow_and_nothing_hangs() -> None:
+    scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    solver = prepare(scene, "quick", 1e-3)
+    assert np.isnan(solver(np.array(scene.omega), 2.0)).all()
+    assert solver.status == "overflow"
+
+
+@pytest.mark.parametrize("power", [-250, -190, 190, 250])
+def test_unit_of_time_changes_no_bit(power: int) -> None:
+    """Powers of rates overflow, or vanish, where those of radians do not."""
+    law = TorqueLaw((3.0, -2.0, 1.0), (1.0, 2.0, 3.0), (((1.0, 1.0, 2.0), 5.0),))
+    scene = Scene("", (1.0, 2.0, -1.0), moments=(4.0, 3.0, 2.0), torque=law)
+    factor = 2.0**power
+    found = prepare(scene, "quick", 1e-5)(np.array(scene.omega), 1.0).copy()
+    faster = scaled(scene, factor)
+    other = prepare(faster, "quick", 1e-5)(np.array(faster.omega), 1.0 / factor)
+    np.testing.assert_array_equal(other, found * factor)
+
+
+def test_more_waves_than_there_is_room_for_are_left_to_the_series() -> None:
+    waves = tuple(((0.5, -0.2, 0.1 * k), 1.0 + k) for k in range(9))
+    for law in (TorqueLaw(sines=waves), TorqueLaw(sines=waves[:5], cosines=waves[5:])):
+        scene = Scene("", (0.3, 1.0, -0.5), moments=(3.0, 2.0, 1.5), torque=law)
+        start = np.array(scene.omega)
+        quick = prepare(scene, "quick", 1e-3)
+        assert np.isnan(quick(start, 1.0)).all()
+        assert quick.status == "refused"
+        truth = reference(scene, [1.0]).omega[0]
+        found = prepare(scene, tolerance=1e-3)(start, 1.0)
+        assert np.abs(found - truth).max() <= 1e-3 * np.abs(truth).max()
+    fewer = replace(scene, torque=TorqueLaw(sines=waves[:8]))
+    quick = prepare(fewer, "quick", 1e-3)
+    quick(start, 1.0)
+    assert quick.status == "complete"

@@ -1,0 +1,284 @@
+"""The Taylor kernel: its tolerance, both directions, its rows, its ends, every instruction set."""
+
+import ctypes
+import os
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, case_scene
+from pyharness.methods.kernels import extension, normalized
+from pyharness.methods.registry import solve
+from pyharness.model.build import build
+from pyharness.model.scene import TorqueLaw
+from pyharness.model.trajectory import Array
+from pyharness.truth.reference import Reference, reference
+from tests.instruction_sets import BEST, level_here
+from tests.random_scenes import NASTY
+
+FORTRAN = Path(__file__).parent.parent.parent / "fortran"
+RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
+WAVES = TorqueLaw(
+    (10.0, 0.0, -5.0), (1.0, 2.0, 0.0), (((20.0, 0.0, 5.0), 3.0), ((0.0, 9.0, 0.0), 11.0)),
+    (((5.0, 5.0, 5.0), 3.0), ((0.0, 0.0, 30.0), 0.5), ((1.0, 2.0, 3.0), 0.0)),
+)  # fmt: skip
+SCENES = {
+    **{f"case {case}": case_scene(case) for case in range(1, 8)},
+    "waves": Scene("", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0), torque=WAVES),
+    "sine and cosine of two speeds": Scene(
+        "", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0),
+        torque=TorqueLaw(
+            sines=(((20.0, 0.0, 5.0), 2.0),), cosines=(((5.0, 30.0, -5.0), 5.0),)
+        ),
+    ),
+    "from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((5.0, 3.0, 1.0))
+    ),
+    "rate from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw(rate=(90.0, 60.0, 70.0))
+    ),
+    "sine from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
+        torque=TorqueLaw(sines=(((50.0, 30.0, 10.0), 2.0),)),
+    ),
+    "about one axis from rest": Scene(
+        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
+        torque=TorqueLaw(sines=(((0.0, 0.0, 10.0), 2.0),)),
+    ),
+    "two zeros": Scene("", (1.0, 2.0, 3.0), coefficients=(0.0, -1.0, 0.0)),
+    "not a body": Scene("", (0.1, 0.2, -0.3), coefficients=(1.0, 1.0, 0.5)),
+}  # fmt: skip
+
+
+@cache
+def _truth(name: str, *times: float) -> Reference:
+    return reference(SCENES[name], times)
+
+
+def _error(found: Array, truth: Array) -> float:
+    error: float = np.abs(found - truth).max() / np.abs(truth).max()
+    return error
+
+
+def _end(scene: Scene, time: float, tolerance: float) -> tuple[Array, int, int]:
+    rows, _, status, steps = extension().taylor_rows(
+        *normalized(scene), scene.omega, [time], tolerance
+    )
+    return rows[:, 0], status, steps
+
+
+@pytest.mark.parametrize(("case", "horizon"), RUNS)
+def test_tolerance_is_met_from_coarse_to_rounding(case: int, horizon: float, level: int) -> None:
+    truth = _truth(f"case {case}", horizon).omega[0]
+    for digits in range(3, 14):
+        omega, status, _ = _end(case_scene(case), horizon, 10.0**-digits)
+        assert status == 0
+        assert _error(omega, truth) <= 10.0**-digits
+
+
+@pytest.mark.parametrize(("case", "horizon"), RUNS)
+def test_best_error_is_rounding(case: int, horizon: float, level: int) -> None:
+    """Single runs scatter by a factor of two around their median, so the best of four counts."""
+    truth = _truth(f"case {case}", horizon).omega[0]
+    errors = [
+        _error(_end(case_scene(case), horizon, tolerance)[0], truth)
+        for tolerance in (1e-15, 1.5e-15, 2e-15, 3e-15)
+    ]
+    assert min(errors) <= (3e-16 if horizon == 3.0 else 2e-15)
+    assert max(errors) <= (1e-15 if horizon == 3.0 else 5e-15)
+
+
+@pytest.mark.parametrize("time", [2.0, -2.0])
+@pytest.mark.parametrize("name", SCENES)
+def test_any_torque_law_either_way(name: str, time: float) -> None:
+    truth = _truth(name, time).omega[0]
+    for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
+        omega, status, _ = _end(SCENES[name], time, tolerance)
+        assert status == 0
+        assert _error(omega, truth) <= tolerance
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-6, 1e-9, 1e-12, 1e-14])
+@pytest.mark.parametrize(("frequency", "time"), [(242.25, 70.5), (1000.3, 60.0)])
+def test_thousands_of_turns_of_a_wave(frequency: float, time: float, tolerance: float) -> None:
+    """What each step errs adds up, and so does what the rounding of a phase costs."""
+    law = TorqueLaw(sines=(((2.0, -1.0, 6.0), frequency),))
+    scene = Scene("", (0.3, -1.0, 0.5), moments=(2.0, 2.0, 2.0), torque=law)
+    omega, status, _ = _end(scene, time, tolerance)
+    assert status == 0
+    assert _error(omega, reference(scene, [time]).omega[0]) <= tolerance
+
+
+@pytest.mark.parametrize("kind", NASTY)
+def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
+    """Where a small difference grows the series takes smaller errors by itself."""
+    generator = np.random.default_rng([3, list(NASTY).index(kind)])
+    for number in range(60):
+        scene, time = NASTY[kind](generator)
+        times = np.linspace(0.0, time, 33)[1:]
+        truth, n_rows, _, _ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-14)
+        if n_rows < len(times):
+            continue
+        scale = max(np.abs(truth).max(), max(map(abs, scene.omega)))
+        for tolerance in (1e-3, 1e-6, 1e-9):
+            omega, _, _ = _end(scene, time, tolerance)
+            error = np.abs(omega - truth[:, -1]).max() / scale
+            assert error <= tolerance, f"{kind} {number} to {tolerance:g}"
+
+
+@pytest.mark.parametrize("name", ["case 2", "case 3", "case 4", "case 5", "case 6"])
+def test_forth_and_back(name: str) -> None:
+    """A torque that does not vary knows no time, so the way back starts at 0 again."""
+    scene = SCENES[name]
+    there, _, _ = _end(scene, 3.0, 1e-15)
+    turned = Scene("", tuple(there), moments=scene.moments, torque=scene.torque)
+    back, _, _ = _end(turned, -3.0, 1e-15)
+    assert _error(back, np.array(scene.omega)) <= 2e-13
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_rows_are_what_solves_to_each_time_give(name: str, side: float) -> None:
+    times = [side * t for t in (0.0, 1e-9, 0.01, 0.3, 0.31, 0.9, 2.0)]
+    rows = solve(SCENES[name], times, "taylor", 1e-15)
+    assert rows.ended == "complete"
+    np.testing.assert_array_equal(rows.omega[0], SCENES[name].omega)
+    scale = np.abs(rows.omega).max()
+    for time, row in zip(times[1:], rows.omega[1:], strict=True):
+        omega, _, _ = _end(SCENES[name], time, 1e-15)
+        np.testing.assert_allclose(row, omega, rtol=0, atol=3e-15 * scale)
+
+
+def test_many_rows_within_one_step() -> None:
+    times = np.linspace(0.0, 3.0, 301)
+    rows = solve(case_scene(5), times.tolist(), "taylor", 1e-12)
+    truth = reference(case_scene(5), times.tolist()).omega
+    assert rows.steps < 60
+    assert _error(rows.omega, truth) <= 1e-12
+
+
+def test_blow_up_ends_the_rows(level: int) -> None:
+    scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    found = solve(scene, [0.5, 0.9, 0.999, 1.001, 2.0], "taylor", 1e-12)
+    assert found.ended == "overflow"
+    np.testing.assert_allclose(found.omega, [[2.0] * 3, [10.0] * 3, [1000.0] * 3], rtol=1e-10)
+    assert found.steps < 10_000
+    _, n_rows, status, _ = extension().taylor_rows(*normalized(scene), scene.omega, [2.0], 1e-12)
+    assert (n_rows, status) == (0, 2)
+
+
+@pytest.mark.parametrize("size", [1e100, 1e160])
+def test_hopeless_scale_ends(size: float) -> None:
+    scene = Scene("", (size, size, size), coefficients=(1.0, -1.0, 1.0))
+    with pytest.raises(InputError, match=r"taylor gave up before t = 2 s after 1 step;"):
+        solve(scene, [2.0], "taylor", 1e-6)
+
+
+def test_tiny_and_resting_bodies() -> None:
+    scene = Scene("", (1e-300, -2e-300, 0.0), moments=(3.0, 2.0, 1.0))
+    omega, status, steps = _end(scene, 5.0, 1e-12)
+    assert (status, steps) == (0, 1)
+    np.testing.assert_array_equal(omega, scene.omega)
+    omega, status, _ = _end(Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0)), 5.0, 1e-12)
+    assert status == 0
+    np.testing.assert_array_equal(omega, 0.0)
+
+
+def test_steps_fall_with_the_tolerance_and_not_below_the_need() -> None:
+    counts = [_end(case_scene(7), 3.0, e)[2] for e in (1e-3, 1e-6, 1e-9, 1e-12)]
+    assert max(counts) <= 150
+
+
+def test_threads_give_the_same_bits() -> None:
+    def many(_: int) -> list[bytes]:
+        return [_end(case_scene(c), 3.0, 1e-12)[0].tobytes() for c in range(1, 8)]
+
+    with ThreadPoolExecutor(8) as pool:
+        results = list(pool.map(many, range(64)))
+    assert all(result == results[0] for result in results)
+
+
+@pytest.mark.skipif(
+    any(flag in (build().flags or "") for flag in ("-O0", "=native")),
+    reason="without optimisation nothing is fused, and natively the plain kernel is",
+)
+def test_levels_agree_to_rounding() -> None:
+    """And not to the bit: with fused multiply-adds they would only if one kernel ran twice."""
+    found = []
+    for number in range(level_here() + 1):
+        assert extension().choose_instructions(number) == number
+        found.append(_end(case_scene(5), 3.0, 1e-15)[0])
+    extension().choose_instructions(BEST)
+    for omega in found[1:]:
+        assert 0.0 < _error(omega, found[0]) <= 1e-15
+
+
+@pytest.mark.external
+@pytest.mark.skipif(shutil.which(os.environ.get("FC", "gfortran")) is None, reason="no compiler")
+def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
+    """The source is the definition; unroll.py only writes its loops out."""
+    modules = ("euler_equations", "taylor_plan", "taylor")
+    sources = ["kinds.f90", "statuses.f90", "interruption.f90", "../tests/never_interrupted.f90"]
+    sources += [f"modern/{name}.f90" for name in modules]
+    library = tmp_path / "loops.so"
+    command = [os.environ.get("FC", "gfortran"), "-shared", "-fPIC", "-O1", "-o", str(library)]
+    subprocess.run([*command, *(str(FORTRAN / s) for s in sources)], cwd=tmp_path, check=True)
+    loops = ctypes.CDLL(str(library)).taylor_solve_level
+    for name, scene in SCENES.items():
+        coefficients, constant, rate, sines, cosines = normalized(scene)
+        found = np.zeros(3)
+        n_rows, ended, count = ctypes.c_int(), ctypes.c_int(), ctypes.c_int64()
+        loops(
+            *map(_address, (coefficients, constant, rate)),
+            sines.shape[1], _address(sines), cosines.shape[1], _address(cosines),
+            _address(np.array(scene.omega)), _address(np.array([1e-12])),
+            _address(np.array([1.0])), 1, _address(np.array([2.0])), _address(found),
+            *(ctypes.byref(each) for each in (n_rows, ended, count, ctypes.c_double())),
+        )  # fmt: skip
+        omega, status, steps = _end(scene, 2.0, 1e-12)
+        assert (ended.value, abs(count.value - steps) <= 1) == (status, True), name
+        np.testing.assert_allclose(found, omega, rtol=0, atol=1e-13 * np.abs(omega).max())
+
+
+def _address(array: Array) -> ctypes.Array[ctypes.c_double]:
+    """Return the array's memory, columns first, in a form that ctypes passes and keeps alive."""
+    if not array.size:
+        return (ctypes.c_double * 1)()
+    return (ctypes.c_double * array.size).from_buffer(array.T.reshape(-1).data)
+
+
+def test_start_alone_is_a_row() -> None:
+    scene = case_scene(5)
+    found = solve(scene, [0.0], "taylor", 1e-9)
+    np.testing.assert_array_equal(found.omega, [scene.omega])
+    assert (found.ended, found.steps) == ("complete", 0)
+
+
+def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
+    law = TorqueLaw((1e308, 0.0, 0.0))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    for times in ([1.0, 3.0, 4.0], [3.0], [1.0, 1.5, 3.0]):
+        found = solve(scene, times, "taylor", 1e-9)
+        assert found.ended == "overflow"
+        np.testing.assert_allclose(found.omega[:, 0], [1e308 * t for t in times if t < 1.7])
+
+
+@pytest.mark.parametrize(
+    ("kind", "number"), [("near the separatrix", 127), ("other units", 190), ("resonant", 153)]
+)
+def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number: int) -> None:
+    """Of 1500 draws those where a difference that is carried wrongly would have cost the most."""
+    generator = np.random.default_rng([11, list(NASTY).index(kind)])
+    for _ in range(number + 1):
+        scene, time = NASTY[kind](generator)
+    times = np.linspace(0.0, time, 33)[1:]
+    truth, *_ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-15)
+    scale = max(np.abs(truth).max(), *map(abs, scene.omega))
+    found, status, _ = _end(scene, time, 1e-3)
+    assert status == 0
+    assert np.abs(found - truth[:, -1]).max() <= 0.4e-3 * scale

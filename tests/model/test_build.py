@@ -1,0 +1,91 @@
+"""The build: what the binary needs, what f2py may not guess, and what the set-up says."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pyharness.methods import kernels
+from pyharness.model.build import build
+
+ROOT = Path(__file__).parent.parent.parent
+LIBRARIES = ("gfortran", "quadmath", "flang", "FortranRuntime", "ifcore", "imf")
+
+
+def _dependencies(path: str) -> str:
+    """Return the names of the libraries that a binary asks the loader for."""
+    command = ["otool", "-L", path] if sys.platform == "darwin" else ["readelf", "-d", path]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    if sys.platform == "darwin":
+        return "\n".join(lines[1:])
+    return "\n".join(line for line in lines if "NEEDED" in line)
+
+
+@pytest.mark.external
+@pytest.mark.skipif("-fcheck" in (build().flags or ""), reason="run-time checks have messages")
+def test_extension_needs_no_fortran_library_at_run_time() -> None:
+    needed = _dependencies(kernels.extension().__file__ or "")
+    assert "lib" in needed
+    for library in LIBRARIES:
+        assert library not in needed
+
+
+def test_flags_are_the_ones_that_keep_the_bits() -> None:
+    flags = build().flags
+    assert flags is not None
+    assert "-ffp-contract=off" in flags or "-fp-model=strict" in flags
+    assert "fast" not in flags
+
+
+@pytest.mark.external
+def test_kind_that_f2py_would_guess_fails_the_build(tmp_path: Path) -> None:
+    """F2py maps an unknown kind to C float without an error; the build must not."""
+    script = ROOT / "fortran/run_f2py.py"
+    good = "subroutine s(x)\n  real(8), intent(in) :: x\nend subroutine s\n"
+    bad = "subroutine s(x)\n  use k, only: dp\n  real(dp), intent(in) :: x\nend subroutine s\n"
+    for text, code in ((good, 0), (bad, 1)):
+        source = tmp_path / "x.f90"
+        source.write_text(text)
+        command = [sys.executable, str(script), str(source), "m", str(tmp_path)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == code, done.stderr
+        assert ("is mapped to C" in done.stderr) == bool(code)
+
+
+@pytest.mark.external
+@pytest.mark.skipif(not (ROOT / ".ci/setup").exists(), reason="needs a checkout")
+@pytest.mark.parametrize(
+    ("python", "compiler", "words"),
+    [
+        (sys.executable, "gfortran", "apt-get install gfortran"),
+        (sys.executable, "no-such-fortran", "no Fortran compiler 'no-such-fortran'"),
+        ("no-such-python", "gfortran", "there is no 'no-such-python'"),
+    ],
+)
+def test_setup_that_can_not_go_on_says_what_to_do(
+    python: str, compiler: str, words: str, tmp_path: Path
+) -> None:
+    """No compiler, and none may be installed: a message with four commands, nothing else."""
+    # A path with the tools that the script needs, and no compiler.
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    for tool in ("sh", "id", "mkdir", "rm", "grep", "tail", "env"):
+        found = shutil.which(tool)
+        assert found is not None
+        (tools / tool).symlink_to(found)
+    environment = {"PATH": str(tools), "INSTALL": "no", "HOME": os.environ.get("HOME", "/")}
+    done = subprocess.run(
+        [str(ROOT / ".ci/setup"), python, compiler],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert words in done.stderr
+    assert "meson" not in done.stderr
+    assert len(done.stderr.splitlines()) <= 4
+    if python == sys.executable:
+        for manager in ("apt-get", "dnf", "brew", "conda"):
+            assert manager in done.stderr
+    assert not (tmp_path / ".venv").exists()

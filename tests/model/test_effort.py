@@ -1,0 +1,205 @@
+"""Limits count the work, and each names the one option that lifts it, and how far."""
+
+import copy
+import pickle
+import re
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pyharness import case_scene
+from pyharness.cli.main import main
+from pyharness.methods.gauss import FIXED_STEP
+from pyharness.methods.prepared import PREPARED, prepare, solve
+from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.model.effort import suggested
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.listing import corrected
+from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.trajectory import Trajectory
+from pyharness.truth.reference import reference
+
+WAVES: tuple[Wave, ...] = (((1.0, 0.0, 2.0), 5.0), ((0.0, 2.0, 2.0), 3.0))
+FREE = Scene("free", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), steps=100)
+# Its motion speeds up: the mean pace of the beginning says too little.
+PUSHED = replace(FREE, torque=TorqueLaw(constant=(1.0, 2.0, 3.0)))
+DRIVEN = replace(FREE, torque=TorqueLaw(sines=WAVES))
+SPHERE = replace(DRIVEN, moments=(40.0, 40.0, 40.0))
+MANY = [0.001 * n for n in range(1, 1001)]
+
+Run = Callable[[float], Trajectory]
+
+
+def _method(
+    scene: Scene, name: str, time: float | list[float], tolerance: float = 1e-9
+) -> tuple[Run, str]:
+    times = time if isinstance(time, list) else [time]
+    return lambda effort: solve(scene, times, name, tolerance, effort=effort), name
+
+
+def _program(scene: Scene, name: str, implementation: str) -> tuple[Run, str]:
+    program = PROGRAM_REGISTRY[name]
+    listing = corrected(name)
+    return (
+        lambda effort: program.run(scene, listing, implementation, effort=effort),
+        f"{name} \\({implementation}\\)",
+    )
+
+
+# What the limit is to bite on, and an effort with which it does.
+LIMITED: dict[str, tuple[tuple[Run, str], float]] = {
+    "taylor": (_method(PUSHED, "taylor", 400.0), 1e-4),
+    "taylor-waves": (_method(DRIVEN, "taylor", 400.0), 1.5e-4),
+    "taylor-hopeless": (_method(DRIVEN, "taylor", 400.0), 2e-6),
+    "auto": ((_method(DRIVEN, "auto", 400.0)[0], "taylor"), 1.5e-4),
+    "rk4": (_method(FREE, "rk4", 400.0, 1.0), 5e-5),
+    "taylor-3": (_method(DRIVEN, "taylor-3", 400.0, 1.0), 1e-4),
+    "gauss-1": (_method(PUSHED, "gauss-1", 2.0, 1e-8), 1e-4),
+    "gauss-4": (_method(DRIVEN, "gauss-4", 20.0), 5e-5),
+    "closed-form": (_method(SPHERE, "closed-form", MANY), 1e-6),
+    "dop853": (_method(FREE, "DOP853".lower(), 20.0), 1e-3),
+    "lsoda": (_method(DRIVEN, "lsoda", 20.0), 1e-3),
+    "radau": (_method(DRIVEN, "radau", 2.0, 1e-6), 5e-4),
+    "reference": (_method(PUSHED, "reference", 20.0), 2e-3),
+    "reference-waves": (_method(DRIVEN, "reference", 20.0), 2e-3),
+    "runge-kutta": (_program(FREE, "runge-kutta", "fortran"), 1e-7),
+    "four-term-waves": (_program(DRIVEN, "four-term", "fortran"), 2e-6),
+    "two-term-python": (_program(DRIVEN, "two-term", "python"), 1e-4),
+}
+
+
+def _refusal(run: Run, effort: float) -> str:
+    with pytest.raises(InputError) as caught:
+        run(effort)
+    return str(caught.value)
+
+
+def _advised(message: str) -> float:
+    found = re.search(r"or allow more work: --effort (\S+) \(effort=(\S+) in Python\)$", message)
+    assert found, message
+    assert found[1] == found[2]
+    return float(found[1])
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_limit_is_lifted_as_far_as_it_says(name: str) -> None:
+    """What it advises is enough, and not three times too much nor six with its own slack of two."""
+    (run, who), effort = LIMITED[name]
+    message = _refusal(run, effort)
+    assert re.match(f"(?i){who}[: ]", message)
+    advised = _advised(message)
+    assert run(advised).ended == "complete"
+    assert _advised(_refusal(run, advised / 8.0)) == pytest.approx(advised, rel=1.0)
+
+
+@pytest.mark.parametrize(("count", "span"), [(0, 1000.0), (50, 50.0)])
+def test_waves_count(count: int, span: float) -> None:
+    """Sines that do next to nothing make each step dearer, and so fewer steps are allowed."""
+    scene = replace(FREE, torque=TorqueLaw(sines=(((0.0, 0.0, 1e-30), 1.0),) * count))
+    steps = {"taylor": 1e7 / (1.0 + 0.5 * count), "dop853": 5e5 * 8.0 / (8.0 + count)}
+    for name, allowed in steps.items():
+        found = re.search(r"after (\d+) ", _refusal(_method(scene, name, span)[0], 1e-4))
+        assert found
+        assert int(found[1]) == pytest.approx(1e-4 * allowed, abs=1.0)
+
+
+@pytest.mark.parametrize("name", [name for name in PREPARED if name not in ("closed-form", "auto")])
+def test_prepared_solver_has_the_limit_too(name: str) -> None:
+    omega = np.array(DRIVEN.omega)
+    tolerance = 1e-6
+    short = prepare(DRIVEN, name, tolerance, effort=1e-8)
+    assert np.isnan(short(omega, 20.0)).all()
+    assert short.status == "gave up"
+    if name not in FIXED_STEP:
+        with pytest.raises(InputError, match="allow more work"):
+            short.trajectory(omega, [20.0])
+    other = copy.copy(short)
+    other(omega, 20.0)
+    assert other.status == "gave up"
+    enough = prepare(DRIVEN, name, tolerance)
+    enough(omega, 20.0)
+    assert enough.status == "complete"
+
+
+@pytest.mark.parametrize(
+    "effort", [0.0, -1.0, float("nan"), float("inf"), 10**400, "2", b"2", True, None, 1j, [1.0]]
+)
+def test_effort_is_a_number_above_0(effort: float) -> None:
+    for call in (
+        lambda: solve(FREE, [1.0], effort=effort),
+        lambda: prepare(FREE, effort=effort),
+        lambda: PROGRAM_REGISTRY["two-term"].run(FREE, corrected("two-term"), effort=effort),
+    ):
+        with pytest.raises(
+            InputError, match=r"^effort: .*(above 0|where a number belongs|too large for binary64)$"
+        ):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("run --case 5 --method taylor --times 400 --effort 1e-6", "taylor gave up before t = 400"),
+        ("run --case 5 --program two-term --effort 1e-8", "two-term (fortran): 600 steps with"),
+        ("compare --case 5 --effort 1e-5", "two-term (python): "),
+        ("compare --case 5 --effort 1e-7 --ablate", "two-term (fortran): "),
+        ("run --case 5 --method taylor --effort 0", "--effort: 0; allowed: a number above 0"),
+        ("compare --case 5 --effort inf", "--effort: 'inf' is not finite"),
+    ],
+)
+def test_command_line_has_the_option(
+    command: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(command.split()) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"pyharness: {words}"[:20])
+    assert said.count("\n") == 1
+
+
+def test_compare_refuses_at_once_what_takes_long(capsys: pytest.CaptureFixture[str]) -> None:
+    """By the pace of the reference's first steps; it took a minute to find out."""
+    begin = time.process_time()
+    command = "compare --case 5 --omega0 0.3,1.1,2.7 --step-size 1 --steps 100000"
+    assert main(command.split()) == 2
+    assert time.process_time() - begin < 2.0
+    said = capsys.readouterr().err
+    assert "reference: more than " in said
+    assert _advised(said.strip()) > 1.0
+
+
+def test_forecast_of_the_reference_is_not_taken_in_by_a_blow_up() -> None:
+    """Steps that shrink end soon, where the solution leaves every bound."""
+    scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    found = reference(scene, [0.5, 1000.0], effort=0.1)
+    np.testing.assert_allclose(found.omega, [[2.0] * 3], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("needed", "effort", "text"),
+    [(3.0, 1.0, "6"), (1.06e-4, 1e-4, "0.00022"), (151.0, 1.0, "310"), (None, 0.5, "5")],
+)
+def test_advice_is_rounded_up(needed: float | None, effort: float, text: str) -> None:
+    assert suggested(effort, needed) == text
+
+
+def test_huge_advice_is_a_number() -> None:
+    assert float(suggested(1.0, 1e305)) == 1e300
+    assert main(["run", "--case", "5", "--method", "taylor", "--times", "1e300"]) == 2
+
+
+def test_the_seven_cases_need_no_more() -> None:
+    for number in range(1, 8):
+        scene = case_scene(number)
+        assert solve(scene, scene.times(), effort=1e-4).ended == "complete"
+
+
+def test_refusal_comes_back_from_another_process() -> None:
+    """What can't be unpickled leaves a pool waiting for ever."""
+    known = TimedError("gave up at t = {time} s", 2.5)
+    back = pickle.loads(pickle.dumps(known))
+    assert (str(back), back.time, str(back.slower(2.0))) == (
+        "gave up at t = 2.5 s", 2.5, "gave up at t = 5 s",
+    )  # fmt: skip

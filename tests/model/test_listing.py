@@ -1,0 +1,86 @@
+"""Listings: names, options, and the bits that the Fortran reads."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pyharness import InputError, Listing, subset
+from pyharness.model.listing import PROGRAMS, corrected, entries, names_of, original
+from tests.divergences import divergences
+
+
+def test_names_are_those_of_the_fortran_and_the_bits_agree() -> None:
+    source = (Path(__file__).parent.parent.parent / "fortran/original/listing.f90").read_text()
+    found = dict(re.findall(r"listing%(\w+) = btest\(bits, (\d+)\)", source))
+    assert {name.replace("_", "-"): int(bit) for name, bit in found.items()} == {
+        entry["id"]: entry["flag"] for entry in entries()
+    }
+
+
+def test_every_entry_names_its_cards_in_every_program_that_has_it() -> None:
+    for entry in entries():
+        assert set(entry["cards"]) == set(entry["programs"])
+        assert entry["kind"] in ("defect", "reading")
+
+
+def test_programs_have_the_defects_of_the_apparatus() -> None:
+    assert names_of("defect", "two-term") == ("dt-accumulates", "x3-reads-acl2", "torque-held")
+    assert names_of("defect", "four-term") == ("dt-accumulates", "torque-held")
+    assert len(names_of("defect", "runge-kutta")) == 6
+    assert names_of("reading", "four-term") == ()
+
+
+def test_labels() -> None:
+    for program in PROGRAMS:
+        assert original(program).label == "original"
+        assert corrected(program).label == "corrected"
+    assert subset("two-term", fix=["torque-held"]).label == "custom"
+
+
+def test_options_of_the_command_line() -> None:
+    rest = {"x3-reads-acl2", "torque-held"}
+    assert subset("two-term").label == "original"
+    assert subset("two-term", fix=["dt-accumulates"]).defects == rest
+    assert subset("two-term", keep=["dt-accumulates"]).defects == {"dt-accumulates"}
+    assert subset("two-term", "original", keep=["dt-accumulates"]).label == "original"
+    assert subset("two-term", "corrected", fix=["dt-accumulates"]).label == "corrected"
+    both = subset("two-term", fix=["dt-accumulates"], keep=["torque-held"])
+    assert both.defects == rest
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ({"program": "two-term", "fix": ["stage-base"]}, "program two-term has no defect"),
+        ({"program": "two-term", "fix": ["dt-acumulates"]}, "did you mean 'dt-accumulates'"),
+        ({"program": "two-term", "keep": ["c1-for-c"]}, "unknown defect 'c1-for-c'"),
+        ({"program": "two-term", "readings": ["do-variable"]}, "has no reading 'do-variable'"),
+        ({"program": "two-term", "base": "mended"}, "unknown listing 'mended'"),
+        (
+            {"program": "two-term", "fix": ["torque-held"], "keep": ["torque-held"]},
+            "both --fix and --keep",
+        ),
+        ({"program": "four-term", "readings": ["c1-for-c"]}, "allowed: none"),
+    ],
+)
+def test_mistakes_are_named(call: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=re.escape(words)):
+        subset(**call)
+
+
+def test_listing_refuses_what_the_program_has_not() -> None:
+    with pytest.raises(InputError, match="unknown program 'three-term'"):
+        Listing("three-term", frozenset())
+    with pytest.raises(InputError, match="has no defect 'stage-base'"):
+        Listing("two-term", frozenset(["stage-base"]))
+
+
+def test_divergences_are_complete_entries() -> None:
+    kinds = {"cross-language", "cross-build", "from-the-listing", "from-the-plan"}
+    identities = [entry["id"] for entry in divergences()]
+    assert len(set(identities)) == len(identities)
+    for entry in divergences():
+        assert entry["kind"] in kinds
+        assert all(entry[key] for key in ("what", "reason", "evidence"))

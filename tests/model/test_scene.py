@@ -1,0 +1,187 @@
+"""Scenes and scene files: what is read, and what is refused with what words."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, case_scene, read_scene
+from pyharness.model.scene import most_steps
+
+GOOD = """
+name = "spinning brick"
+[body]
+moments = [40.0, 30.0, 20.0]
+[initial]
+omega = [0, 1.0, 1.0]
+[torque]
+constant = [1.0, 2.0, 3.0]
+rate = [0.0, 0.0, 1.0]
+sines = [{ amplitude = [1.0, 0.0, 0.0], frequency = 100 }]
+cosines = [{ amplitude = [0.0, 1.0, 0.0], frequency = 100.0 }]
+[run]
+step_size = 0.02
+steps = 7
+"""
+
+
+def _read(folder: Path, text: str) -> Scene:
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return read_scene(path)
+
+
+def test_every_key_of_a_scene_file_is_read(tmp_path: Path) -> None:
+    scene = _read(tmp_path, GOOD)
+    assert scene == Scene(
+        name="spinning brick",
+        omega=(0.0, 1.0, 1.0),
+        moments=(40.0, 30.0, 20.0),
+        torque=TorqueLaw(
+            (1.0, 2.0, 3.0),
+            (0.0, 0.0, 1.0),
+            (((1.0, 0.0, 0.0), 100.0),),
+            (((0.0, 1.0, 0.0), 100.0),),
+        ),
+        step_size=0.02,
+        steps=7,
+    )
+    assert scene.masses == (100.0, 110.0, 120.0)
+    assert scene.forces == (10.0, 20.0, 40.0)
+
+
+def test_only_body_and_initial_are_required(tmp_path: Path) -> None:
+    scene = _read(tmp_path, "[body]\ncoefficients=[1,2,3]\n[initial]\nomega=[1,2,3]\n")
+    assert scene.name == "scene"
+    assert (scene.step_size, scene.steps) == (0.01, 100)
+    assert scene.torque.is_zero
+    assert scene.euler_coefficients == (1.0, 2.0, 3.0)
+
+
+BODY = "[body]\nmoments=[3,2,1]\n"
+INITIAL = "[initial]\nomega=[1,2,3]\n"
+
+BAD = {
+    BODY + INITIAL + "[run]\nstep_sise = 1\n": "unknown key 'step_sise'; did you mean 'step_size'",
+    BODY + INITIAL + "[runn]\n": "unknown key 'runn'; did you mean 'run'",
+    BODY: "omega is missing",
+    INITIAL: "either moments or coefficients",
+    BODY + "coefficients=[1,2,3]\n" + INITIAL: "either moments or coefficients",
+    "[body]\nmoments=[3,2]\n" + INITIAL: "three numbers",
+    "[body]\nmoments=[3,2,0]\n" + INITIAL: "I3 is 0; allowed: a finite number above 0",
+    "[body]\nmoments=[3,-2,1]\n" + INITIAL: "I2 is -2",
+    "[body]\nmoments=[inf,2,1]\n" + INITIAL: "I1 is inf",
+    "[body]\nmoments=[nan,2,1]\n" + INITIAL: "I1 is nan",
+    "[body]\nmoments=[1,2,'x']\n" + INITIAL: "text where a number belongs",
+    "[body]\nmoments=[1,2,true]\n" + INITIAL: "true or false where a number belongs",
+    f"[body]\nmoments=[1,2,1{'0' * 400}]\n" + INITIAL: "too large for binary64",
+    BODY + "[initial]\nomega=[1,2,inf]\n": "omega: inf is not finite",
+    BODY + INITIAL + "[run]\nstep_size=0\n": "step_size is 0",
+    BODY + INITIAL + "[run]\nstep_size=-1\n": "step_size is -1",
+    BODY + INITIAL + "[run]\nsteps=0\n": "steps is 0",
+    BODY + INITIAL + "[run]\nsteps=10000000000\n": "GB",
+    BODY + INITIAL + "[run]\nsteps=1.5\n": "whole number",
+    BODY + INITIAL + "[run]\nsteps=1000\nstep_size=1e308\n": "not finite",
+    BODY + INITIAL + "[torque]\nsines=[{amplitude=[1,2,3]}]\n": "frequency is missing",
+    BODY + INITIAL + "[torque]\nsines=[3]\n": "list of",
+    BODY + INITIAL + "[torque]\nsines=[{amplitude=[1,2,3],frequency=1,phase=0}]\n": "'phase'",
+    BODY + INITIAL + "[torque]\nrate=[1,2,inf]\n": "rate: inf is not finite",
+    "name = 3\n" + BODY + INITIAL: "it must be text",
+    "body = 3\n" + INITIAL: "must be a table",
+    "[body\n": "not TOML",
+    "x = " + "[" * 100_000: "nested too deeply",
+}
+
+
+@pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
+def test_bad_scene_file_is_one_line_that_says_what_and_where(text: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        _read(tmp_path, text)
+    message = str(caught.value)
+    assert BAD[text] in message
+    assert "scene.toml" in message
+    assert "\n" not in message
+    assert len(message) < 400
+
+
+def test_files_that_are_no_scene(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="No such file"):
+        read_scene(tmp_path / "missing.toml")
+    with pytest.raises(InputError, match="directory"):
+        read_scene(tmp_path)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(InputError, match="not UTF-8"):
+        read_scene(binary)
+    large = tmp_path / "large.toml"
+    large.write_bytes(b"#" * 1_000_001)
+    with pytest.raises(InputError, match="larger than"):
+        read_scene(large)
+    with pytest.raises(InputError, match="null"):
+        read_scene("a\0b")
+
+
+def test_cases_are_those_of_table_1() -> None:
+    assert case_scene(3).euler_coefficients == ((39 - 20) / 41, (20 - 41) / 39, (41 - 39) / 20)
+    assert [case_scene(n).is_impossible for n in range(1, 8)] == [False] * 5 + [True, False]
+    assert case_scene(7).torque.at(0.0) == (0.0, 1.0, 0.0)
+    assert case_scene(7).torque.at(0.25) == (math.sin(25.0), math.cos(25.0), 0.25)
+    with pytest.raises(InputError, match="unknown case '8'"):
+        case_scene(8)
+
+
+def test_right_hand_side_is_the_normalized_form() -> None:
+    """Equations 16-18 against equations 5-7 with an inertia tensor and a cross product."""
+    scene = case_scene(7)
+    inertia = np.array(scene.moments)
+    for t, omega in ((0.0, (1.0, 2.0, 3.0)), (0.7, (-0.3, 5.0, 0.1))):
+        torque = np.array(scene.torque.at(t))
+        wanted = (torque - np.cross(omega, inertia * omega)) / inertia
+        np.testing.assert_allclose(scene.right_hand_side()(t, omega), wanted, rtol=1e-14)
+    scene = case_scene(5)
+    wanted = (np.array([100, 200, 150]) - np.cross((0, 1, 1), inertia * (0, 1, 1))) / inertia
+    np.testing.assert_allclose(scene.right_hand_side()(0.0, scene.omega), wanted, rtol=1e-14)
+
+
+def test_torque_of_coefficients_is_not_divided() -> None:
+    law = TorqueLaw((1.0, 2.0, 3.0))
+    by_coefficients = Scene("", (0.0, 0.0, 0.0), coefficients=(0.0, 0.0, 0.0), torque=law)
+    by_moments = Scene("", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law)
+    assert by_coefficients.normalized_torque(0.0) == (1.0, 2.0, 3.0)
+    assert by_moments.normalized_torque(0.0) == (0.5, 1.0, 1.5)
+
+
+def test_largest_number_of_steps_fits() -> None:
+    assert 10_000_000 < most_steps() <= 400_000_000
+
+
+def test_name_is_short_and_vectors_have_three_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "x.toml"
+    text = 'name = "%s"\n[body]\nmoments = [3, 2, 1]\n[initial]\nomega = [%s]\n'
+    for given, kept in (("long " * 30, "long " * 11 + "long"), ("x" * 70, "x" * 60)):
+        path.write_text(text % (given, "1, 2, 3"))
+        assert read_scene(path).name == kept
+    for numbers in ("1, 2", "1, 2, 3, 4", ""):
+        path.write_text(text % ("x", numbers))
+        with pytest.raises(InputError, match=r"omega: .* numbers; allowed: three numbers"):
+            read_scene(path)
+
+
+def test_rate_alone_makes_a_torque_vary() -> None:
+    law = TorqueLaw(rate=(0.0, 0.0, 3.0))
+    scene = Scene("ramp", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    assert law.varies
+    assert not law.is_zero
+    assert scene.right_hand_side()(2.0, scene.omega) == [0.0, 0.0, 6.0]
+
+
+def test_times_are_the_ends_of_steps() -> None:
+    assert replace(case_scene(3), step_size=0.5, steps=3).times() == [0.5, 1.0, 1.5]
+
+
+def test_wave_beyond_every_angle_is_no_number() -> None:
+    law = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e308),))
+    scene = Scene("fast", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    assert np.isnan(scene.right_hand_side()(1e10, scene.omega)[0])

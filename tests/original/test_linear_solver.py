@@ -1,0 +1,63 @@
+"""LEQT1F's stand-in: Fortran against twin bit for bit, and both against what a solver must do."""
+
+import numpy as np
+import pytest
+
+from pyharness.methods.kernels import extension
+from pyharness.original.linear_solver import SINGULAR, leqt1f
+
+
+def _both(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, int]:
+    """Solve in both languages, require the same bits, return the solution and IER."""
+    _, compiled, ier = extension().solve_linear(np.asfortranarray(a), np.asfortranarray(b))
+    columns, twin_ier = leqt1f(a.tolist(), b.T.tolist())
+    assert ier == twin_ier
+    np.testing.assert_array_equal(compiled, np.array(columns).T)
+    return compiled, ier
+
+
+@pytest.mark.bitwise
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
+def test_random_unsymmetric_systems(n: int) -> None:
+    """Unsymmetric, so that a transposed index shows; several right-hand sides."""
+    generator = np.random.default_rng(n)
+    for _ in range(200):
+        a = generator.normal(size=(n, n)) * 10.0 ** generator.integers(-3, 4, size=(n, 1))
+        b = generator.normal(size=(n, 6))
+        x, ier = _both(a, b)
+        assert ier == 0
+        bound = 1e-13 * np.linalg.cond(a / np.abs(a).max(axis=1, keepdims=True))
+        np.testing.assert_allclose(x, np.linalg.solve(a, b), rtol=0, atol=bound * np.abs(x).max())
+
+
+def test_singular_matrix_leaves_the_right_hand_sides() -> None:
+    b = np.array([[1.0, 2.0], [3.0, 4.0]])
+    for a in ([[1.0, 2.0], [2.0, 4.0]], [[0.0, 0.0], [1.0, 1.0]], [[1.0, 1e-17], [1.0, 0.0]]):
+        x, ier = _both(np.array(a), b)
+        assert ier == SINGULAR
+        np.testing.assert_array_equal(x, b)
+
+
+def test_small_pivot_just_above_the_working_precision_is_not_singular() -> None:
+    # n + pivot must differ from n = 2, whose neighbour above is 4.4e-16 away.
+    _, ier = _both(np.array([[1.0, 1.0], [1.0, 1.0 + 1e-15]]), np.ones((2, 1)))
+    assert ier == 0
+    _, ier = _both(np.array([[1.0, 1.0], [1.0, 1.0 + 2.220446049250313e-16]]), np.ones((2, 1)))
+    assert ier == SINGULAR
+
+
+def test_rows_are_scaled_before_the_pivot_is_chosen() -> None:
+    """Without scaling row 2 would be the pivot, and the small solution would be lost."""
+    a = np.array([[1.0, 1.0], [1e10, 1e25]])
+    x, ier = _both(a, np.array([[2.0], [1e25]]))
+    assert ier == 0
+    np.testing.assert_allclose(x[:, 0], [1.0, 1.0], rtol=1e-14)
+
+
+def test_first_of_equal_maxima_is_the_pivot() -> None:
+    """Equal candidates: no exchange; the factors show which row was taken."""
+    factors, _, ier = extension().solve_linear(
+        np.asfortranarray([[3.0, 1.0], [-3.0, 2.0]]), np.asfortranarray([[1.0], [1.0]])
+    )
+    assert ier == 0
+    np.testing.assert_array_equal(factors, [[3.0, 1.0], [-1.0, 3.0]])

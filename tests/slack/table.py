@@ -1,0 +1,340 @@
+"""Plants of a chosen size: one just beyond every limit of `verify` and `stress`, one just within.
+
+What a limit promises is written down here once more, from its words and not from the code: a limit
+that becomes looser lets its plant pass, one that becomes too tight fails what lies within.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from pyharness.methods.registry import METHODS
+from pyharness.model.listing import PROGRAMS
+from tests.slack.plants import (
+    ULP,
+    Slack,
+    U,
+    beside,
+    bit_off,
+    counted_off,
+    crossing_off,
+    cut,
+    end_off,
+    ended,
+    exact,
+    form_for_all,
+    gives_up,
+    graded,
+    instead,
+    last_off,
+    linear,
+    near,
+    of_order,
+    off,
+    on,
+    other_library,
+    probe_off,
+    quotient_off,
+    refuses,
+    roundings,
+    shorter,
+    singular,
+    solved,
+    solver_bit_off,
+    solver_off,
+    some_bits,
+    stop_test,
+    value_off,
+    watched,
+    without,
+)
+
+_RUN = "pyharness.methods.registry.Program.run"
+_COMPILED = "pyharness.methods.kernels.run"
+_CASES = "pyharness.verify.methods"
+_DRAWN = "pyharness.verify.random_methods"
+_RECORDED = "pyharness.verify.golden.solve"
+_NEAR_SEPARATRIX = "pyharness.stress.trials.separatrix.run_method"
+_HELD = "pyharness.stress.hold.run_method"
+_TORQUE = "pyharness.stress.trials.torque"
+_TURNED = "pyharness.stress.trials.invariance"
+_REGIONS = "pyharness.stress.trials.regions"
+_STEPS = "pyharness.stress.trials.step_size"
+_MATRICES = "pyharness.stress.trials.matrices"
+
+_TIME = partial(bit_off, name="time")
+_BITS = "cells/runge-kutta/case-3/original"
+_ORDERS = {"two-term": 2, "four-term": 2, "runge-kutta": 4}
+_TEXTBOOKS = {"improved-euler": 2, "taylor-3": 2, "rk4": 4}
+_GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
+_JUDGED = [name for name, method in METHODS.items() if method.finest < 1.0 and name != "reference"]
+
+
+def _with_form(name: str) -> int:
+    """Return a case that the method takes."""
+    return 4 if name == "closed-form" else 5
+
+
+VERIFY = (
+    # Every bit, counter and label, in one language and in both alike.
+    exact("cells/two-term/case-3/corrected", on(_COMPILED, bit_off), ULP),
+    exact("random/0/program", on(_COMPILED, bit_off), ULP),
+    exact(_BITS, on(_COMPILED, partial(bit_off, name="velocity")), ULP),
+    exact(_BITS, on(_COMPILED, partial(bit_off, name="recorded_time")), ULP),
+    exact(_BITS, on(_COMPILED, _TIME), ULP),
+    exact(_BITS, on(_RUN, _TIME), ULP),
+    exact(_BITS, on(_COMPILED, ended)),
+    exact(_BITS, on(_COMPILED, counted_off("evaluations"))),
+    exact(_BITS, on(_RUN, counted_off("evaluations"))),
+    exact("cells/four-term/case-3/corrected", on(_COMPILED, singular)),
+    exact("random/0/solve-taylor", refuses(f"{_DRAWN}.truth_of"), failing="random/0/no-truth"),
+    # .298 of the digits from 1e-3 to the finest that each claims: 1e-15, 1e-14, 7e-13, 2.1e-12,
+    # 2.2e-16, and 1e-12.
+    *(
+        near(f"random/0/solve-{name}", on(f"{_DRAWN}.solve", off), due)
+        for name, due in (
+            ("auto", 2.65e-7), ("taylor", 2.65e-7), ("gauss-7", 5.26e-7), ("dop853", 1.87e-6),
+            ("rk45", 2.59e-6), ("radau", 1.87e-6), ("lsoda", 2.59e-6), ("reference", 1.69e-7),
+        )
+    ),
+    *(
+        near(f"random/0/prepare-{name}", on(f"{_DRAWN}.prepare", solver_off), due)
+        for name, due in (("auto", 2.65e-7), ("taylor", 2.65e-7), ("quick", 2.07e-6))
+    ),
+    # Where a difference grows less than tenfold the tolerance is kept, and beyond that by all but
+    # the series, which may exceed it as many times; where it grows a thousandfold all may.
+    near("random/56/solve-taylor", on(f"{_DRAWN}.solve", off), 5.1e-6),
+    near("random/592/solve-taylor", on(f"{_DRAWN}.solve", off), 14.2 * 3.31e-6),
+    near("random/592/solve-gauss-6", on(f"{_DRAWN}.solve", off), 5.32e-6),
+    near("random/641/solve-gauss-8", on(f"{_DRAWN}.solve", off), 14.9e3 * 1.53e-6),
+    # Rounding has 2e-15 for each factor, here 15.1.
+    near("random/337/solve-gauss-8", on(f"{_DRAWN}.solve", off), 9.7e-14 + 15.1 * 2e-15),
+    exact("random/0/solve-taylor", on(f"{_DRAWN}.solve", _TIME), ULP),
+    exact("random/0/solve-taylor", on(f"{_DRAWN}.solve", ended)),
+    exact("random/0/solve-taylor", refuses(f"{_DRAWN}.solve")),
+    exact("cells/two-term/case-3/corrected", refuses("pyharness.verify.programs.case_scene"),
+          failing="cells/refused"),
+    # The last step of Case 7 ends at (.25, .91, 1.08): 4 roundings of either end of it, and h times
+    # 32 of the sizes of all terms of a rate, in all 2.8, .3 and .16; in collocation times the
+    # condition of the matrix, 7 and 547.
+    near("schemes/two-term/case-7", on(_RUN, last_off), 8.2 * U / 1.08),
+    near("schemes/four-term/case-7", on(_RUN, last_off), 37.0 * U / 1.08),
+    near("schemes/runge-kutta/case-7", on(_RUN, last_off), 2.9 * U / 1.08),
+    exact("schemes/runge-kutta/case-7", on(_RUN, cut)),
+    exact("stops/case-3/corrected", on(_RUN, cut)),
+    # In a step of Case 3 rates of 5 rad/s**2, each with 32 roundings, change by .27, and omega, 10
+    # rad/s, with 2 at either end and those of the rates, by .05.
+    near("stops/case-3/corrected", on(_RUN, quotient_off), 2.3e-13),
+    # Constants stand twice the rounding beside a quotient.
+    near("stops/case-3/corrected", stop_test, 4.6e-13),
+    # A tolerance, relative to the largest omega.
+    *(
+        near(f"methods/{name}/case-{_with_form(name)}/1.0e-06",
+             instead(f"{_CASES}.solve", solved), 1e-6)
+        for name in _JUDGED
+    ),
+    # Of a steady spin nothing is left but 8 roundings of the start and 8 of the result, and half a
+    # unit in the last place of the truth itself.
+    near("methods/taylor/case-1/1.0e-15", on(f"{_CASES}.solve", off), 1e-15 + 17.0 * U),
+    exact("methods/taylor/case-5/1.0e-06", refuses(f"{_CASES}.solve")),
+    exact("methods/closed-form/case-5/1.0e-06", instead(f"{_CASES}.solve", form_for_all)),
+    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", _TIME), ULP),
+    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", ended)),
+    *(
+        near(f"prepared/{name}/case-{_with_form(name)}/{end}/1.0e-06",
+             on(f"{_CASES}.prepare", solver_off), 1e-6)
+        for name in ("auto", "taylor", "quick", "closed-form")
+        for end in (3, -1)
+    ),
+    exact("prepared/quick/case-5/1/1.0e-06", on(f"{_CASES}.prepare", gives_up)),
+    *(
+        exact(f"prepared/{name}/case-5/bits", on(f"{_CASES}.prepare", solver_bit_off), ULP)
+        for name in (*_TEXTBOOKS, *_GAUSS)
+    ),
+    # A fifth of an order.
+    *(
+        near(f"orders/{name}/case-5{what}", graded(_RUN, of_order(_ORDERS[name])), 0.2)
+        for name in PROGRAMS
+        for what in ("", "/velocity")
+    ),
+    *(
+        near(f"orders/{name}/case-5", graded(f"{_CASES}.solve", of_order(due)), 0.2)
+        for name, due in _TEXTBOOKS.items()
+    ),
+    # An error is that of rounding up to 8 of every step, and what the truth is wrong by: 7e-13 if
+    # it is that of `solve_ivp`.
+    near("orders/two-term/case-5", graded(_RUN, roundings(7e-13)), 1.0),
+    near("orders/two-term/case-5/velocity", graded(_RUN, roundings(0.0)), 1.0),
+    # A method against print: half a unit of its last digit or what its source admits (5e-15 here),
+    # the finest tolerance, and two roundings of each number of the problem, which move the omega
+    # that they move the least by 4e-15.
+    near("external/detest-b5/20/taylor", on("pyharness.verify.external.solve", off), 1.0e-14),
+    near("external/detest-b5/20/gauss-8", on("pyharness.verify.external.solve", off), 1.9e-14),
+    near("external/detest-b5/20/quick", on("pyharness.verify.external.prepare", solver_off), 1e-9),
+    # The finest that LSODA claims to meet over 20 s.
+    near("external/detest-b5/20/lsoda", on("pyharness.verify.external.solve", off), 1.6e-11),
+    near("external/nasa-brick/30/taylor", on("pyharness.verify.external.solve", off), 2e-8 / 34.3),
+    # A program's halved steps leave half a unit in the last place of each of 16 384.
+    near("external/detest-b5/20/runge-kutta", on(_RUN, off), 2.0e-12),
+    # Half a unit of three digits, 3.9e-4 of which there are, and the halved steps' own error.
+    Slack("external/hairer-rigid-body/20/runge-kutta", on(_RUN, off), 4e-4, 1e-4),
+    exact("external/detest-b5/20/auto", refuses("pyharness.verify.external.solve")),
+    exact("external/detest-b5/20/two-term", on(_RUN, singular)),
+    # Both the record and the result may be wrong by 1e-9; where every bit counts, none.
+    near("golden/taylor/case-5", on(_RECORDED, off), 2e-9),
+    exact("golden/taylor/case-5", on(_RECORDED, _TIME), ULP),
+    exact("golden/taylor/case-5", on("pyharness.verify.golden.read_record", without)),
+    exact("golden/taylor", on("pyharness.verify.golden.recorded", without),
+          failing="golden/taylor/case-5-method-taylor-tolerance-1e-09"),
+    # Sine and cosine of another library may differ by what rounding may do to a wave.
+    near("golden/rk4/case-7", beside(other_library, on(_RECORDED, off)), 3.4e-15),
+    exact("golden/rk4/case-5", on(_RECORDED, bit_off), ULP),
+    exact("golden/two-term/case-5/corrected", on(_RUN, bit_off), ULP),
+)  # fmt: skip
+
+_SCALED = "pyharness.stress.trials.scales.run_method"
+_SPHERE = "near-symmetry/{}/sphere-equal/{}"
+_FREE = f"{_TURNED}.end"
+
+STRESS = (
+    exact("separatrix/taylor/none", refuses(_NEAR_SEPARATRIX),
+          failing="separatrix/refused"),
+    exact("separatrix/taylor/none", on(_NEAR_SEPARATRIX, bit_off), ULP),
+    near("separatrix/quick/none", on(_NEAR_SEPARATRIX, off), ULP),
+    exact("separatrix/taylor/none", on(_NEAR_SEPARATRIX, ended)),
+    # Near the separatrix the flow amplifies tolerances, 10.4 times here, and says nothing where
+    # less than two digits are left.
+    near("separatrix/taylor/early-1e-01/1e-06/error", on(_HELD, off), 1.04e-5),
+    near("separatrix/taylor/on-1e-04/1e-06/error", on(_HELD, off), 6.4e-3 / 0.63),
+    exact("separatrix/taylor/early-1e-01/1e-06/error", on(_HELD, ended)),
+    exact("separatrix/taylor/early-1e-01/1e-06/error", refuses(_HELD)),
+    # A sphere's flow amplifies nothing: a tolerance, 8 roundings of the start and 8 of the result,
+    # half a unit in the last place of the truth, and one of each of the 10 steps of a method that
+    # does not compensate, 4 where its steps are iterated.
+    *(
+        near(_SPHERE.format(name, "1e-06/error"), on(_HELD, off), 1e-6)
+        for name in ("taylor", *_GAUSS, "dop853", "lsoda", "radau", "rk45")
+    ),
+    near(_SPHERE.format("taylor", "1e-15/error"), on(_HELD, off), 1e-15 + 17.0 * U),
+    near(_SPHERE.format("taylor", "1e-15/drift"), on(_HELD, off), 1e-15 + 16.0 * U),
+    near(_SPHERE.format("rk4", "steps/error"), on(_HELD, off), 27.0 * U),
+    near(_SPHERE.format("rk4", "steps/drift"), on(_HELD, off), 26.0 * U),
+    near(_SPHERE.format("gauss-4", "steps/drift"), on(_HELD, off), 56.0 * U),
+    near(_SPHERE.format("closed-form", "1e-14/error"), on(_HELD, off), 1e-14),
+    near(_SPHERE.format("auto", "1e-14/drift"), on(_HELD, off), 1e-14),
+    # What the rounding of A, B and C makes of 1e6 s, 2.7e-12, and is.
+    Slack("near-symmetry/closed-form/large-pair-long-1e-01/1e-14/error", on(_HELD, off), 4e-12,
+          1e-12),
+    # The finest of the ladder that LSODA can meet over 14.5 radians, amplified 18.8 times.
+    near("near-symmetry/lsoda/small-pair-1e-01/1e-11/drift", on(_HELD, off), 1e-11),
+    near("near-symmetry/lsoda/small-pair-1e-01/1e-11/error", on(_HELD, off), 18.8 * 1e-11),
+    # What a step of .002 radians may leave out, by the largest derivatives, 20 000 times.
+    near("near-symmetry/improved-euler/small-pair-1e-01/steps/drift", on(_HELD, off), 1.38e-4),
+    near("near-symmetry/rk4/small-pair-1e-01/steps/drift", on(_HELD, off), 1.19e-9),
+    near("shapes/taylor/plate-123/1e-06/error", on(_HELD, off), 9.2e-5),
+    near("shapes/quick/plate-123/1e-06/drift", on(_HELD, off), 1e-6),
+    near("scales/gauss-4/1e0/1e-06/drift", on(_HELD, off), 1e-6),
+    near("scales/taylor/1e0/1e-06/error", on(_HELD, off), 4.1e-4),
+    exact("scales/taylor/same-2^100", on(_SCALED, bit_off, call=2), ULP),
+    exact("scales/taylor/beyond", on(_SCALED,
+          lambda found, size: replace(found, ended="complete") if size else found)),
+    # The flow of the driven body amplifies 4 times.
+    *(
+        near(f"torque/{name}/tiny-1e-12/1e-06", on(f"{_TORQUE}._end", end_off), 4e-6)
+        for name in ("taylor", "auto", "prepared-auto", "quick", "gauss-4", "dop853")
+    ),
+    exact("torque/taylor/tiny-1e-12/1e-06", refuses(f"{_TORQUE}.solve")),
+    exact("torque/prepared-auto/tiny-1e-12/1e-06", on(f"{_TORQUE}.prepare", gives_up)),
+    exact("torque/taylor/tiny-1e-12/1e-06",
+          on(f"{_TORQUE}._end", lambda found, size: (found[0], "overflow" if size else found[1]))),
+    # The sphere's angle has two words, and the sum 16 roundings of its terms.
+    near("torque/closed-form/no-digits-1e16/1e-14", on(f"{_TORQUE}._end", end_off),
+         1e-14 + 16.0 * U),
+    # 1e4 radians in binary64, of n evaluations 4 sqrt(n).
+    near("torque/taylor/axial-1e4/1e-15", on(f"{_TORQUE}._end", end_off), 4.8e-10),
+    # What a wave of 1e16 rad/s moves can't be seen: tolerance, amplified twice.
+    near("torque/quick/averaged-1e16/1e-06", on(f"{_TORQUE}._end", end_off), 2.03e-6),
+    # 4 sqrt(n) of one rounding of a step, and n times what it leaves out.
+    *(
+        near(f"length/{name}/tumbling/{what}/1000", watched(lambda size, time: size), due)
+        for name, what, due in (
+            ("taylor", "energy", 4.4e-13), ("taylor", "momentum", 2.3e-13),
+            ("taylor", "phase", 9.5e-10), ("gauss-4", "energy", 4.6e-13),
+            ("gauss-4", "momentum", 2.4e-13), ("gauss-4", "phase", 2.9e-7),
+        )
+    ),
+    # The power of the growth, half way to the next.
+    *(
+        Slack(f"length/{name}/tumbling/{what}/power",
+              watched(lambda size, time: 1e-20 * time**size), due + 0.1, due - 0.1)
+        for name, what, due in (
+            ("taylor", "energy", 1.25), ("taylor", "phase", 2.25), ("gauss-4", "momentum", 0.75),
+            ("gauss-4", "phase", 1.75),
+        )
+    ),
+    *(
+        near(f"length/closed-form/tumbling/{what}", watched(lambda size, time: size), due)
+        # 16 roundings of omega.
+        for what, due in (("energy", 6.3e-15), ("momentum", 3.5e-15), ("phase", 6.7e-15))
+    ),
+    exact("length/taylor/tumbling/prepared",
+          beside(shorter, on("pyharness.stress.trials.length.prepare", solver_bit_off)), ULP),
+    exact("invariance/taylor/signs-12/free/1e-06", on(_FREE, bit_off, call=2), ULP),
+    exact("invariance/runge-kutta/cyclic/free/corrected", on(_RUN, bit_off, call=2), ULP),
+    exact("invariance/taylor/signs-12/free/1e-06", refuses(_FREE)),
+    # Both solutions may be wrong by the tolerance, amplified 2.7 times.
+    near("invariance/taylor/cyclic/free/1e-06", on(_FREE, off, call=2), 5.4e-6),
+    near("invariance/dop853/times-1.7/free/1e-06", on(_FREE, off, call=2), 5.4e-6),
+    # The way back amplifies the error of the way there, and makes its own.
+    near("invariance/taylor/back/free/1e-06", on(_FREE, off, call=2), 8.6e-6),
+    # Four pieces, each amplified by those that follow, against one.
+    near("invariance/taylor/split/free/1e-06", on(_FREE, off, call=5), 1.8e-5),
+    exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
+    exact("matrices/two-term/1e-02/bits", linear(bit_off), ULP),
+    # 3n roundings of a sum; carried by the inverse.
+    near("matrices/two-term/1e-02/residual", linear(value_off), 6.0 * U),
+    near("matrices/two-term/1e-02/forward", linear(value_off), 18.0 * U),
+    near("matrices/two-term/1e-02/increment", linear(value_off), 41.0 * U),
+    near("matrices/four-term/1e-02/residual", linear(value_off), 12.0 * U),
+    # Two sums, each wrong by n + 2 roundings.
+    near("matrices/two-term/1e-02/pivots", on(f"{_MATRICES}.solved",
+         lambda found, size: replace(found, pivoting=(size, found.pivoting[1]))), 16.0 * U),
+    near("matrices/four-term/threshold",
+         on(f"{_MATRICES}.declared_singular_below", value_off), 1.3e-14),
+    exact("matrices/four-term/original/ier-1e-04", on(_COMPILED, singular)),
+    # Roundings of a step, amplified by the differences that find its derivative.
+    *(
+        near(f"regions/{program}/corrected/{check}", on(f"{_REGIONS}.{probe}", probe_off), due)
+        for program, check, probe, due in (
+            ("two-term", "first-step-spin-0.25", "first_step", 7.0e-14),
+            ("four-term", "first-step-spin-0.25", "first_step", 9.5e-11),
+            ("runge-kutta", "first-step-spin-0.25", "first_step", 4.8e-13),
+            ("two-term", "10-steps-imaginary-0.5", "later_steps", 5.9e-13),
+            ("runge-kutta", "10-steps-imaginary-0.5", "later_steps", 8.8e-14),
+            ("two-term", "boundary-real", "observed_boundary", 1.0e-12),
+            ("runge-kutta", "boundary-real", "observed_boundary", 1.1e-13),
+            ("two-term", "step-10-at--2", "complex_step", 5.0e-13),
+            ("four-term", "step-10-at--2", "complex_step", 3.7e-9),
+            ("two-term", "step-10-case-6", "moving_step", 1.9e-13),
+        )
+    ),
+    # Twice what steps miss, carried to the end, and in a million steps the roundings of each.
+    *(
+        near(f"step-size/{check}", instead(f"{_STEPS}._error", lambda size, *_: (size, "")), due)
+        for check, due in (
+            ("two-term/case-5/corrected/1e-02", 9.2e-4), ("rk4/case-5/1e-02", 6.4e-8),
+            ("four-term/case-5/corrected/1e-06", 6.3e-6), ("rk4/case-5/1e-06", 2.9e-10),
+            # The longest step of which anything is foretold.
+            ("rk4/case-4/3e-01", 0.03),
+            ("two-term/case-5/corrected/1e-06", 5.8e-10),
+        )
+    ),
+    # A quarter of a decade, and a decade of rounding by its root: the next of the steps is beyond.
+    Slack("step-size/rk4/case-5/crossing", crossing_off, 0.3, 0.2),
+    # Where the wobble of a spin has doubled.
+    near("step-size/rk4/case-4/diverges",
+         on("pyharness.stress.divergence.smallest_divergent", value_off), 0.0575),
+    exact("threads/linear-solver", some_bits),
+)  # fmt: skip
+
+SLACK: Sequence[Slack] = (*VERIFY, *STRESS)

@@ -1,0 +1,119 @@
+"""Slack of `verify` and `stress`: what lies just beyond a limit fails, what lies within passes."""
+
+import ast
+import pkgutil
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+
+import pyharness
+from pyharness.compare.checks import Check, Sample, bounded
+from pyharness.stress.run import TRIALS, stress
+from pyharness.verify.kinds import KINDS, verify
+from pyharness.verify.selection import Selection
+from tests.slack.plants import Slack, kept
+from tests.slack.table import SLACK
+
+PACKAGE = Path(pyharness.__file__).parent
+# A place of the source: file and line.
+Place = tuple[str, int]
+
+
+def _made(id: str) -> list[Check]:
+    """Make one check."""
+    if id.partition("/")[0] in KINDS:
+        return list(verify(Selection(only=[id], seed="fixed", draws=1000)))
+    return [outcome.check for outcome in stress([id])]
+
+
+@contextmanager
+def _failing(places: set[Place]) -> Iterator[None]:
+    """Gather where checks are made that fail."""
+
+    def seeing(init: Callable[..., None]) -> Callable[..., None]:
+        def seen(self: Check, *rest: Any, **named: Any) -> None:
+            init(self, *rest, **named)
+            if not self.passed:
+                frame = sys._getframe(1)
+                if frame.f_code is bounded.__code__ and frame.f_back:
+                    frame = frame.f_back
+                file = Path(frame.f_code.co_filename).relative_to(PACKAGE)
+                places.add((str(file), frame.f_lineno))
+
+        return seen
+
+    with (
+        patch.object(Check, "__init__", seeing(Check.__init__)),
+        patch.object(Sample, "__init__", seeing(Sample.__init__)),
+    ):
+        yield
+
+
+# What plants don't touch and limits are made of.
+_KEPT = ("verify.methods", "stress.hold", "stress.trials.torque", "stress.trials.scales")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _once() -> Iterator[None]:
+    """Compute truths and conditionings once."""
+    with pytest.MonkeyPatch.context() as patched:
+        for room in _KEPT:
+            for name in ("conditioning", "reference"):
+                target = f"pyharness.{room}.{name}"
+                if hasattr(pkgutil.resolve_name(f"pyharness.{room}"), name):
+                    patched.setattr(target, kept(pkgutil.resolve_name(target)))
+        yield
+
+
+@cache
+def _fared(slack: Slack) -> tuple[list[Check], list[Check], frozenset[Place]]:
+    """Return the checks within and beyond, and where those failed."""
+    places: set[Place] = set()
+    with slack.planted(slack.within):
+        within = _made(slack.check)
+    with slack.planted(slack.beyond), _failing(places):
+        beyond = _made(slack.check)
+    return within, beyond, frozenset(places)
+
+
+@pytest.mark.parametrize("slack", SLACK, ids=lambda slack: slack.check)
+def test_limit_lies_between_the_plants(slack: Slack) -> None:
+    within, beyond, _ = _fared(slack)
+    own = [check for check in within if check.id == slack.check] or within
+    assert own
+    assert all(check.passed for check in own)
+    assert (slack.failing or slack.check) in [check.id for check in beyond if not check.passed]
+
+
+def test_every_kind_and_every_trial_has_a_plant() -> None:
+    assert {slack.check.partition("/")[0] for slack in SLACK} == {*KINDS, *TRIALS}
+
+
+def _sites() -> Iterator[tuple[str, range]]:
+    """Yield the places of the source where a check is made that can fail."""
+    for path in sorted([*PACKAGE.glob("*.py"), *PACKAGE.glob("trials/*.py")]):
+        if path.name in ("checks.py", "self_test.py"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
+                continue
+            always = len(node.args) > 1 and getattr(node.args[1], "value", None) is True
+            if node.func.id in ("bounded", "Check", "Sample") and not always:
+                last = node.end_lineno or node.lineno
+                yield str(path.relative_to(PACKAGE)), range(node.lineno, last + 1)
+
+
+def test_every_place_that_makes_a_check_is_seen_to_fail() -> None:
+    places = {place for slack in SLACK for place in _fared(slack)[2]}
+    unseen = [
+        f"{file}:{lines.start}"
+        for file, lines in _sites()
+        if not any((file, line) in places for line in lines)
+    ]
+    assert unseen == []

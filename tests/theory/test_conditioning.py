@@ -1,0 +1,149 @@
+"""The flow's conditioning against finite differences of the true solution.
+
+The other way: no linearised equations, no propagator. The truth is computed in decimal arithmetic
+from neighbouring starts, and differences tell what an error becomes.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pyharness.methods import linearised
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array
+from pyharness.theory import conditioning as room
+from pyharness.theory.conditioning import ROUNDING, conditioning
+from pyharness.truth.reference import reference
+
+_CHANGE = 1e-6
+_SCENES = {
+    "beside the separatrix": (Scene("", (1e-3, 1.0, 0.0), moments=(6.0, 5.0, 2.0)), 14.0),
+    "any body": (Scene("", (0.4, -1.1, 0.7), moments=(3.0, 2.0, 4.0)), -7.0),
+    "constant torque": (case_scene(5), 0.8),
+}
+
+
+def _end(scene: Scene, start: Sequence[float], time: float) -> Array:
+    first, second, third = (float(x) for x in start)
+    found = reference(replace(scene, omega=(first, second, third)), [time])
+    assert found.remainder is not None
+    return np.asarray(found.omega[0] + found.remainder[0])
+
+
+def _propagator(scene: Scene, start: Sequence[float], time: float) -> Array:
+    """Return the derivatives of the end by the start."""
+    columns = []
+    for axis in range(3):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = list(start)
+            moved[axis] += sign * _CHANGE
+            ends.append(_end(scene, moved, time))
+        columns.append((ends[0] - ends[1]) / (2.0 * _CHANGE))
+    return np.array(columns).T
+
+
+@cache
+def _sampled(name: str, count: int = 32) -> tuple[Array, Array, Array]:
+    """Return times, omega and propagators to the end; the law of torque must not vary."""
+    scene, time = _SCENES[name]
+    times = np.linspace(0.0, time, count + 1)
+    omega = np.vstack([scene.omega, reference(scene, times[1:].tolist()).omega])
+    rest = [
+        _propagator(scene, w, time - t) if t != time else np.eye(3)
+        for t, w in zip(times, omega, strict=True)
+    ]
+    return times, omega, np.array(rest)
+
+
+@pytest.mark.parametrize("name", _SCENES)
+def test_amplification_is_that_of_neighbouring_solutions(name: str) -> None:
+    scene, time = _SCENES[name]
+    _, omega, rest = _sampled(name)
+    sampled = float(np.abs(rest).sum(axis=2).max())
+    found = conditioning(scene, time)
+    # Samples miss the very largest, never exceed it.
+    assert 0.999 * sampled <= found.amplification <= 1.1 * sampled
+    assert found.largest == pytest.approx(np.abs(omega).max(), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", _SCENES)
+def test_rounding_and_storing_are_sums_over_neighbouring_solutions(name: str) -> None:
+    scene, time = _SCENES[name]
+    times, omega, rest = _sampled(name)
+    a, b, c = scene.euler_coefficients
+    x, y, z = omega.T
+    terms = np.abs(np.column_stack([a * y * z, b * x * z, c * x * y]))
+    terms = terms + np.abs(scene.normalized_torque(0.0))
+    found = conditioning(scene, time)
+
+    def gathered(made: Array) -> Array:
+        arriving = np.array([np.abs(p) @ m for p, m in zip(rest, made, strict=True)])
+        return np.asarray(np.abs(np.trapezoid(arriving, times, axis=0)))
+
+    ends = np.abs(rest[0]) @ np.abs(omega[0]) + np.abs(omega[-1])
+    rounding = 8.0 * ROUNDING * (gathered(terms) + ends).max() / found.largest
+    assert found.rounding == pytest.approx(rounding, rel=0.02)
+    storing = ROUNDING * gathered(np.abs(omega)).max() / (abs(time) * found.largest)
+    assert found.storing == pytest.approx(storing, rel=0.02)
+
+
+def test_torque_that_varies_counts_with_its_angle() -> None:
+    """A rounding of frequency times t is one of so many radians."""
+    law = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1000.0),))
+    scene = Scene("", (1.0, 1.0, 1.0), moments=(2.0, 2.0, 2.0), torque=law)
+    found = conditioning(scene, 4.0)
+    # Of a sphere errors just add up: 1000 t over the moment, integrated.
+    wanted = 8.0 * ROUNDING * (0.5 * 1000.0 * 4.0**2 / 2.0 + 0.5 * 4.0 + 2.0)
+    assert found.rounding == pytest.approx(wanted, rel=0.01)
+    assert found.amplification == 1.0
+    assert found.unamplified == pytest.approx(wanted, rel=0.01)
+
+
+def test_a_wrong_sign_in_the_linearised_equations_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = linearised.jacobians
+    scene, time = _SCENES["any body"]
+    rest = _sampled("any body")[2]
+
+    def wrong(scene: Scene, omega: Array) -> Array:
+        found = right(scene, omega)
+        found[:, 0, 1] *= -1.0
+        return found
+
+    monkeypatch.setattr(linearised, "jacobians", wrong)
+    sampled = float(np.abs(rest).sum(axis=2).max())
+    assert not 0.999 * sampled <= conditioning(scene, time).amplification <= 1.1 * sampled
+
+
+def test_limit_that_is_no_number_allows_nothing() -> None:
+    """min(2.0, nan) is 2.0, which would let anything pass."""
+    flow = room.Conditioning(1.0, math.nan, 0.0, 0.0, 1.0)
+    assert flow.limit(1e-9) == 0.0
+
+
+def test_limit_says_nothing_beyond_two() -> None:
+    scene, time = _SCENES["beside the separatrix"]
+    flow = conditioning(scene, time)
+    assert flow.limit(1e-9) == pytest.approx(1e-9 * flow.amplification + flow.rounding)
+    assert flow.limit(1e-9, 1e6) > flow.limit(1e-9)
+    assert flow.limit(1.0) == flow.limit(math.inf) == 2.0
+
+
+def test_flow_between_nodes_is_that_of_the_middle() -> None:
+    """Its error falls with the square of the distance of nodes: with that itself at an end."""
+    scene, time = _SCENES["any body"]
+    errors = []
+    for count in (40, 80):
+        times = np.linspace(0.0, time, count + 1)
+        rows = reference(scene, times[1:].tolist()).omega
+        flow = linearised.propagators(scene, times, np.vstack([scene.omega, rows]))
+        finer = np.linspace(0.0, time, 16 * count + 1)
+        rows = reference(scene, finer[1:].tolist()).omega
+        exact = linearised.propagators(scene, finer, np.vstack([scene.omega, rows]))
+        errors.append(float(np.abs(flow[0] - exact[0]).max()))
+    assert errors[0] > 3.5 * errors[1]

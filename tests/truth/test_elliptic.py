@@ -1,0 +1,98 @@
+"""The truth of torque-free motion: against the series, and by the laws of a flow."""
+
+import itertools
+from dataclasses import replace
+from decimal import Decimal
+
+import mpmath
+import numpy as np
+import pytest
+
+from pyharness.model.scene import Scene
+from pyharness.truth.elliptic import jacobi, torque_free
+from pyharness.truth.reference import reference
+
+_START = (0.4, -1.1, 0.7)
+
+
+def _away(scene: Scene, time: float) -> float:
+    """Return the largest distance from the decimal Taylor series (rad/s)."""
+    series = reference(scene, [time], precise=True)
+    assert series.remainder is not None
+    rows = zip(torque_free(scene, time), series.omega[0], series.remainder[0], strict=True)
+    return max(abs(float(x - Decimal(float(w)) - Decimal(float(rest)))) for x, w, rest in rows)
+
+
+@pytest.mark.parametrize("moments", list(itertools.permutations((6.0, 5.0, 2.0))))
+@pytest.mark.parametrize("time", [0.3, -9.0])
+def test_agrees_with_the_series(moments: tuple[float, float, float], time: float) -> None:
+    for signs in itertools.product((1.0, -1.0), repeat=3):
+        first, second, third = (w * s for w, s in zip(_START, signs, strict=True))
+        assert _away(Scene("", (first, second, third), moments=moments), time) < 1e-27
+
+
+@pytest.mark.parametrize(
+    ("moments", "omega"),
+    [
+        ((1.0, 1.0, 0.3), _START),
+        ((0.3, 1.0, 1.0), _START),
+        ((1.0, 0.3, 1.0), _START),
+        ((2.0, 2.0, 2.0), _START),
+        ((6.0, 5.0, 2.0), (0.1, 1.0, 0.1)),
+        ((6.0, 5.0, 2.0), (0.1, 1.0, -0.1)),
+        ((6.0, 5.0, 2.0), (0.0, 1.0, 0.0)),
+        ((6.0, 5.0, 2.0), (0.0, 0.0, -1.0)),
+        ((6.0, 5.0, 2.0), (0.0, 0.0, 0.0)),
+        ((200.0, 10.0, 20.0), _START),
+    ],
+)
+def test_agrees_where_the_motion_is_special(
+    moments: tuple[float, float, float], omega: tuple[float, float, float]
+) -> None:
+    assert _away(Scene("", omega, moments=moments), 5.0) < 1e-25
+
+
+def test_digits_hold_over_many_flips() -> None:
+    """Forward and back, each beyond what 40 digits would bear: the start comes out again."""
+    scene = Scene("", (1e-15, 1.0, 0.0), moments=(6.0, 5.0, 2.0))
+    there = torque_free(scene, 700.0)
+    halves = torque_free(scene, 350.0)
+    # omega holds 53 bits only, so that the second half starts beside: the laws are held instead.
+    for weights in ((6, 5, 2), (36, 25, 4)):
+        energies = [
+            sum(q * w * w for q, w in zip(weights, row, strict=True))
+            for row in ([Decimal(w) for w in scene.omega], halves, there)
+        ]
+        assert max(energies) - min(energies) < Decimal("1e-60")
+
+
+def test_coefficients_as_binary64_holds_them() -> None:
+    """The two solutions differ by what one rounding of A, B and C does, and are not the same."""
+    scene = Scene("", _START, moments=(3.0, 0.7, 2.9))
+    exact, held = torque_free(scene, 50.0), torque_free(scene, 50.0, rounded=True)
+    away = max(float(abs(x - y)) for x, y in zip(exact, held, strict=True))
+    assert 1e-18 < away < 1e-13
+    powers = Scene("", _START, coefficients=scene.euler_coefficients)
+    np.testing.assert_array_equal(
+        [float(x) for x in torque_free(powers, 50.0)], [float(x) for x in held]
+    )
+
+
+def test_unbounded_motion_is_refused() -> None:
+    scene = Scene("", _START, coefficients=(1.0, 1.0, 1.0))
+    with pytest.raises(ValueError, match="not bounded"):
+        torque_free(scene, 1.0)
+    assert torque_free(replace(scene, coefficients=(0.0, 0.0, 0.0)), 1.0) == [
+        Decimal(w) for w in _START
+    ]
+
+
+@pytest.mark.parametrize("comodulus", ["0.5", "1e-9", "1e-30", "1", "0"])
+def test_jacobi_agrees_with_mpmath(comodulus: str) -> None:
+    with mpmath.workdps(60):
+        parameter = 1 - mpmath.mpf(comodulus)
+        for u in ("0.3", "-4", "31.5"):
+            found = jacobi(Decimal(u), Decimal(comodulus))
+            for kind, value in zip(("sn", "cn", "dn"), found, strict=True):
+                wanted = mpmath.ellipfun(kind, mpmath.mpf(u), m=parameter)
+                assert abs(mpmath.mpf(str(value)) - wanted) < mpmath.mpf(10) ** -13, (kind, u)

@@ -1,0 +1,117 @@
+"""The pictures of `run` and `compare`: nothing is cut off, nothing that was computed is missing."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.views import pictures as plots
+
+pytest.importorskip("matplotlib")
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> "list[Figure]":
+    """Return the list to which every figure that is saved is added."""
+    figures = []
+    real = plots._saved
+
+    def keep(figure: "Figure", path: str) -> bytes:
+        figures.append(figure)
+        return real(figure, path)
+
+    monkeypatch.setattr(plots, "_saved", keep)
+    monkeypatch.chdir(tmp_path)
+    return figures
+
+
+def _ends(figure: "Figure") -> list[tuple[int, float, float]]:
+    """Return panel, time and place of every end that is marked."""
+    return [
+        (panel, float(np.asarray(line.get_xdata())[0]), float(np.asarray(line.get_ydata())[0]))
+        for panel, axes in enumerate(figure.axes)
+        for line in axes.lines
+        if line.get_marker() == "x"
+    ]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--case", "5", "--method", "auto"],
+        ["--case", "5", "--method", "taylor", "--times", "1"],
+        ["--case", "2", "--program", "runge-kutta"],
+        ["--case", "6", "--program", "two-term"],
+    ],
+)
+def test_title_is_within_the_picture(arguments: list[str], drawn: "list[Figure]") -> None:
+    assert main(["run", *arguments, "--plot", "x.png", "--out", "x.txt"]) == 0
+    box = drawn[0].texts[0].get_window_extent()
+    assert box.x0 >= 0.0
+    assert box.x1 <= drawn[0].bbox.x1
+    assert max(axes.bbox.y1 for axes in drawn[0].axes) <= box.y0
+
+
+def test_name_of_any_length_leaves_room(drawn: "list[Figure]", tmp_path: Path) -> None:
+    path = tmp_path / "long.toml"
+    name = "very " * 2000
+    path.write_text(f'name = "{name}"\n[body]\nmoments=[3,2,1]\n[initial]\nomega=[0.1,1,0.2]\n')
+    assert main(["run", "--scene", str(path), "--method", "auto", "--plot", "x.png"]) == 0
+    assert drawn[0].axes[0].bbox.height > 100.0
+
+
+def test_end_of_a_program_is_marked(drawn: "list[Figure]") -> None:
+    run = ["run", "--case", "2", "--program", "runge-kutta", "--plot", "x.png", "--out", "x.txt"]
+    assert main(run) == 0
+    assert [(panel, time) for panel, time, _ in _ends(drawn[0])] == [
+        (0, 0.25),
+        (1, 0.25),
+        (2, 0.25),
+    ]
+    assert "x: stopped at step 25 by V2" in drawn[0].texts[0].get_text()
+
+
+def test_end_out_of_view_is_marked_at_the_edge(drawn: "list[Figure]") -> None:
+    """Case 6: two-term as punched overflows at step 57, at 1e111."""
+    assert main(["compare", "--case", "6", "--plot", "x.png", "--out", "x.txt"]) == 0
+    ends = _ends(drawn[0])
+    assert sorted(panel for panel, _, _ in ends) == [0, 2, 3, 5, 6, 8]
+    for panel, time, place in ends:
+        bottom, top = drawn[0].axes[panel].get_ylim()
+        assert bottom <= place <= top
+        assert time == pytest.approx(0.56 if panel % 3 == 0 else 0.24)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "--case", "5", "--method", "auto", "--times", "1"],
+        ["run", "--case", "3", "--program", "four-term", "--steps", "1"],
+        ["compare", "--case", "3", "--steps", "1"],
+    ],
+)
+def test_one_row_is_a_mark(arguments: list[str], drawn: "list[Figure]") -> None:
+    assert main([*arguments, "--plot", "x.png", "--out", "x.txt"]) == 0
+    for axes in drawn[0].axes:
+        lines = [line for line in axes.lines if len(np.asarray(line.get_xdata())) == 1]
+        assert lines
+        assert all(line.get_marker() not in ("None", "", None) for line in lines)
+
+
+@pytest.mark.parametrize("ending", plots.FORMATS)
+def test_letter_that_the_font_lacks_is_no_warning(
+    ending: str, tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    path = tmp_path / "rigid.toml"
+    text = 'name = "\u56de\u8ee2"\n[body]\nmoments=[3,2,1]\n[initial]\nomega=[0.1,1,0.2]\n'
+    path.write_text(text, encoding="utf-8")
+    picture = str(tmp_path / f"x.{ending}")
+    assert main(["run", "--scene", str(path), "--method", "auto", "--plot", picture]) == 0
+    assert [str(each.message) for each in recwarn] == []

@@ -72,20 +72,21 @@ def _run(command: str) -> str:
         environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "100", "NO_COLOR": "1"}
         done = subprocess.run(
             [sys.executable, "-m", "pyharness", *shlex.split(command)],
-            cwd=folder, env=environment, capture_output=True, text=True, check=False,
+            cwd=folder, env=environment, capture_output=True, check=False,
         )  # fmt: skip
         written = {
             str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()[:16]
             for path in sorted(Path(folder).rglob("*"))
             if path.is_file() and path.name != "scene.toml"
         }
+    said, text = (each.decode(errors="backslashreplace") for each in (done.stderr, done.stdout))
     try:
-        printed = _steady(json.loads(done.stdout))
+        printed = _steady(json.loads(text))
     except ValueError:
-        printed = re.sub(r"\b[\d.]+ (s|ms|us|µs|min)\b", r"- \1", done.stdout).splitlines()
+        printed = text.splitlines()
     record = {
         "command": command, "exit": done.returncode, "printed": printed,
-        "said": done.stderr.splitlines(), "written": written,
+        "said": said.splitlines(), "written": written,
     }  # fmt: skip
     return json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 

@@ -1,14 +1,10 @@
-"""The work-precision picture of `bench`: error against time and against right-hand sides."""
+"""The pictures of `bench`: error against time and against right-hand sides; growth of errors."""
 
-import io
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pyharness.bench.measure import Finding, Row, Workload
-from pyharness.bench.report import bench_rows
-from pyharness.cli.output import numbers_beside
-from pyharness.views.text import csv_text
+from pyharness.model.report import Picture, Table, numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,16 +24,14 @@ _PROGRAMS = ("two-term", "four-term", "runge-kutta")
 _OURS = ("auto", "taylor", "closed-form", "rk4", "improved-euler", "taylor-3")
 # Orders whose slopes are drawn, against right-hand sides.
 _SLOPES = (2, 4, 8)
-_REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
 
-def bench_picture(finding: Finding, path: str) -> dict[str, bytes]:
-    """Draw a row for each workload; return content by path: the picture, and its rows as CSV."""
-    import matplotlib
+def bench_picture(finding: Finding, data: Table) -> Picture:
+    """Draw a row for each workload; `data` has the same numbers."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
-    figure = Figure(figsize=(14.0, 4.6 * count + 2.2), layout="constrained")
+    figure = Figure(figsize=(14.0, 4.6 * count + 2.2), dpi=100, layout="constrained")
     axes = figure.subplots(count, 2, squeeze=False, sharey="row")
     names = list(dict.fromkeys(row.method for row in finding.rows))
     styles = _styles(names)
@@ -68,14 +62,7 @@ def bench_picture(finding: Finding, path: str) -> dict[str, bytes]:
         "they stand on the left only.",
         fontsize=10,
     )
-    buffer = io.BytesIO()
-    form = Path(path).suffix.lstrip(".").lower()
-    with matplotlib.rc_context(_REPRODUCIBLE):
-        figure.savefig(
-            buffer, format=form, dpi=100, metadata={"Date": None} if form == "svg" else None
-        )
-    numbers = csv_text(*bench_rows(finding))
-    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
+    return Picture(figure, data)
 
 
 def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -138,11 +125,11 @@ def _slopes(axes: "Axes") -> None:
     axes.set_xlim(low, high)
 
 
-def growth_picture(found: "Mapping[int, Sequence[Growth]]", path: str) -> dict[str, bytes]:
-    """Draw error over time beside what one rounding of time changes; content by path, with CSV."""
+def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
+    """Draw error over time beside what one rounding of time changes."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(4.5 * len(found), 4.0), layout="constrained")
+    figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")
     axes = figure.subplots(1, len(found), sharey=True, squeeze=False)
     rows = []
     for place, (case, growths) in enumerate(found.items()):
@@ -154,13 +141,7 @@ def growth_picture(found: "Mapping[int, Sequence[Growth]]", path: str) -> dict[s
         one.set_title(f"Case {case}", fontsize=10)
         one.set_xlabel("time (s)")
         one.grid(visible=True, linewidth=0.3)
-        rows += [
-            [str(case), repr(each.time), repr(each.error), repr(each.conditioning)]
-            for each in growths
-        ]
+        rows += [[case, each.time, each.error, each.conditioning] for each in growths]
     axes[0, 0].set_ylabel("error over the largest omega")
     axes[0, 0].legend(loc="best")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=Path(path).suffix.lstrip(".").lower(), dpi=110)
-    numbers = csv_text(("case", "time", "error", "one_rounding"), rows)
-    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
+    return Picture(figure, numbers("case time error one_rounding", rows))

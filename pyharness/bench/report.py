@@ -1,78 +1,140 @@
-"""The views of `bench`: tables of at most 100 columns, CSV, JSON, Markdown."""
+"""The reports of `bench`: run time against error, what the plan saves, growth of errors."""
 
 import math
-import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from pyharness.bench.growth import Growth
 from pyharness.bench.measure import TARGETS, Finding, Workload
+from pyharness.bench.savings import Saving
 from pyharness.bench.scores import groups, means, scores, yardstick
-from pyharness.model.build import Build
-from pyharness.views.records import SCHEMA
-from pyharness.views.text import aligned, markdown_text, short, wrapped
+from pyharness.model.build import build, machine
+from pyharness.model.report import (
+    Column,
+    Line,
+    Picture,
+    Report,
+    Section,
+    Table,
+    digits,
+    numbers,
+    short,
+)
 
 _MOST_SHOWN = 3
 
 
-def bench_table(finding: Finding) -> str:
-    """Return the default view: a table for each workload, then the means."""
-    lines: list[str] = []
-    for title, head, rows in _parts(finding):
-        lines += [*wrapped(title), *aligned(head, rows, left=1), ""]
-    for line in _notes(finding):
-        lines += textwrap.wrap(line, 100, subsequent_indent="  ")
-    return "\n".join(lines) + "\n"
+def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
+    """Report a table for each workload, then the means; the page tells the machine as well.
 
+    `packages` are those whose versions count, `command` what makes the page again.
+    """
+    parts, notes = _parts(finding), _notes(finding)
+    here, built = machine(packages), build()
 
-def bench_markdown(finding: Finding, machine: dict[str, str], build: Build, command: str) -> str:
-    """Return a page: machine, versions, how to run it again, the tables, what was not run."""
-    parts = [
-        "# Run time against error",
-        f"Made by `{command}`; run that again to have it for another machine.",
-        "One process and one run: medians of interleaved batches. Times drift with the machine "
-        "and with what else it does: compare the ratios, not the times.",
-        markdown_text(
-            ("", "version"),
-            [
-                *([name, text] for name, text in machine.items()),
-                ["pyharness", build.version],
-                ["Fortran compiler", f"{build.compiler}, {build.flags}"],
-                ["Python", build.python],
-                ["NumPy", build.numpy or "-"],
-                ["SciPy", build.scipy or "-"],
-                ["platform", build.platform],
-            ],
-        ).rstrip(),
+    def draw() -> Picture:
+        from pyharness.bench.pictures import bench_picture
+
+        return bench_picture(finding, data_table(finding))
+
+    versions = [
+        *here.items(),
+        ("pyharness", built.version),
+        ("Fortran compiler", f"{built.compiler}, {built.flags}"),
+        ("Python", built.python),
+        ("NumPy", built.numpy),
+        ("SciPy", built.scipy),
+        ("platform", built.platform),
     ]
-    for title, head, rows in _parts(finding):
-        parts += [f"## {title}", markdown_text(head, rows).rstrip()]
-    parts += ["## Notes", "\n".join(f"- {line}" for line in _notes(finding))]
-    return "\n\n".join(parts) + "\n"
+    tables: list[Section] = [[Line(f"## {title}"), table] for title, table in parts]
+    page: list[Section] = [
+        [Line("# Run time against error")],
+        [Line(f"Made by `{command}`; run that again to have it for another machine.")],
+        [
+            Line(
+                "One process and one run: medians of interleaved batches. Times drift with the "
+                "machine and with what else it does: compare the ratios, not the times."
+            )
+        ],
+        [Table((Column(""), Column("version")), versions)],
+        *tables,
+        [Line("## Notes")],
+        [Line(f"- {line}") for line in notes],
+    ]
+    return Report(
+        "bench",
+        text=[*parts, notes],
+        record=lambda: _record(finding) | {"machine": here, "build": asdict(built)},
+        data=data_table(finding),
+        page=page,
+        pictures={"precision": draw},
+    )
 
 
-def bench_rows(finding: Finding) -> tuple[Sequence[str], list[list[str]]]:
-    """Return head and rows for CSV: full numbers, empty where there is none."""
-    head = ("case", "horizon", "method", "kind", "setting", "seconds", "error", "evaluations",
-            "note")  # fmt: skip
-
-    def text(x: float | None) -> str:
-        return "" if x is None else repr(x)
-
+def data_table(finding: Finding) -> Table:
+    """Return all that was measured."""
     rows = [
         [
-            str(row.workload.scene.case or ""), repr(row.workload.horizon), row.method, row.kind,
-            text(row.setting), text(row.seconds), text(row.error), text(row.evaluations), row.note,
+            row.workload.scene.case or None, row.workload.horizon, row.method, row.kind,
+            row.setting, row.seconds, row.error, row.evaluations, row.note,
         ]
         for row in finding.rows
     ]  # fmt: skip
-    return head, rows
+    return numbers("case horizon method kind setting seconds error evaluations note", rows)
 
 
-def bench_record(finding: Finding, machine: dict[str, str], build: Build) -> dict[str, Any]:
-    """Return what `bench` found."""
+def savings_report(found: Sequence[Saving]) -> Report:
+    """Report what each skip of the plan saves."""
+    microseconds, quotient = digits(".3g", 1e6), digits(".2f")
+    columns = (
+        Column("skipped", left=True),
+        Column("where", left=True),
+        Column("us with it", microseconds, unit="s", full=microseconds),
+        Column("us without", microseconds, unit="s", full=microseconds),
+        Column("ratio", quotient, full=quotient),
+    )
+    rows = [[each.part, each.where, each.with_it, each.without, each.ratio] for each in found]
+    table = Table(columns, rows)
+    record = {"savings": [asdict(each) for each in found]}
+    return Report("bench", text=[[table]], record=lambda: record, data=table)
+
+
+def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
+    """Report errors of the Taylor method over time, by case."""
+    time, error, quotient = digits(".3g"), digits(".2g"), digits(".2f")
+    columns = (
+        Column("case", left=True),
+        Column("time", time, unit="s", full=time),
+        Column("error", error, full=error),
+        Column("one rounding of time", error, full=error),
+        Column("ratio", quotient, full=quotient),
+        Column("steps"),
+    )
+    rows = [
+        [case, each.time, each.error, each.conditioning, each.error / each.conditioning, each.steps]
+        for case, growths in found.items()
+        for each in growths
+    ]
+    table = Table(columns, rows)
+
+    def draw() -> Picture:
+        from pyharness.bench.pictures import growth_picture
+
+        return growth_picture(found)
+
+    record = {str(case): [asdict(each) for each in growths] for case, growths in found.items()}
+    return Report(
+        "bench",
+        text=[[table]],
+        record=lambda: {"growth": record},
+        data=table,
+        pictures={"growth": draw},
+    )
+
+
+def _record(finding: Finding) -> dict[str, Any]:
     return {
-        "schema": SCHEMA,
         "rows": [
             {
                 "case": row.workload.scene.case,
@@ -102,8 +164,6 @@ def bench_record(finding: Finding, machine: dict[str, str], build: Build) -> dic
             for (case, method), seconds in finding.preparation.items()
         ],
         "reference_error": finding.doubt,
-        "machine": machine,
-        "build": asdict(build),
     }
 
 
@@ -125,29 +185,31 @@ def ratio(value: float | None) -> str:
     return f"{value:.{min(digits, 5)}f}"
 
 
-def _parts(finding: Finding) -> list[tuple[str, list[str], list[list[str]]]]:
-    """Return title, head and rows of every table."""
-    by = yardstick(finding)
+def _parts(finding: Finding) -> list[tuple[str, Table]]:
+    """Return title and table of every workload, and of every mean."""
     targets = [f"{target:.0e}".replace("e-0", "e-") for target in TARGETS]
-    head = ["us per solve to", *(cell for name in targets for cell in (name, "ratio")), "best"]
+    columns = [Column("us per solve to", left=True)]
+    for name in targets:
+        columns += [Column(name, microseconds, unit="s"), Column("ratio", ratio)]
+    columns.append(Column("best", short))
     parts = []
     for load in finding.workloads:
-        rows = []
+        rows: list[list[Any]] = []
         for score in scores(finding, load):
-            row = [score.method]
-            for seconds, relative in zip(score.seconds, score.ratios, strict=True):
-                row += [microseconds(seconds), ratio(relative)]
-            rows.append([*row, short(score.best)])
+            pairs = zip(score.seconds, score.ratios, strict=True)
+            rows.append([score.method, *(x for pair in pairs for x in pair), score.best])
         if rows:
-            parts.append((_title(finding, load), head, rows))
+            parts.append((_title(finding, load), Table(columns, rows)))
+    columns = [Column("ratio at", left=True), *(Column(name, ratio) for name in targets)]
     for group, loads in groups(finding).items():
         if len(loads) > 1:
             labels = ", ".join(load.label for load in loads)
-            rows = [[each.method, *map(ratio, each.ratios)] for each in means(finding, loads)]
-            rows = [row for row in rows if set(row[1:]) != {"-"}]
-            title = f"Geometric mean of {by} time / own time: {group} (cases {labels})"
+            title = f"Geometric mean of {yardstick(finding)} time / own time: {group} "
+            title += f"(cases {labels})"
+            rows = [[each.method, *each.ratios] for each in means(finding, loads)]
+            rows = [row for row in rows if set(row[1:]) != {None}]
             if rows:
-                parts.append((title, ["ratio at", *targets], rows))
+                parts.append((title, Table(columns, rows)))
     return parts
 
 

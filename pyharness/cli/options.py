@@ -4,7 +4,7 @@ import argparse
 import math
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NoReturn
 
@@ -12,6 +12,7 @@ from pyharness.cli.stderr import say
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset
+from pyharness.model.report import Report
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene, read_scene
 
@@ -230,10 +231,10 @@ def check_outputs(options: argparse.Namespace) -> None:
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:
         return
-    from pyharness.cli.output import check_apart, check_writable, numbers_beside
+    from pyharness.cli.output import check_apart, check_writable
 
     if picture is not None:
-        from pyharness.views.pictures import check_picture
+        from pyharness.views.pictures import check_picture, numbers_beside
 
         check_picture(picture)
         for path in (picture, numbers_beside(picture)):
@@ -242,6 +243,29 @@ def check_outputs(options: argparse.Namespace) -> None:
         check_writable(options.out, "--out")
     if picture is not None and options.out is not None:
         check_apart(picture, options.out)
+
+
+def show(
+    report: Report,
+    options: argparse.Namespace,
+    own: Mapping[str, Callable[[], str | bytes]] | None = None,
+) -> None:
+    """Give a report in the form asked for, and draw its picture where one is asked for.
+
+    `own` are forms, by name, that this report alone has.
+    """
+    from pyharness.views.render import render
+
+    progress("")
+    form = options.format or FORMATS[0]
+    content = own[form]() if own and form in own else render(report, form)
+    if getattr(options, "plot", None) is not None:
+        from pyharness.views.pictures import saved
+
+        assert report.pictures is not None
+        (draw,) = report.pictures.values()
+        write(saved(draw(), options.plot), "--plot")
+    emit(content, options.out)
 
 
 def write(contents: dict[str, bytes], option: str) -> None:

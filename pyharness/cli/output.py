@@ -10,6 +10,7 @@ from typing import Self
 
 from pyharness.model.errors import InputError
 from pyharness.model.pipes import write_waiting
+from pyharness.views.pictures import numbers_beside
 
 
 def check_writable(path: str, option: str) -> None:
@@ -39,11 +40,6 @@ def check_writable(path: str, option: str) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
     raise InputError(f"{option} '{path}': {reason}; give a file in a folder that can be written")
-
-
-def numbers_beside(picture: str) -> str:
-    """Return where the numbers of a picture go."""
-    return str(Path(picture).with_suffix(".csv"))
 
 
 def check_apart(picture: str, out: str) -> None:

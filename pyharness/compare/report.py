@@ -1,58 +1,63 @@
-"""The views of `compare`: a table of at most 100 columns, CSV, Markdown; nothing is computed."""
+"""The report of `compare`."""
 
 import math
-from collections.abc import Sequence
+from typing import Any
 
 from pyharness.compare.agreement import Accuracy
 from pyharness.compare.comparison import Comparison
 from pyharness.compare.orders import Order
+from pyharness.model.report import (
+    Column,
+    Picture,
+    Report,
+    Table,
+    build_record,
+    digits,
+    numbers,
+    short,
+)
+from pyharness.model.scene_report import ending_record, heading, listing_record, scene_record
 from pyharness.model.trajectory import Stop, Trajectory
-from pyharness.views.text import aligned, heading, markdown_text, short, wrapped
 
-_PROGRAM_HEAD = (
-    "program", "listing", "steps", "stop", "w1", "w2", "w3", "V", "energy", "mom.sq", "ulp",
-    "us/step",
-)  # fmt: skip
-_METHOD_HEAD = (
-    "solve_ivp", "tolerance", "w1", "w2", "w3", "energy", "mom.sq", "evaluations", "ms",
-)  # fmt: skip
+_OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
+_DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
-def comparison_table(comparison: Comparison) -> str:
-    """Return the default view of `compare`."""
-    lines = heading(comparison.scene)
-    lines += wrapped(
-        f"reference: {comparison.reference.source}, error of any w below "
-        f"{short(comparison.reference.error)} rad/s "
-        f"(estimated {short(comparison.reference.estimate)} before rounding to binary64)"
+def comparison_report(comparison: Comparison) -> Report:
+    """Report what `compare` found: programs, then methods of `solve_ivp`, then the verdict."""
+    scene, truth = heading(comparison.scene), comparison.reference
+    reference = (
+        f"reference: {truth.source}, error of any w below {short(truth.error)} rad/s "
+        f"(estimated {short(truth.estimate)} before rounding to binary64)"
     )
-    lines.append("")
-    lines += aligned(_PROGRAM_HEAD, _program_rows(comparison), left=2)
-    lines.append("")
-    lines += aligned(
-        _METHOD_HEAD,
-        _method_rows(comparison),
-        left=1,
-    )
-    lines.append("")
-    lines += wrapped(
+    legend = (
         "w1-w3, V: largest error against the reference (rad/s, m/s). energy, mom.sq: largest "
         "relative drift. ulp: distance between Fortran and Python in units in the last place. "
         "stop: variable and its Lipschitz quotient against the limit. us/step: Fortran, the call "
         "included."
     )
-    for each in comparison.methods:
-        if each.failure:
-            lines += wrapped(f"failed: {each.method}: {each.failure}")
-    lines += verdict(comparison)
-    return "\n".join(lines) + "\n"
+    failures = [f"failed: {x.method}: {x.failure}" for x in comparison.methods if x.failure]
+    told, programs, methods = verdict(comparison), _programs(comparison), _methods(comparison)
+
+    def draw() -> Picture:
+        from pyharness.compare.picture import comparison_picture
+
+        return comparison_picture(comparison)
+
+    return Report(
+        "compare",
+        text=[[*scene, reference], [programs], [methods], [legend, *failures, *told]],
+        record=lambda: _record(comparison),
+        data=_data(comparison),
+        page=[scene, [programs], [methods], told],
+        pictures={"omega": draw},
+    )
 
 
 def verdict(comparison: Comparison) -> list[str]:
     """Return the verdict: one sentence, or one for each thing that is not as it should be."""
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
-    told += [f"not judged: {each}" for each in comparison.not_judged]
-    return [line for each in told for line in wrapped(each)]
+    return told + [f"not judged: {each}" for each in comparison.not_judged]
 
 
 def _as_expected(comparison: Comparison) -> str:
@@ -71,80 +76,69 @@ def _seen(order: Order) -> str:
     return f"{order.value:.1f}"
 
 
-def comparison_rows(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:
-    """Return head and rows of the comparison for CSV: full numbers, empty where there is none."""
-    head = (
-        "method", "listing", "active", "steps", "ended", "stop_variable", "stop_quotient",
-        "error_w1", "error_w2", "error_w3", "error_v", "energy_drift", "momentum_drift", "ulps",
-        "order", "order_state", "evaluations", "seconds",
+def _programs(comparison: Comparison) -> Table:
+    columns = (
+        Column("program", left=True), Column("listing", left=True), Column("steps"),
+        Column("stop"), *_OMEGA, Column("V", short, unit="m/s"), *_DRIFTS, Column("ulp", _count),
+        Column("us/step", digits(".2f", 1e6), unit="s"),
     )  # fmt: skip
     rows = []
     for each in comparison.programs:
-        run, good = each.trajectory, each.accuracy
-        cells = {
-            "method": each.listing.program,
-            "listing": each.listing.label,
-            "active": " ".join(sorted(each.listing.defects | each.listing.readings)),
-            "steps": str(run.steps),
-            "ended": run.ended,
-            "stop_variable": run.stop.variable if run.stop else "",
-            "stop_quotient": repr(run.stop.quotient) if run.stop else "",
-            **_accuracy_cells(good),
-            "ulps": _cell(each.ulps),
-            "order": _cell(each.order.value if each.order else None),
-            "order_state": each.order.state if each.order else "",
-            "evaluations": str(run.evaluations),
-            "seconds": _cell(each.seconds_per_step * run.steps),
-        }
-        rows.append([cells.get(name, "") for name in head])
-    for method in comparison.methods:
-        cells = {"method": method.method, "ended": method.failure}
-        if method.trajectory is not None and method.accuracy is not None:
-            cells |= {
-                "ended": method.trajectory.ended,
-                **_accuracy_cells(method.accuracy),
-                "evaluations": str(method.trajectory.evaluations),
-                "seconds": _cell(method.seconds),
-            }
-        rows.append([cells.get(name, "") for name in head])
-    return head, rows
+        run, good, listing = each.trajectory, each.accuracy, each.listing
+        end = _stop(run.stop, comparison.lipschitz) if run.stop else _ended(run)
+        row = [listing.program, listing.label, run.steps, end, *good.omega, good.velocity]
+        rows.append([*row, good.energy, good.momentum, each.ulps, each.seconds_per_step])
+    return Table(columns, rows)
 
 
-def comparison_markdown(comparison: Comparison) -> str:
-    """Return the two tables of the comparison in Markdown, with heading and verdict."""
-    parts = [
-        "\n".join(heading(comparison.scene)) + "\n",
-        markdown_text(_PROGRAM_HEAD, _program_rows(comparison)),
-        markdown_text(_METHOD_HEAD, _method_rows(comparison)),
-        "\n".join(verdict(comparison)) + "\n",
-    ]
-    return "\n".join(parts)
-
-
-def _program_rows(comparison: Comparison) -> list[list[str]]:
-    rows = []
-    for each in comparison.programs:
-        run, good = each.trajectory, each.accuracy
-        row = [each.listing.program, each.listing.label, str(run.steps)]
-        row.append(_stop(run.stop, comparison.lipschitz) if run.stop else _ended(run))
-        row += [short(x) for x in (*good.omega, good.velocity, good.energy, good.momentum)]
-        row += [_count(each.ulps), f"{1e6 * each.seconds_per_step:.2f}"]
-        rows.append(row)
-    return rows
-
-
-def _method_rows(comparison: Comparison) -> list[list[str]]:
-    rows = []
+def _methods(comparison: Comparison) -> Table:
+    columns = (
+        Column("solve_ivp", left=True), Column("tolerance", short), *_OMEGA, *_DRIFTS,
+        Column("evaluations"), Column("ms", digits(".1f", 1e3), unit="s"),
+    )  # fmt: skip
+    rows: list[list[Any]] = []
     for each in comparison.methods:
+        row = [each.method, each.tolerance]
         if each.trajectory is None or each.accuracy is None:
-            rows.append([each.method, short(each.tolerance), *["-"] * 6, "-"])
+            rows.append([*row, *[None] * 7])
             continue
-        good = each.accuracy
-        row = [each.method, short(each.tolerance)]
-        row += [short(x) for x in (*good.omega, good.energy, good.momentum)]
-        row += [str(each.trajectory.evaluations), f"{1e3 * each.seconds:.1f}"]
-        rows.append(row)
-    return rows
+        row += [*each.accuracy.omega, each.accuracy.energy, each.accuracy.momentum]
+        rows.append([*row, each.trajectory.evaluations, each.seconds])
+    return Table(columns, rows)
+
+
+def _data(comparison: Comparison) -> Table:
+    """Return programs and methods in one table."""
+    names = (
+        "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
+        "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"
+    )
+    rows: list[list[Any]] = []
+    for each in comparison.programs:
+        run, order = each.trajectory, each.order
+        rows.append(
+            [
+                each.listing.program, each.listing.label,
+                " ".join(sorted(each.listing.defects | each.listing.readings)), run.steps,
+                run.ended, *((run.stop.variable, run.stop.quotient) if run.stop else (None, None)),
+                *_accuracy(each.accuracy), each.ulps,
+                *((order.value, order.state) if order else (None, None)), run.evaluations,
+                each.seconds_per_step * run.steps,
+            ]
+        )  # fmt: skip
+    for method in comparison.methods:
+        tried, good = method.trajectory, method.accuracy
+        if tried is None or good is None:
+            found: list[Any] = [method.failure, *[None] * 13]
+        else:
+            found = [tried.ended, None, None, *_accuracy(good), None, None, None]
+            found += [tried.evaluations, method.seconds]
+        rows.append([method.method, None, None, None, *found])
+    return numbers(names, rows)
+
+
+def _accuracy(good: Accuracy) -> tuple[float | None, ...]:
+    return (*good.omega, good.velocity, good.energy, good.momentum)
 
 
 def _stop(stop: Stop, limit: float) -> str:
@@ -162,16 +156,50 @@ def _count(ulps: float) -> str:
     return f"{ulps:.0f}" if ulps < 1000 else short(ulps)
 
 
-def _accuracy_cells(good: Accuracy) -> dict[str, str]:
+def _record(comparison: Comparison) -> dict[str, Any]:
     return {
-        "error_w1": _cell(good.omega[0]),
-        "error_w2": _cell(good.omega[1]),
-        "error_w3": _cell(good.omega[2]),
-        "error_v": _cell(good.velocity),
-        "energy_drift": _cell(good.energy),
-        "momentum_drift": _cell(good.momentum),
+        "scene": scene_record(comparison.scene),
+        "lipschitz": comparison.lipschitz,
+        "reference": {
+            "source": comparison.reference.source,
+            "estimate": comparison.reference.estimate,
+            "error": comparison.reference.error,
+        },
+        "programs": [
+            {
+                "program": each.listing.program,
+                "listing": listing_record(each.listing),
+                **ending_record(each.trajectory),
+                **_accuracy_record(each.accuracy),
+                "ulps": each.ulps,
+                "differences": list(each.differences),
+                "order": each.order.value if each.order else None,
+                "order_state": each.order.state if each.order else None,
+                "seconds_per_step": each.seconds_per_step,
+            }
+            for each in comparison.programs
+        ],
+        "methods": [
+            {
+                "method": each.method,
+                "tolerance": each.tolerance,
+                "failure": each.failure or None,
+                **({} if each.trajectory is None else ending_record(each.trajectory)),
+                **({} if each.accuracy is None else _accuracy_record(each.accuracy)),
+                "seconds": each.seconds,
+            }
+            for each in comparison.methods
+        ],
+        "unexpected": list(comparison.unexpected),
+        "not_judged": list(comparison.not_judged),
+        "build": build_record(),
     }
 
 
-def _cell(x: float | None) -> str:
-    return "" if x is None else repr(x)
+def _accuracy_record(accuracy: Accuracy) -> dict[str, Any]:
+    return {
+        "error": list(accuracy.omega),
+        "velocity_error": accuracy.velocity,
+        "energy_drift": accuracy.energy,
+        "momentum_drift": accuracy.momentum,
+    }

@@ -1,133 +1,157 @@
-"""The views of `defects` and of `compare --ablate`: text of at most 100 columns."""
+"""The reports of `defects` and of `compare --ablate`."""
 
 import string
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from itertools import zip_longest
 from typing import Any
 
 from pyharness.history.ablation import CaseEffects, Effect
 from pyharness.model.listing import names_of
+from pyharness.model.report import Column, Field, Line, Report, Section, Table, numbers, short
 from pyharness.model.scene import Scene
-from pyharness.views.text import WIDTH, aligned, heading, short, wrapped
+from pyharness.model.scene_report import heading, listing_record, scene_record
 
 _FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "why")
-
-
-def apparatus_table(entries: Sequence[dict[str, Any]]) -> str:
-    """Return a line for each entry: name, kind, certainty, flag, what it is."""
-    head = ("name", "kind", "certainty", "flag", "what it is")
-    rows = [
-        [
-            entry["id"],
-            entry["kind"],
-            entry["certainty"],
-            str(entry.get("flag", "-")),
-            entry["summary"],
-        ]
-        for entry in entries
-    ]
-    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(4)]
-    room = WIDTH - sum(widths) - 2 * 4
-    lines = []
-    for row in [list(head), *rows]:
-        start = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False))
-        parts = textwrap.wrap(row[4], room)
-        lines += [f"{start if not i else ' ' * len(start)}  {part}" for i, part in enumerate(parts)]
-    lines += ["", "`defects NAME` shows the statements, the evidence and the effect."]
-    return "\n".join(lines) + "\n"
-
-
-def entry_text(entry: dict[str, Any]) -> str:
-    """Return one entry whole."""
-    lines = wrapped(f"{entry['id']}: {entry['summary']}")
-    lines.append("")
-    for field in _FIELDS:
-        value = entry.get(field)
-        if field == "cards":
-            value = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
-        if not value:
-            continue
-        lines += textwrap.wrap(
-            value, WIDTH, initial_indent=f"{field:10s} ", subsequent_indent=" " * 11
+_ENTRIES = (
+    *(Column(head, left=True) for head in ("name", "kind", "certainty", "flag")),
+    Column("what it is", left=True, fit="wrap"),
+)
+_EFFECTS = (
+    Column("case", left=True),
+    *(
+        column
+        for letter in "abcd"
+        for column in (
+            Column(f"w.{letter}", short, unit="rad/s"),
+            Column(f"V.{letter}", short, unit="m/s"),
+            Column(f"stop.{letter}"),
         )
+    ),
+)
+_SUBSETS = (
+    Column("active", left=True), Column("error of w", short, unit="rad/s"),
+    Column("error of V", short, unit="m/s"), Column("steps"), Column("stop"),
+)  # fmt: skip
+_HALF = 48  # columns of a text that stands beside another
+
+
+def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
+    """Report a line for each entry: name, kind, certainty, flag, what it is."""
+    rows = [
+        [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
+        for each in entries
+    ]
+    note = "`defects NAME` shows the statements, the evidence and the effect."
+    return Report(
+        "defects", text=[[Table(_ENTRIES, rows)], [note]], record=lambda: {"entries": entries}
+    )
+
+
+def entry_report(entry: dict[str, Any], effects: Sequence[CaseEffects]) -> Report:
+    """Report one entry whole, with its effect by program and case."""
+    fields = []
+    for name in _FIELDS:
+        value = entry.get(name)
+        if name == "cards":
+            value = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
+        if value:
+            fields.append(Field(f"{name:10s} ", value))
+    text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
     if "punched" in entry:
-        lines += ["", *_beside("as punched", entry["punched"], "as mended", entry["mended"])]
-    return "\n".join(lines) + "\n"
+        text.append(_beside("as punched", entry["punched"], "as mended", entry["mended"]))
+    if effects:
+        text += _effects(effects, entry["kind"] == "reading")
+    return Report(
+        "defects",
+        text,
+        record=lambda: {
+            "entry": entry,
+            "effects": [
+                {
+                    "program": each.program,
+                    "case": each.case,
+                    "punched": _effect_record(each.punched),
+                    "mended_alone": _effect_record(each.mended_alone),
+                    "kept_alone": _effect_record(each.kept_alone),
+                    "mended": _effect_record(each.mended),
+                }
+                for each in effects
+            ],
+        },
+    )
 
 
 def _beside(left_head: str, left: str, right_head: str, right: str) -> list[str]:
     """Return two texts side by side under their heads."""
-    room = (WIDTH - 3) // 2
     columns = [
-        [head, "-" * room, *textwrap.wrap(text, room)]
+        [head, "-" * _HALF, *textwrap.wrap(text, _HALF)]
         for head, text in ((left_head, left), (right_head, right))
     ]
     pairs = zip_longest(*columns, fillvalue="")
-    return [f"{a.ljust(room)}   {b}".rstrip() for a, b in pairs]
+    return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
 
 
-def effects_table(effects: Sequence[CaseEffects], is_reading: bool) -> str:
+def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
     """Return errors and stops by program and case: as punched, alone mended, alone kept, mended."""
     columns = ("as punched", "this alone mended", "this alone kept", "all mended")
     if is_reading:
         columns = ("punched, with it", "punched", "mended, with it", "mended")
-    head = ["case"]
-    for letter in "abcd":
-        head += [f"w.{letter}", f"V.{letter}", f"stop.{letter}"]
-    lines = [
-        "effect, measured now, 100 steps: largest error of w (rad/s) and of V (m/s), the stop;"
+    told: list[Section] = [
+        [
+            "effect, measured now, 100 steps: largest error of w (rad/s) and of V (m/s), the stop;",
+            ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)),
+        ]
     ]
-    lines.append(", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)))
     for program in dict.fromkeys(each.program for each in effects):
         rows = []
         for each in effects:
-            if each.program != program:
-                continue
-            row = [str(each.case)]
-            for found in (each.punched, each.mended_alone, each.kept_alone, each.mended):
-                row += [short(found.omega), short(found.velocity), _stop(found)]
-            rows.append(row)
-        lines += ["", program, *aligned(head, rows, left=1)]
-    return "\n".join(lines) + "\n"
+            if each.program == program:
+                row: list[Any] = [each.case]
+                for found in (each.punched, each.mended_alone, each.kept_alone, each.mended):
+                    row += [found.omega, found.velocity, _stop(found)]
+                rows.append(row)
+        told.append([program, Table(_EFFECTS, rows)])
+    return told
 
 
-def lattice_table(scene: Scene, program: str, effects: Sequence[Effect]) -> str:
-    """Return one row for each subset of the defects, as letters, sorted by effect."""
-    names = names_of("defect", program)
-    letters = dict(zip(names, string.ascii_lowercase, strict=False))
-    lines = [*heading(scene), f"program {program}: every subset of its defects, sorted by effect"]
-    lines += [f"  {letter}  {name}" for name, letter in letters.items()]
-    head = ("active", "error of w", "error of V", "steps", "stop")
-    rows = [
-        [
-            "".join(a if name in found.listing.defects else "." for name, a in letters.items()),
-            short(found.omega),
-            short(found.velocity),
-            str(found.steps),
-            _stop(found),
-        ]
-        for found in effects
-    ]
-    return "\n".join([*lines, "", *aligned(head, rows, left=1)]) + "\n"
+def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
+    """Report, by program, a row for each subset of its defects, as letters, sorted by effect."""
+    text: list[Section] = []
+    rows = []
+    for program, effects in found.items():
+        letters = dict(zip(names_of("defect", program), string.ascii_lowercase, strict=False))
+        title = f"program {program}: every subset of its defects, sorted by effect"
+        key = [f"  {letter}  {name}" for name, letter in letters.items()]
+        subsets = []
+        for each in effects:
+            errors, active = (each.omega, each.velocity, each.steps), each.listing.defects
+            written = "".join(a if name in active else "." for name, a in letters.items())
+            subsets.append([written, *errors, _stop(each)])
+            variable = each.stop.variable if each.stop else None
+            rows.append([program, " ".join(sorted(active)), *errors, each.ended, variable])
+        text += [[*heading(scene), title, *key], [Table(_SUBSETS, subsets)]]
+    return Report(
+        "compare",
+        text,
+        record=lambda: {
+            "scene": scene_record(scene),
+            "lattice": {name: list(map(_effect_record, each)) for name, each in found.items()},
+        },
+        data=numbers("program active error_w error_v steps ended stop_variable", rows),
+    )
 
 
-def lattice_rows(program: str, effects: Sequence[Effect]) -> tuple[Sequence[str], list[list[str]]]:
-    """Return head and rows of the lattice for CSV, errors in full."""
-    head = ("program", "active", "error_w", "error_v", "steps", "ended", "stop_variable")
-    rows = [
-        [
-            program,
-            " ".join(sorted(found.listing.defects)),
-            repr(found.omega),
-            repr(found.velocity),
-            str(found.steps),
-            found.ended,
-            found.stop.variable if found.stop else "",
-        ]
-        for found in effects
-    ]
-    return head, rows
+def _effect_record(effect: Effect) -> dict[str, Any]:
+    return {
+        "listing": listing_record(effect.listing),
+        "error": effect.omega,
+        "velocity_error": effect.velocity,
+        "steps": effect.steps,
+        "ended": effect.ended,
+        "stop": None if effect.stop is None else asdict(effect.stop),
+    }
 
 
 def _stop(found: Effect) -> str:

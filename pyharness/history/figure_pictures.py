@@ -1,25 +1,17 @@
-"""The figures of the thesis as files: findings in, pictures and their numbers out."""
+"""The figures of the thesis: findings in, pictures and their numbers out."""
 
-import io
 import textwrap
-from collections.abc import Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.history.figures import Curve, Finding
-from pyharness.model.errors import InputError
+from pyharness.model.report import Picture, Table, numbers
 from pyharness.model.trajectory import Array
-from pyharness.views.records import SCHEMA
-from pyharness.views.text import aligned, csv_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from pyharness.model.build import Build
-
-ENDINGS = ("svg", "png", "csv")
 # Told apart without colour: by dash, width and marker, and by where the markers stand.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _STYLES: dict[str, dict[str, Any]] = {
@@ -42,24 +34,13 @@ _END: dict[str, Any] = {
     "linestyle": "none", "zorder": 5, "clip_on": False,
 }  # fmt: skip
 _SETS = {"punched": "programs as punched", "mended": "programs mended"}
-# Without a salt of its own and with a date, an SVG would have other bytes in every run.
-_REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
 
-def check_matplotlib() -> None:
-    """Refuse to draw where matplotlib is missing."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise InputError("figures needs matplotlib: 'pip install matplotlib'") from None
-
-
-def files(finding: Finding) -> dict[str, bytes]:
-    """Return the content of a figure's files by name: SVG, PNG, and the plotted numbers as CSV."""
-    import matplotlib
+def figure_picture(finding: Finding) -> Picture:
+    """Draw a figure: its curves over the reference."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.2, 8.6), layout="constrained")
+    figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
     axes = figure.subplots(3, 1, sharex=True)
     truth = finding.reference
     for row in range(3):
@@ -79,33 +60,22 @@ def files(finding: Finding) -> dict[str, bytes]:
         handles, labels, loc="outside lower center", ncols=2, handlelength=5.0, frameon=False
     )
     figure.suptitle(_heading(finding), fontsize=10)
-    plan = finding.plan
-    content = {}
-    with matplotlib.rc_context(_REPRODUCIBLE):
-        for ending, metadata in (("svg", {"Date": None}), ("png", None)):
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=ending, dpi=110, metadata=metadata)
-            content[f"{plan.stem}.{ending}"] = buffer.getvalue()
-    content[f"{plan.stem}.csv"] = numbers(finding).encode()
-    return content
+    return Picture(figure, curve_numbers(finding))
 
 
-def numbers(finding: Finding) -> str:
-    """Return the plotted numbers as CSV, floats that round-trip."""
-    head = ["curve", "listing", "time", "recorded_time", "omega1", "omega2", "omega3"]
+def curve_numbers(finding: Finding) -> Table:
+    """Return the plotted numbers: omega (rad/s) by curve and time (s)."""
     truth = finding.reference
     rows = [
-        ["reference", "", repr(t), "", *map(repr, omega)]
+        ["reference", "", t, None, *omega]
         for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
     ]
     for curve in finding.curves:
-        run = curve.trajectory
-        for time, recorded, omega in zip(
-            run.time.tolist(), run.recorded_time.tolist(), run.omega.tolist(), strict=True
-        ):
-            rows.append([curve.listing.program, curve.listing.label])
-            rows[-1] += map(repr, (time, recorded, *omega))
-    return csv_text(head, rows)
+        run, name = curve.trajectory, [curve.listing.program, curve.listing.label]
+        times = zip(run.time.tolist(), run.recorded_time.tolist(), strict=True)
+        for pair, omega in zip(times, run.omega.tolist(), strict=True):
+            rows.append([*name, *pair, *omega])
+    return numbers("curve listing time recorded_time omega1 omega2 omega3", rows)
 
 
 def ending(curve: Curve) -> str:
@@ -116,7 +86,8 @@ def ending(curve: Curve) -> str:
     return f"overflow after step {run.steps}" if run.ended != "complete" else ""
 
 
-def _label(curve: Curve) -> str:
+def label(curve: Curve) -> str:
+    """Name a curve, and where it ends."""
     name, end = curve.listing.program, ending(curve)
     return f"{name} ({end})" if end else name
 
@@ -136,7 +107,7 @@ def _draw(axes: "Axes", curve: Curve, row: int, bottom: float, top: float) -> No
     height = top - bottom
     # Far outside the frame a renderer loses its way: there the curve may be anywhere.
     shown = np.clip(run.omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
-    axes.plot(run.time, shown, label=_label(curve), zorder=3, **_STYLES[name], **_MARKERS)
+    axes.plot(run.time, shown, label=label(curve), zorder=3, **_STYLES[name], **_MARKERS)
     if ending(curve) and len(run.time):
         axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
 
@@ -156,45 +127,3 @@ def _frame(finding: Finding, row: int) -> tuple[float, float]:
         high = max(high, top if top < largest + far else largest + near)
     margin = max(0.06 * (high - low), 0.001 * far, 1e-12)
     return low - margin, high + margin
-
-
-def figures_table(findings: Sequence[Finding]) -> str:
-    """Return the list of files, a line for each figure."""
-    endings = ",".join(ENDINGS)
-    rows = [
-        [
-            f"{finding.plan.stem}.{{{endings}}}",
-            str(finding.plan.case),
-            ", ".join(_label(curve) for curve in finding.curves),
-        ]
-        for finding in findings
-    ]
-    return "\n".join(aligned(("files", "case", "curves"), rows, left=3)) + "\n"
-
-
-def figures_record(findings: Sequence[Finding], build: "Build") -> dict[str, Any]:
-    """Return the list of figures with their files."""
-    return {
-        "schema": SCHEMA,
-        "figures": [
-            {
-                "figure": finding.plan.title,
-                "case": finding.plan.case,
-                "set": finding.plan.set,
-                "caption": finding.plan.caption,
-                "source": finding.plan.source,
-                "curves": [
-                    {
-                        "program": each.listing.program,
-                        "listing": each.listing.label,
-                        "steps": each.trajectory.steps,
-                        "ended": each.trajectory.ended,
-                    }
-                    for each in finding.curves
-                ],
-                "files": [f"{finding.plan.stem}.{ending}" for ending in ENDINGS],
-            }
-            for finding in findings
-        ],
-        "build": asdict(build),
-    }

@@ -13,6 +13,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.truth.reference import Reference, reference
 
 SETS = {"punched": original, "mended": corrected}
+ENDINGS = ("svg", "png", "csv")
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,11 @@ class Plan:
         return f"figure-{self.number:02d}{self.part.lower()}" + (
             "-mended" if self.set == "mended" else ""
         )
+
+    @property
+    def files(self) -> list[str]:
+        """The names of its files: pictures, and the plotted numbers."""
+        return [f"{self.stem}.{ending}" for ending in ENDINGS]
 
     @property
     def title(self) -> str:

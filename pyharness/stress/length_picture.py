@@ -1,15 +1,12 @@
-"""The picture of Brouwer's law: `stress --only length --plot FILE`; its rows as CSV."""
+"""The picture of Brouwer's law: `stress --only length --plot FILE`."""
 
-import io
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.cli.output import numbers_beside
+from pyharness.model.report import Picture, numbers
 from pyharness.theory.brouwer import LAWS
-from pyharness.views.text import csv_text
 
 if TYPE_CHECKING:
     from pyharness.stress.trials.length import Curve
@@ -20,16 +17,14 @@ _STYLES: dict[str, dict[str, Any]] = {
     "gauss-8": {"linestyle": (0, (6, 1.5)), "marker": "s", "color": "#3a86c8"},
     "gauss-4": {"linestyle": (0, (1, 1.5)), "marker": "^", "color": "#b02018"},
 }
-_REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
 
-def picture(found: Sequence["Curve"], path: str) -> dict[str, bytes]:
-    """Draw energy and phase of each motion; content by path, with CSV."""
-    import matplotlib
+def length_picture(found: Sequence["Curve"]) -> Picture:
+    """Draw energy and phase of each motion."""
     from matplotlib.figure import Figure
 
     motions = list(dict.fromkeys(each.motion for each in found))
-    figure = Figure(figsize=(10.0, 8.0), layout="constrained")
+    figure = Figure(figsize=(10.0, 8.0), dpi=100, layout="constrained")
     axes = figure.subplots(len(_SHOWN), len(motions), squeeze=False, sharex=True, sharey="row")
     for row, what in enumerate(_SHOWN):
         for column, motion in enumerate(motions):
@@ -60,24 +55,11 @@ def picture(found: Sequence["Curve"], path: str) -> dict[str, bytes]:
     figure.suptitle(
         "Errors over many starts of one motion; open: of one start. Thin: the bounds.", fontsize=10
     )
-    buffer = io.BytesIO()
-    form = Path(path).suffix.lstrip(".").lower()
-    with matplotlib.rc_context(_REPRODUCIBLE):
-        figure.savefig(
-            buffer, format=form, dpi=100, metadata={"Date": None} if form == "svg" else None
-        )
     rows = [
-        [
-            each.motion,
-            each.method,
-            each.what,
-            f"{n:.0f}",
-            repr(float(e)),
-            repr(float(limit)),
-            str(count),
-        ]
+        [each.motion, each.method, each.what, f"{n:.0f}", error, limit, count]
         for each in found
-        for n, e, limit, count in zip(each.steps, each.error, each.limits, each.starts, strict=True)
+        for n, error, limit, count in zip(
+            each.steps, each.error, each.limits, each.starts, strict=True
+        )
     ]
-    numbers = csv_text(("motion", "method", "what", "steps", "error", "limit", "starts"), rows)
-    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
+    return Picture(figure, numbers("motion method what steps error limit starts", rows))

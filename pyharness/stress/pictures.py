@@ -1,16 +1,13 @@
 """The picture of one trial: for each method what was found, and its limit, by circumstance."""
 
-import io
 import re
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from pyharness.cli.output import numbers_beside
 from pyharness.compare.checks import Check
+from pyharness.model.report import Picture, numbers
 from pyharness.stress.run import Trial
-from pyharness.views.text import csv_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,15 +20,13 @@ _MARKERS = {"error": "o", "drift": "v"}
 _COLUMNS = 2
 _PLACES_PER_LETTER = 0.6
 _COARSE = 1e-6
-_REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
 
-def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str, bytes]:
-    """Draw a panel for each method; return content by path: the picture, and its numbers as CSV.
+def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
+    """Draw a panel for each method.
 
     Circumstances whose names begin alike stand together, in the order in which they were tried.
     """
-    import matplotlib
     from matplotlib.figure import Figure
 
     drawn = [check for check in checks if len(check.id.split("/")) > 2 and check.value is not None]
@@ -40,7 +35,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str
     columns = min(_COLUMNS, len(methods))
     rows = -(-len(methods) // columns)
     width = max(5.0, 2.0 + 0.11 * max(places.values(), default=0.0))
-    figure = Figure(figsize=(width * columns, 2.6 * rows + 1.6), layout="constrained")
+    figure = Figure(figsize=(width * columns, 2.6 * rows + 1.6), dpi=110, layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, name in zip(grid.flat, methods, strict=False):
         _panel(axes, name, [check for check in drawn if check.id.split("/")[1] == name], places)
@@ -63,14 +58,8 @@ def stress_picture(trial: Trial, checks: Sequence[Check], path: str) -> dict[str
         handles=handles, loc="outside upper center", ncols=min(len(handles), int(inches)),
         frameon=False, fontsize=8, title="\n".join(lines), title_fontsize=9,
     )  # fmt: skip
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(_REPRODUCIBLE):
-        kind = Path(path).suffix.lstrip(".").lower()
-        metadata = {"Date": None} if kind == "svg" else None
-        figure.savefig(buffer, format=kind, dpi=110, metadata=metadata)
-    rows_out = [[check.id, repr(check.value), repr(check.limit), check.note] for check in drawn]
-    numbers = csv_text(["id", "value", "limit", "note"], rows_out)
-    return {path: buffer.getvalue(), numbers_beside(path): numbers.encode()}
+    found = [[check.id, repr(check.value), repr(check.limit), check.note] for check in drawn]
+    return Picture(figure, numbers("id value limit note", found))
 
 
 def _places(names: Sequence[str]) -> dict[str, float]:

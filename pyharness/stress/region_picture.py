@@ -1,14 +1,11 @@
 """The picture of the regions of linear stability: numbers in, picture out."""
 
-import io
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pyharness.cli.output import numbers_beside
+from pyharness.model.report import Column, Picture, Table, digits
 from pyharness.theory.regions import Regions
-from pyharness.views.text import csv_text
 
 # Told apart without colour: by dash and width.
 _STYLES: tuple[dict[str, Any], ...] = (
@@ -18,22 +15,14 @@ _STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#107040", "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.1},
     {"color": "#806000", "linestyle": (0, (2, 3)), "linewidth": 1.1},
 )
-_REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 _LEAST = 1e-13
 
 
-def regions_picture(found: Regions, path: str) -> dict[str, bytes]:
-    """Draw the regions beside the growth along the imaginary axis.
-
-    Returns
-    -------
-    dict
-        Content by path: the picture, and beside it the growth as CSV.
-    """
-    import matplotlib
+def regions_picture(found: Regions) -> Picture:
+    """Draw the regions beside the growth along the imaginary axis."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 5.8), layout="constrained")
+    figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")
     plane, axis = figure.subplots(1, 2)
     plane.axvspan(found.real[0], 0.0, color="#ededed", zorder=0)
     plane.text(
@@ -75,20 +64,7 @@ def regions_picture(found: Regions, path: str) -> dict[str, bytes]:
         handles, [each.name for each in found.regions], loc="outside lower center", ncols=3,
         handlelength=5.0, frameon=False, fontsize=9,
     )  # fmt: skip
-    buffer = io.BytesIO()
-    form = Path(path).suffix.lstrip(".").lower()
-    with matplotlib.rc_context(_REPRODUCIBLE):
-        figure.savefig(
-            buffer, format=form, dpi=100, metadata={"Date": None} if form == "svg" else None
-        )
-    return {path: buffer.getvalue(), numbers_beside(path): _numbers(found)}
-
-
-def _numbers(found: Regions) -> bytes:
-    head = ["distance", *(each.name for each in found.regions)]
-    columns = [each.growth.tolist() for each in found.regions]
-    rows = [
-        [f"{distance:.6g}", *(f"{value:.3g}" for value in values)]
-        for distance, *values in zip(found.distances.tolist(), *columns, strict=True)
-    ]
-    return csv_text(head, rows).encode()
+    columns = [Column("distance", full=digits(".6g"), unit="rad")]
+    columns += [Column(each.name, full=digits(".3g")) for each in found.regions]
+    rows = np.column_stack([found.distances, *(each.growth for each in found.regions)])
+    return Picture(figure, Table(columns, rows))

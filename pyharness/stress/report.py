@@ -1,35 +1,38 @@
-"""The table of `stress`: for each trial what was tried, and a row for each method."""
+"""The report of `stress`: for each trial what was tried, and a row for each method."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from pyharness.compare.checks import Check
-from pyharness.compare.checks_report import failure_lines, few_lines, verdict
+from pyharness.compare.checks_report import checks_report, told_singly, verdict
+from pyharness.model.report import Column, Picture, Report, Section, Table, short
 from pyharness.stress.run import Trial
-from pyharness.views.text import WIDTH, aligned, short, wrapped
 
-_HEAD = ("method", "checks", "failed", "bounded", "share", "value", "limit", "worst at")
+_COLUMNS = (
+    Column("method", left=True), Column("checks"), Column("failed"), Column("bounded"),
+    Column("share", short), Column("value", short), Column("limit", short),
+    Column("worst at", left=True, fit="cut"),
+)  # fmt: skip
 _NOTE = (
     "bounded: checks with a bound, the rest describe; share: of the bound that the worst takes, "
     "value and limit its own (without a bound: the largest value)"
 )
 
 
-def stress_table(trials: Sequence[Trial], checks: Sequence[Check]) -> str:
-    """Return the failures, then a table for each trial."""
-    failures = failure_lines(checks) + few_lines(checks)
-    lines = [*failures, ""] if failures else []
+def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
+    """Report the failures, then a table for each trial; a trial is a picture."""
+    text: list[Section] = [told_singly(checks)]
     for each in trials:
         own = [check for check in checks if check.kind == each.name]
-        if not own:
-            continue
-        lines += wrapped(f"{each.name}: {each.title}")
-        lines += wrapped(f"  bound: {each.bound}")
-        lines += ["", *_rows(own), ""]
-    lines += [*wrapped(_NOTE), verdict(checks)]
-    return "\n".join(lines) + "\n"
+        if own:
+            text.append([f"{each.name}: {each.title}", f"  bound: {each.bound}"])
+            text.append([_table(own)])
+    report = checks_report("stress", checks, [*text, [_NOTE, verdict(checks)]])
+    pictures = {each.name: partial(_picture, each, checks) for each in trials}
+    return report._replace(pictures=pictures)
 
 
-def _rows(checks: Sequence[Check]) -> list[str]:
+def _table(checks: Sequence[Check]) -> Table:
     groups: dict[str, list[Check]] = {}
     for check in checks:
         groups.setdefault(check.id.split("/")[1], []).append(check)
@@ -40,19 +43,27 @@ def _rows(checks: Sequence[Check]) -> list[str]:
         worst = max(judged, key=severity, default=None)
         if worst is None:
             worst = max(members, key=lambda check: _size(check.value))
-        share = "-" if worst.limit is None else short(severity(worst)[1])
-        where = "/".join(worst.id.split("/")[2:]) or "-"
-        row = [name, str(len(members)), str(failed), str(len(judged)), share]
-        rows.append([*row, short(worst.value), short(worst.limit), where])
-    return _left_last(aligned(_HEAD, rows, left=1), rows)
+        share = None if worst.limit is None else severity(worst)[1]
+        where = "/".join(worst.id.split("/")[2:]) or None
+        numbers = (share, worst.value, worst.limit)
+        rows.append([name, len(members), failed, len(judged), *numbers, where])
+    return Table(_COLUMNS, rows)
 
 
-def _left_last(lines: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines with their last column to the left, cut where it does not fit."""
-    width = max(len(row[-1]) for row in [_HEAD, *rows])
-    before = max(map(len, lines)) - width
-    cells = [_HEAD[-1], *(row[-1] for row in rows)]
-    return [(line[:before] + cell)[:WIDTH] for line, cell in zip(lines, cells, strict=True)]
+def _picture(trial: Trial, checks: Sequence[Check]) -> Picture:
+    if trial.name == "regions":
+        from pyharness.stress.region_picture import regions_picture
+        from pyharness.theory.regions import regions
+
+        return regions_picture(regions())
+    if trial.name == "length":
+        from pyharness.stress.length_picture import length_picture
+        from pyharness.stress.trials.length import curves
+
+        return length_picture(list(curves()))
+    from pyharness.stress.pictures import stress_picture
+
+    return stress_picture(trial, checks)
 
 
 def severity(check: Check) -> tuple[bool, float]:

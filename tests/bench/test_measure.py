@@ -27,15 +27,15 @@ from pyharness.bench.measure import (
 )
 from pyharness.bench.peers import installed, peers
 from pyharness.bench.pictures import _slopes
-from pyharness.bench.report import bench_markdown, bench_record, bench_rows, bench_table, ratio
+from pyharness.bench.report import bench_report, ratio
 from pyharness.bench.scores import groups, means, scores, yardstick
 from pyharness.cli.main import main
 from pyharness.cli.verbs.bench import chosen
 from pyharness.compare import timing as bench_timing
-from pyharness.model.build import build, machine
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.truth.reference import reference
+from pyharness.views.render import render
 
 Capture = pytest.CaptureFixture[str]
 SHORT = Workload("5", case_scene(5), 3.0)
@@ -114,8 +114,12 @@ def test_groups_part_torque_from_none_and_short_from_long() -> None:
     assert [load.horizon for load in workloads(3, 7.5)] == [7.5]
 
 
+def _rendered(finding: Finding) -> str:
+    return render(bench_report(finding, [], ""), "table")
+
+
 def test_table_shows_ratios_refusals_and_fits() -> None:
-    text = bench_table(KNOWN)
+    text = _rendered(KNOWN)
     lines = text.splitlines()
     assert max(map(len, lines)) <= 100
     at = next(i for i, line in enumerate(lines) if line.startswith("us per solve"))
@@ -127,7 +131,7 @@ def test_table_shows_ratios_refusals_and_fits() -> None:
     ]  # fmt: skip
     assert "slow: no tolerance below 2.2e-14 (case 5 at 1e-15)" in lines
     assert "slow: overflow (case 5 at 1e-06)" in lines
-    assert "slow: refused (case 5 at 1e-15, case 6)" in bench_table(
+    assert "slow: refused (case 5 at 1e-15, case 6)" in _rendered(
         replace(
             KNOWN,
             refused=[
@@ -142,7 +146,7 @@ def test_table_shows_ratios_refusals_and_fits() -> None:
 
 def test_markdown_page_tells_machine_versions_and_the_command() -> None:
     command = "pyharness bench --format markdown"
-    text = bench_markdown(KNOWN, machine(["numpy"]), build(), command)
+    text = render(bench_report(KNOWN, ["numpy"], command), "markdown")
     assert f"`{command}`" in text
     assert "| processor | " in text
     assert "| numpy | " in text
@@ -150,7 +154,8 @@ def test_markdown_page_tells_machine_versions_and_the_command() -> None:
 
 
 def test_record_is_as_contracted_and_csv_has_every_row() -> None:
-    record = bench_record(KNOWN, {}, build())
+    report = bench_report(KNOWN, [], "")
+    record = json.loads(render(report, "json"))
     assert record["schema"] == 1
     contract = ["case", "horizon", "method", "setting", "seconds", "error", "evaluations"]
     for row in record["rows"]:
@@ -159,9 +164,9 @@ def test_record_is_as_contracted_and_csv_has_every_row() -> None:
     assert (failed["seconds"], failed["error"], failed["note"]) == (None, None, "overflow")
     assert record["refused"][0]["reason"] == "no tolerance below 2.2e-14"
     assert record["compile_seconds"] == [{"case": 5, "method": "heyoka", "seconds": 0.5}]
-    json.dumps(record, allow_nan=False)
-    head, rows = bench_rows(KNOWN)
-    assert list(head)[:3] == contract[:3]
+    json.dumps(report.record(), allow_nan=False)
+    head, *rows = csv.reader(render(report, "csv").splitlines())
+    assert head[:3] == contract[:3]
     assert len(rows) == len(KNOWN.rows)
 
 

@@ -16,7 +16,7 @@ from pyharness.cli.main import main
 from pyharness.methods import kernels
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import original
-from pyharness.views.text import short
+from pyharness.model.report import short
 
 Capture = pytest.CaptureFixture[str]
 

@@ -14,20 +14,19 @@ from pyharness import InputError, case_scene
 from pyharness.compare import comparison as room
 from pyharness.compare.agreement import accuracy, differences, distance, ulps
 from pyharness.compare.comparison import compare, listings_for
-from pyharness.compare.report import (
-    comparison_markdown,
-    comparison_rows,
-    comparison_table,
-    verdict,
-)
+from pyharness.compare.picture import comparison_picture
+from pyharness.compare.report import comparison_report, verdict
 from pyharness.methods.registry import PROGRAM_REGISTRY, SCIPY_METHODS
-from pyharness.model.build import build
+from pyharness.methods.report import trajectory_report
 from pyharness.model.listing import corrected, original, subset
 from pyharness.model.trajectory import Trajectory
 from pyharness.truth.reference import reference
-from pyharness.views.pictures import comparison_picture
-from pyharness.views.records import comparison_record, json_text, run_record
-from pyharness.views.text import csv_text
+from pyharness.views.pictures import saved
+from pyharness.views.render import json_text, render
+
+
+def _text(found: room.Comparison) -> str:
+    return render(comparison_report(found), "table")
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +39,7 @@ def test_all_is_as_expected_in_every_case() -> None:
         found = compare(case_scene(case), listings_for())
         assert found.unexpected == ()
         assert [each.ulps for each in found.programs] == [0.0] * 6
-        for line in comparison_table(found).splitlines():
+        for line in _text(found).splitlines():
             assert len(line) <= 100, line
         assert found.not_judged == ()
         assert " ".join(verdict(found)).startswith("as expected: Fortran = Python bit for bit in 6")
@@ -48,7 +47,7 @@ def test_all_is_as_expected_in_every_case() -> None:
 
 def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> None:
     """Case 2 as punched: step 25, by V2."""
-    lines = comparison_table(case_2).splitlines()
+    lines = _text(case_2).splitlines()
     row = next(line for line in lines if line.startswith("runge-kutta") and "original" in line)
     assert row.split()[2:5] == ["25", "V2", "3305>500"]
 
@@ -57,7 +56,7 @@ def test_table_of_what_failed_and_of_large_quotients_fits() -> None:
     found = compare(replace(case_scene(3), step_size=1e-5, steps=3), listings_for())
     why = "Radau gave up at t = 49.568 s after 250000 right-hand sides; take a shorter time or less"
     failed = replace(found.methods[-1], trajectory=None, accuracy=None, failure=why)
-    text = comparison_table(replace(found, methods=(*found.methods[:-1], failed)))
+    text = _text(replace(found, methods=(*found.methods[:-1], failed)))
     assert "U2 2.4e5>500" in text
     assert f"failed: {failed.method}: {why}" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 100
@@ -156,7 +155,7 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
     found = compare(case_scene(3), [corrected("runge-kutta")])
     assert found.unexpected == ("runge-kutta corrected: Fortran and twin differ in omega",)
     assert found.programs[0].ulps == 1
-    assert "UNEXPECTED" in comparison_table(found)
+    assert "UNEXPECTED" in _text(found)
 
     def wrong(self: object, *args: object, **kwargs: object) -> Trajectory:
         run = real(self, *args, **kwargs)  # type: ignore[arg-type]
@@ -169,9 +168,9 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
 
 
 def test_views_carry_the_same_numbers(case_2: room.Comparison) -> None:
-    head, rows = comparison_rows(case_2)
-    table = list(csv.DictReader(io.StringIO(csv_text(head, rows))))
-    record = json.loads(json_text(comparison_record(case_2, build())))
+    report = comparison_report(case_2)
+    table = list(csv.DictReader(io.StringIO(render(report, "csv"))))
+    record = json.loads(render(report, "json"))
     assert record["schema"] == 1
     assert len(table) == len(record["programs"]) + len(record["methods"]) == 10
     for row, entry, each in zip(table, record["programs"], case_2.programs, strict=False):
@@ -179,7 +178,7 @@ def test_views_carry_the_same_numbers(case_2: room.Comparison) -> None:
         assert float(row["error_w1"]) == entry["error"][0] == each.accuracy.omega[0]
         assert int(row["steps"]) == entry["steps"] == each.trajectory.steps
     assert table[4]["stop_variable"] == record["programs"][4]["stop"]["variable"] == "V2"
-    markdown = comparison_markdown(case_2).splitlines()
+    markdown = render(report, "markdown").splitlines()
     assert sum(line.startswith("| two-term") for line in markdown) == 2
 
 
@@ -190,7 +189,7 @@ def test_number_that_is_not_finite_is_null() -> None:
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_picture_and_its_numbers(case_2: room.Comparison, suffix: str, tmp_path: Path) -> None:
-    files = comparison_picture(case_2, str(tmp_path / f"x.{suffix}"))
+    files = saved(comparison_picture(case_2), str(tmp_path / f"x.{suffix}"))
     picture, numbers = files.values()
     starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
     assert picture.startswith(starts[suffix])
@@ -205,7 +204,7 @@ def test_picture_and_its_numbers(case_2: room.Comparison, suffix: str, tmp_path:
 def test_diverging_program_leaves_the_picture_whole(tmp_path: Path) -> None:
     """Case 6 reaches 1e111; no warning, no empty frame."""
     found = compare(case_scene(6), listings_for())
-    assert len(comparison_picture(found, str(tmp_path / "x.png"))) == 2
+    assert len(saved(comparison_picture(found), str(tmp_path / "x.png"))) == 2
 
 
 def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -256,5 +255,6 @@ def test_largest_error_of_a_row_is_that_of_its_worst_component() -> None:
 def test_record_of_a_run_has_the_time_that_the_program_recorded() -> None:
     listing = original("two-term")
     run = PROGRAM_REGISTRY["two-term"].run(case_scene(5), listing)
-    found = run_record(case_scene(5), "two-term", listing, run, build())["trajectory"]
+    report = trajectory_report(case_scene(5), "two-term", listing, "", run)
+    found = report.record()["trajectory"]
     assert found["recorded_time"] == run.recorded_time.tolist() != run.time.tolist()

@@ -12,9 +12,8 @@ import pytest
 from pyharness.compare import orders
 from pyharness.compare.comparison import compare
 from pyharness.compare.orders import Order, measured_order, order_of
-from pyharness.compare.report import comparison_table
+from pyharness.compare.report import comparison_report
 from pyharness.methods.registry import PROGRAM_REGISTRY, Program
-from pyharness.model.build import build
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, corrected
 from pyharness.model.scene import Scene, TorqueLaw
@@ -23,7 +22,7 @@ from pyharness.model.trajectory import Array, Trajectory
 from pyharness.theory.conditioning import ROUNDING
 from pyharness.truth.reference import reference
 from pyharness.verify.plants.planted_twins import plant_in_twin
-from pyharness.views.records import comparison_record
+from pyharness.views.render import render
 
 
 def _steps(case: int, step_size: float, steps: int) -> Scene:
@@ -245,13 +244,14 @@ def test_compare_tells_what_it_does_not_judge() -> None:
     found = compare(_steps(5, 1e-5, 100), [corrected("four-term")])
     assert found.unexpected == ()
     assert len(found.not_judged) == 1
-    table = comparison_table(found)
+    report = comparison_report(found)
+    table = render(report, "table")
     assert "not judged: four-term corrected: IER = 129" in table
     assert "orders mended - (due: 2)" in table
-    assert comparison_record(found, build())["not_judged"] == list(found.not_judged)
+    assert report.record()["not_judged"] == list(found.not_judged)
 
 
 def test_compare_names_rounding() -> None:
     found = compare(case_scene(1), [corrected("two-term")])
-    assert "orders mended rounding (due: 2)" in comparison_table(found)
+    assert "orders mended rounding (due: 2)" in render(comparison_report(found), "table")
     assert found.not_judged == ()

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pyharness.compare.checks import Check
-from pyharness.compare.checks_report import checks_table
+from pyharness.compare.checks_report import checks_report, summary
 from pyharness.model.facts import facts
+from pyharness.views.text import text
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
 from tests.cross.comparison import compared, inside
 from tests.instruction_sets import fuses_here
@@ -83,7 +84,7 @@ def main() -> int:
             for found in pool.map(lambda job: list(_checked(job, twin.result())), ordered)
             for check in found
         ]
-    print(checks_table(skipped, checks, 2), end="")
+    print(text(checks_report("cross", checks, summary(skipped, checks, 2))), end="")
     return 0 if all(check.passed for check in checks) else 1
 
 

@@ -10,10 +10,11 @@ import pytest
 from pyharness import InputError, Scene, case_scene
 from pyharness.cli.main import main
 from pyharness.history.ablation import Effect, effects_of, entries, entry, lattice
-from pyharness.history.apparatus_report import lattice_table
+from pyharness.history.apparatus_report import lattice_report
 from pyharness.model.listing import Listing, names_of, original
 from pyharness.model.listing import entries as flagged
 from pyharness.truth.reference import Reference
+from pyharness.views.render import render
 
 Capture = pytest.CaptureFixture[str]
 KINDS = {"defect", "reading", "misreading", "dialect", "dead code", "missing text"}
@@ -80,7 +81,8 @@ def test_lattice_is_whole_and_sorted() -> None:
     for each in stopped:
         assert each.listing.defects >= {"stage-base", "base-not-restored"}
         assert each.listing.defects >= {"lipschitz-tests-velocity", "lipschitz-per-component"}
-    assert max(map(len, lattice_table(scene, "runge-kutta", found).splitlines())) <= 100
+    text = render(lattice_report(scene, {"runge-kutta": found}), "table")
+    assert max(map(len, text.splitlines())) <= 100
 
 
 def test_overflow_is_worse_than_any_error() -> None:

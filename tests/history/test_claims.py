@@ -20,6 +20,7 @@ from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_REPRODUCED, RE
 from pyharness.history.family.members import Member
 from pyharness.model.listing import corrected, names_of, original
 from pyharness.original.counting import _operations, operations_per_step
+from pyharness.views.render import render
 
 pytestmark = pytest.mark.claims
 Capture = pytest.CaptureFixture[str]
@@ -52,7 +53,7 @@ def test_every_claim_is_judged_and_its_numbers_are_told() -> None:
         assert found.methods.verdict in VERDICTS
         assert found.programs.numbers or found.methods.numbers
         assert len(found.survivals) >= len(each["assumptions"])
-        text = explanation(found)
+        text = render(explanation(found), "table")
         assert each["quote"] in text
         assert max(map(len, text.splitlines())) <= 100
 

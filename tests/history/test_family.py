@@ -37,10 +37,10 @@ from pyharness.history.family.rounding import (
 )
 from pyharness.methods import kernels
 from pyharness.model.listing import corrected, original
+from pyharness.model.report import short
 from pyharness.original.linear_solver import SINGULAR, leqt1f
 from pyharness.theory.tableau import Tableau, tableau
 from pyharness.truth.reference import reference
-from pyharness.views.text import short
 
 Capture = pytest.CaptureFixture[str]
 

@@ -21,6 +21,8 @@ from pyharness.history.figures import Curve, Finding
 from pyharness.methods import kernels
 from pyharness.model.listing import corrected, original
 from pyharness.truth.reference import reference
+from pyharness.views import pictures
+from pyharness.views.pictures import saved
 
 Capture = pytest.CaptureFixture[str]
 STEMS = ["06", "07", "08", "09", "10a", "10b", "11", "12"]
@@ -116,7 +118,7 @@ def test_lines_are_drawn_to_their_end_which_is_marked(monkeypatch: pytest.Monkey
         return plot(self, *values, **style)
 
     monkeypatch.setattr(Axes, "plot", spy)
-    figure_plots.files(finding)
+    figure_plots.figure_picture(finding)
     stopped = [each for each in seen if "runge-kutta" in str(each[2].get("label"))]
     crosses = [each for each in seen if each[2].get("marker") == "X"]
     run = kernels.run(case_scene(2), original("runge-kutta"))
@@ -148,7 +150,7 @@ def test_curve_that_diverges_leaves_the_picture() -> None:
         low, high = figure_plots._frame(beside, row)
         assert low <= calm[0] < calm[1] <= high
         assert high - low < 3.0 * (calm[1] - calm[0])
-    content = figure_plots.files(beside)
+    content = saved(figure_plots.figure_picture(beside), "figure-11.svg")
     assert len(_rows(content["figure-11.csv"].decode(), "two-term")) == 56
     assert b"e+1" not in content["figure-11.svg"]
     assert figure_plots.ending(wild) == "overflow after step 56"
@@ -156,8 +158,10 @@ def test_curve_that_diverges_leaves_the_picture() -> None:
 
 def test_same_bytes_in_every_process(folder: Path) -> None:
     code = (
-        "import sys; from pyharness.history import figures, figure_pictures as figure_plots; "
-        "found = figure_plots.files(next(figures.findings())); "
+        "import sys; from pyharness.history import figures, figure_pictures; "
+        "from pyharness.views.pictures import saved; "
+        "picture = figure_pictures.figure_picture(next(figures.findings())); "
+        "found = saved(picture, 'figure-06.svg', 'figure-06.png'); "
         "sys.stdout.buffer.write(found['figure-06.svg'] + found['figure-06.png'])"
     )
     wanted = (folder / "figure-06.svg").read_bytes() + (folder / "figure-06.png").read_bytes()
@@ -170,10 +174,9 @@ def test_same_bytes_in_every_process(folder: Path) -> None:
 
 def _fast(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw nothing: for the tests of what is written where."""
+    monkeypatch.setattr(figure_plots, "figure_picture", lambda finding: finding)
     monkeypatch.setattr(
-        figure_plots,
-        "files",
-        lambda finding: {f"{finding.plan.stem}.{end}": b"x" for end in figure_plots.ENDINGS},
+        pictures, "saved", lambda finding, *paths: dict.fromkeys(finding.plan.files, b"x")
     )
 
 

@@ -27,8 +27,9 @@ from pyharness import (
 )
 from pyharness.methods import kernels
 from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY
-from pyharness.views.records import json_text, run_record, scene_record
-from pyharness.views.text import heading
+from pyharness.methods.report import trajectory_report
+from pyharness.model.scene_report import heading, scene_record
+from pyharness.views.render import json_text, render
 
 PLAIN = Scene(
     "brick",
@@ -329,9 +330,8 @@ def test_a_name_that_steers_a_terminal_is_shown_escaped(tmp_path: Path) -> None:
     assert heading(scene)[0] == SHOWN
     assert SHOWN in repr(prepare(scene))
     listing = subset("two-term")
-    from pyharness.model.build import build
-
-    record = json_text(run_record(scene, "two-term", listing, kernels.run(scene, listing), build()))
+    run = kernels.run(scene, listing)
+    record = render(trajectory_report(scene, "two-term", listing, "", run), "json")
     assert json.loads(record)["scene"]["name"] == SHOWN
     for length in range(55, 66):
         name = dataclasses.replace(PLAIN, name="x" * length + " \x1b y").name

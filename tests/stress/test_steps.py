@@ -37,6 +37,7 @@ from pyharness.theory.regions import regions
 from pyharness.theory.schemes import FIXED_STEP, TERMS, Numbers, Series, local_error, spacing
 from pyharness.theory.step_errors import Forecaster, path
 from pyharness.verify.plants.planted_twins import plant_in_twin
+from pyharness.views.pictures import saved
 
 FIGURES = Path(__file__).parent.parent.parent / "docs/figures"
 
@@ -246,7 +247,7 @@ def test_a_wrong_coefficient_of_the_twin_is_caught(
 
 
 def test_the_stored_picture_is_current(tmp_path: Path) -> None:
-    made = regions_picture(regions(), "regions.csv.svg")
+    made = saved(regions_picture(regions()), "regions.csv.svg")
     stored = FIGURES / "stability-regions.csv"
     found = list(csv.reader(made["regions.csv.csv"].decode().splitlines()))
     wanted = list(csv.reader(stored.read_text().splitlines()))

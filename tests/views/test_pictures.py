@@ -21,13 +21,13 @@ Capture = pytest.CaptureFixture[str]
 def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> "list[Figure]":
     """Return the list to which every figure that is saved is added."""
     figures = []
-    real = plots._saved
+    real = plots._image
 
-    def keep(figure: "Figure", path: str) -> bytes:
+    def keep(figure: "Figure", form: str) -> bytes:
         figures.append(figure)
-        return real(figure, path)
+        return real(figure, form)
 
-    monkeypatch.setattr(plots, "_saved", keep)
+    monkeypatch.setattr(plots, "_image", keep)
     monkeypatch.chdir(tmp_path)
     return figures
 

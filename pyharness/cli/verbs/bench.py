@@ -3,8 +3,9 @@
 import argparse
 from collections.abc import Sequence
 
+from pyharness.bench import report as reports
 from pyharness.bench.contenders import Contender, own
-from pyharness.bench.measure import Finding, Refusal, measure, workloads
+from pyharness.bench.measure import Refusal, measure, workloads
 from pyharness.bench.peers import installed, peers
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError, unknown
@@ -33,13 +34,13 @@ def declare(parser: shared.Parser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure and show."""
-    form = shared.chosen_format(options, shared.FORMATS)
+    shared.chosen_format(options, shared.FORMATS)
     if options.plan or options.growth:
         meaningless = ["case", "horizon", "methods", "peers"]
         meaningless += ["plot", "growth"] if options.plan else []
         shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
         shared.check_outputs(options)
-        return _plan(options, form) if options.plan else _growth(options, form)
+        return _plan(options) if options.plan else _growth(options)
     known = [str(each) for each in case_numbers()]
     if options.case is not None and options.case not in known:
         raise unknown("case", options.case, known, "--case")
@@ -64,19 +65,14 @@ def run(options: argparse.Namespace) -> int:
     found = measure(loads, contenders, shared.progress)
     shared.progress("")
     if not found.rows:
-        from pyharness.bench.report import not_measured
-
-        raise InputError(f"bench: nothing could be measured: {'; '.join(not_measured(found))}")
+        told = "; ".join(reports.not_measured(found))
+        raise InputError(f"bench: nothing could be measured: {told}")
     absent = "not installed: pip install 'pyharness[peers]'"
     found.refused.extend(
         Refusal(load, each.name, None, absent) for each in missing for load in loads
     )
-
-    if options.plot is not None:
-        from pyharness.bench.pictures import bench_picture
-
-        shared.write(bench_picture(found, options.plot), "--plot")
-    shared.emit(_text(form, options, found), options.out)
+    packages = sorted({each.package for each in peers()} - {"", "scipy"})
+    shared.show(reports.bench_report(found, packages, _again(options)), options)
     return 0
 
 
@@ -97,90 +93,26 @@ def chosen(
     return [each for each in contenders if each.name in names or each.package in names]
 
 
-def _text(form: str, options: argparse.Namespace, found: Finding) -> str:
-    from pyharness.bench import report as views
-    from pyharness.model.build import build, machine
-
-    if form == "table":
-        return views.bench_table(found)
-    if form == "csv":
-        from pyharness.views.text import csv_text
-
-        return csv_text(*views.bench_rows(found))
-    packages = sorted({each.package for each in peers()} - {"", "scipy"})
-    if form == "json":
-        from pyharness.views.records import json_text
-
-        return json_text(views.bench_record(found, machine(packages), build()))
+def _again(options: argparse.Namespace) -> str:
+    """Return the command that makes the page again."""
     command = "pyharness bench"
     for name in ("case", "horizon", "methods", "peers"):
         value = getattr(options, name)
         command += f" --{name} {value}" if value is not None else ""
-    command += " --format markdown"
-    return views.bench_markdown(found, machine(packages), build(), command)
+    return command + " --format markdown"
 
 
-def _plan(options: argparse.Namespace, form: str) -> int:
-    from dataclasses import asdict
-
+def _plan(options: argparse.Namespace) -> int:
     from pyharness.bench.savings import savings
-    from pyharness.views.records import SCHEMA, json_text
-    from pyharness.views.text import aligned, csv_text, markdown_text
 
-    found = savings()
-    head = ("skipped", "where", "us with it", "us without", "ratio")
-    rows = [
-        [
-            each.part,
-            each.where,
-            f"{1e6 * each.with_it:.3g}",
-            f"{1e6 * each.without:.3g}",
-            f"{each.ratio:.2f}",
-        ]
-        for each in found
-    ]
-    if form == "json":
-        text = json_text({"schema": SCHEMA, "savings": [asdict(each) for each in found]})
-    elif form == "table":
-        text = "\n".join(aligned(head, rows, left=2)) + "\n"
-    else:
-        text = (csv_text if form == "csv" else markdown_text)(head, rows)
-    shared.emit(text, options.out)
+    shared.show(reports.savings_report(savings()), options)
     return 0
 
 
-def _growth(options: argparse.Namespace, form: str) -> int:
-    from dataclasses import asdict
-
+def _growth(options: argparse.Namespace) -> int:
     from pyharness.bench.growth import growth
     from pyharness.model.scene_file import case_scene
-    from pyharness.views.records import SCHEMA, json_text
-    from pyharness.views.text import aligned, csv_text, markdown_text
 
     found = {case: growth(case_scene(case)) for case in (3, 4)}
-    head = ("case", "time", "error", "one rounding of time", "ratio", "steps")
-    rows = [
-        [
-            str(case),
-            f"{each.time:.3g}",
-            f"{each.error:.2g}",
-            f"{each.conditioning:.2g}",
-            f"{each.error / each.conditioning:.2f}",
-            str(each.steps),
-        ]
-        for case, rows in found.items()
-        for each in rows
-    ]
-    if form == "json":
-        record = {str(case): [asdict(each) for each in rows] for case, rows in found.items()}
-        text = json_text({"schema": SCHEMA, "growth": record})
-    elif form == "table":
-        text = "\n".join(aligned(head, rows, left=1)) + "\n"
-    else:
-        text = (csv_text if form == "csv" else markdown_text)(head, rows)
-    if options.plot is not None:
-        from pyharness.bench.pictures import growth_picture
-
-        shared.write(growth_picture(found, options.plot), "--plot")
-    shared.emit(text, options.out)
+    shared.show(reports.growth_report(found), options)
     return 0

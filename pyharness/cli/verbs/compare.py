@@ -3,8 +3,8 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.compare import report as views
 from pyharness.compare.comparison import compare, listings_for
+from pyharness.compare.report import comparison_report
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, names_of
@@ -29,14 +29,14 @@ def run(options: argparse.Namespace) -> int:
     scene = shared.chosen_scene(options)
     if options.program is not None and options.program not in PROGRAMS:
         raise unknown("program", options.program, PROGRAMS, "--program")
-    form = shared.chosen_format(options, shared.FORMATS)
+    shared.chosen_format(options, shared.FORMATS)
     shared.check_base(options)
     tolerance = shared.positive(options.tolerance, "--tolerance", 1e-8)
     finest = max(METHODS[name].finest for name in SCIPY_METHODS)
     if not finest <= tolerance <= 1.0:
         raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:.2g} to 1")
     if options.ablate:
-        return _ablate(options, scene, form)
+        return _ablate(options, scene)
     if options.program not in (None, "runge-kutta"):
         shared.refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -52,29 +52,11 @@ def run(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     found = compare(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
-
-    if form == "json":
-        from pyharness.model.build import build
-        from pyharness.views.records import comparison_record, json_text
-
-        text = json_text(comparison_record(found, build()))
-    elif form == "csv":
-        from pyharness.views.text import csv_text
-
-        text = csv_text(*views.comparison_rows(found))
-    elif form == "markdown":
-        text = views.comparison_markdown(found)
-    else:
-        text = views.comparison_table(found)
-    if options.plot is not None:
-        from pyharness.views.pictures import comparison_picture
-
-        shared.write(comparison_picture(found, options.plot), "--plot")
-    shared.emit(text, options.out)
+    shared.show(comparison_report(found), options)
     return 1 if found.unexpected else 0
 
 
-def _ablate(options: argparse.Namespace, scene: Scene, form: str) -> int:
+def _ablate(options: argparse.Namespace, scene: Scene) -> int:
     meaningless = ("listing", "fix", "keep", "lipschitz", "no_stop", "tolerance", "plot")
     shared.refuse(options, "--ablate", meaningless)
     programs = PROGRAMS if options.program is None else (options.program,)
@@ -87,24 +69,11 @@ def _ablate(options: argparse.Namespace, scene: Scene, form: str) -> int:
     shared.check_outputs(options)
 
     from pyharness.history.ablation import lattice
-    from pyharness.history.apparatus_report import lattice_rows, lattice_table
-    from pyharness.views.records import SCHEMA, effect_record, json_text, scene_record
-    from pyharness.views.text import csv_text, markdown_text
+    from pyharness.history.apparatus_report import lattice_report
 
     found = {}
     for program in programs:
         own = tuple(name for name in readings if name in names_of("reading", program))
         found[program] = lattice(scene, program, own, effort)
-    if form == "table":
-        parts = [lattice_table(scene, program, effects) for program, effects in found.items()]
-        text = "\n".join(parts)
-    elif form == "json":
-        effects = {name: [effect_record(e) for e in each] for name, each in found.items()}
-        record = {"schema": SCHEMA, "scene": scene_record(scene), "lattice": effects}
-        text = json_text(record)
-    else:
-        tables = [lattice_rows(program, effects) for program, effects in found.items()]
-        rows = [row for _, part in tables for row in part]
-        text = (csv_text if form == "csv" else markdown_text)(tables[0][0], rows)
-    shared.emit(text, options.out)
+    shared.show(lattice_report(scene, found), options)
     return 0

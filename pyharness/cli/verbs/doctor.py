@@ -4,6 +4,7 @@ import argparse
 
 from pyharness.cli import options as shared
 from pyharness.model.build import OPTIONAL, build, missing
+from pyharness.model.build_report import doctor_report
 
 
 def declare(parser: shared.Parser) -> None:
@@ -14,15 +15,8 @@ def declare(parser: shared.Parser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Show; 3 where the extension is not built."""
-    form = shared.chosen_format(options, ("table", "json"))
+    shared.chosen_format(options, ("table", "json"))
     shared.check_outputs(options)
-    found, absent = build(), missing()
-    if form == "json":
-        from pyharness.views.records import doctor_record, json_text
-
-        shared.emit(json_text(doctor_record(found, absent)), options.out)
-    else:
-        from pyharness.views.text import doctor_table
-
-        shared.emit(doctor_table(found, OPTIONAL, absent), options.out)
+    found = build()
+    shared.show(doctor_report(found, OPTIONAL, missing()), options)
     return 0 if found.extension else 3

@@ -3,9 +3,9 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.family import report as views
 from pyharness.history.family.members import POINTS, WEIGHTINGS, Member
 from pyharness.history.family.orders import order_table
+from pyharness.history.family.report import family_report
 
 _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
@@ -29,27 +29,12 @@ def run(options: argparse.Namespace) -> int:
     if options.case is None and options.scene is None:
         options.case = _DEFAULT_CASE
     scene = shared.chosen_scene(options)
-    form = shared.chosen_format(options, shared.FORMATS)
+    shared.chosen_format(options, shared.FORMATS)
     one = any(getattr(options, name) is not None for name in _OF_A_MEMBER)
     members = [_member(options)] if one else None
     shared.check_outputs(options)
     found = order_table(scene, members, shared.progress)
-    shared.progress("")
-
-    if form == "json":
-        from pyharness.model.build import build
-        from pyharness.views.records import json_text
-
-        text = json_text(views.family_record(scene, found, build()))
-    elif form == "csv":
-        from pyharness.views.text import csv_text
-
-        text = csv_text(*views.family_rows(found))
-    elif form == "markdown":
-        text = views.family_markdown(scene, found)
-    else:
-        text = views.family_table(scene, found)
-    shared.emit(text, options.out)
+    shared.show(family_report(scene, found), options)
     return 1 if any(each.misses for each in found) else 0
 
 

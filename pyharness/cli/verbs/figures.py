@@ -16,30 +16,27 @@ def declare(parser: shared.Parser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Compute and draw everything, then write everything."""
     from pyharness.cli.output import check_folder, write_folder
-    from pyharness.history import figure_pictures as views
+    from pyharness.history.figure_pictures import figure_picture
+    from pyharness.history.figures_report import figures_report
+    from pyharness.views.pictures import check_matplotlib, saved
+    from pyharness.views.render import render
 
     form = shared.chosen_format(options, ("table", "json"))
     if options.out is None:
         raise InputError("figures: give --out DIR, a folder for the files")
     plans = room.plans()
-    names = [f"{plan.stem}.{ending}" for plan in plans for ending in views.ENDINGS]
-    check_folder(options.out, names, "--out")
-    views.check_matplotlib()
+    check_folder(options.out, [name for plan in plans for name in plan.files], "--out")
+    check_matplotlib("figures")
 
     content: dict[str, bytes] = {}
     drawn = []
     for number, finding in enumerate(room.findings(), 1):
         shared.progress(f"figures: {number} of {len(plans)}")
-        content.update(views.files(finding))
+        svg, png, _ = finding.plan.files
+        content |= saved(figure_picture(finding), svg, png)
         drawn.append(finding)
     shared.progress("")
     write_folder(options.out, content, "--out")
-
-    if form == "json":
-        from pyharness.model.build import build
-        from pyharness.views.records import json_text
-
-        shared.emit(json_text(views.figures_record(drawn, build())), None)
-    else:
-        shared.emit(views.figures_table(drawn), None)
+    # The folder takes the files; what was drawn is told here.
+    shared.emit(render(figures_report(drawn), form), None)
     return 0

@@ -1,15 +1,12 @@
 """`limits`: what the programs as punched tend to as the step goes to zero."""
 
 import argparse
-from collections.abc import Callable, Sequence
 
 from pyharness.cli import options as shared
-from pyharness.history.limits import Limit, invisible, limit
+from pyharness.history.limits import invisible, limit
+from pyharness.history.limits_report import limits_report
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS
-from pyharness.views.text import aligned, csv_text, heading, markdown_text, short, wrapped
-
-_HEAD = ("program", "step", "from the limit", "from the truth")
 
 
 def declare(parser: shared.Parser) -> None:
@@ -25,7 +22,7 @@ def declare(parser: shared.Parser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Hold the programs as punched against their limits and against the truth."""
     scene = shared.chosen_scene(options)
-    form = shared.chosen_format(options, shared.FORMATS)
+    shared.chosen_format(options, shared.FORMATS)
     if options.program is not None and options.program not in PROGRAMS:
         raise unknown("program", options.program, PROGRAMS, "--program")
     programs = PROGRAMS if options.program is None else (options.program,)
@@ -35,37 +32,5 @@ def run(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     found = [limit(program, scene, halvings, effort) for program in programs]
-    if form == "json":
-        from dataclasses import asdict
-
-        from pyharness.views.records import SCHEMA, json_text, scene_record
-
-        record = {
-            "schema": SCHEMA,
-            "scene": scene_record(scene),
-            "limits": [asdict(each) for each in found],
-            "invisible": {name: list(each) for name, each in invisible(scene).items()},
-        }
-        text = json_text(record)
-    elif form == "table":
-        lines = heading(scene)
-        for each in found:
-            lines += ["", *wrapped(f"{each.program} as punched tends to {each.tends_to}")]
-            lines += aligned(_HEAD[1:], [row[1:] for row in _rows(each, short)], left=0)
-            lines.append(f"order {each.order:.2f} toward the limit")
-        hidden = invisible(scene)
-        lines += ["", "defects that change no omega here, mended alone:"]
-        lines += wrapped("; ".join(f"{p}: {', '.join(hidden[p]) or 'none'}" for p in programs))
-        text = "\n".join(lines) + "\n"
-    else:
-        rows = [row for each in found for row in _rows(each, repr)]
-        text = (csv_text if form == "csv" else markdown_text)(_HEAD, rows)
-    shared.emit(text, options.out)
+    shared.show(limits_report(scene, found, invisible(scene)), options)
     return 0
-
-
-def _rows(found: Limit, write: Callable[[float], str]) -> Sequence[list[str]]:
-    return [
-        [found.program, f"{h.step_size:g}", write(h.from_limit), write(h.from_truth)]
-        for h in found.halvings
-    ]

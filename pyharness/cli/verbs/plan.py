@@ -1,15 +1,12 @@
 """`plan`: what a scene needs, what is therefore not computed, and why."""
 
 import argparse
-from dataclasses import asdict
 
 from pyharness.cli import options as shared
 from pyharness.methods.plan import plan
 from pyharness.methods.prepared import PREPARED
+from pyharness.methods.report import plan_report
 from pyharness.model.errors import unknown
-from pyharness.views.text import aligned, csv_text, heading, markdown_text, wrapped
-
-_HEAD = ("part", "computed", "why")
 
 
 def declare(parser: shared.Parser) -> None:
@@ -28,22 +25,12 @@ def declare(parser: shared.Parser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Show the decisions for a scene."""
     scene = shared.chosen_scene(options)
-    form = shared.chosen_format(options, shared.FORMATS)
+    shared.chosen_format(options, shared.FORMATS)
     method = options.method or "auto"
     if method not in PREPARED:
         raise unknown("method", method, PREPARED, "--method")
     tolerance = shared.positive(options.tolerance, "--tolerance", 1e-12)
     shared.check_outputs(options)
     found = plan(scene, method, tolerance, options.velocity, options.rows)
-    rows = [[each.part, "yes" if each.kept else "no", each.why] for each in found.decisions]
-    if form == "json":
-        from pyharness.views.records import SCHEMA, json_text, scene_record
-
-        text = json_text({"schema": SCHEMA, "scene": scene_record(scene), "plan": asdict(found)})
-    elif form == "table":
-        lines = [*heading(scene), *wrapped(f"method: {found.method}"), ""]
-        text = "\n".join([*lines, *aligned(_HEAD, rows, left=3)]) + "\n"
-    else:
-        text = (csv_text if form == "csv" else markdown_text)(_HEAD, rows)
-    shared.emit(text, options.out)
+    shared.show(plan_report(scene, found), options)
     return 0

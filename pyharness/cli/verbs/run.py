@@ -5,11 +5,11 @@ import sys
 
 from pyharness.cli import options as shared
 from pyharness.methods import registry as methods
+from pyharness.methods.report import trajectory_report
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.views import text as tables
 
 # What only a program wrote: its printer page, and its tape.
 PROGRAM_FORMATS = ("printer", "tape5")
@@ -50,32 +50,18 @@ def run(options: argparse.Namespace) -> int:
     else:
         name, title, trajectory = _method(options, scene)
 
-    text: str | bytes
-    if form == "printer":
+    def page() -> str:
         from pyharness.history.printer import page
 
-        text = page(scene, name, trajectory)
-    elif form == "tape5":
+        return page(scene, name, trajectory)
+
+    def tape() -> bytes:
         from pyharness.history.tape5 import records
 
-        text = records(trajectory)
-    elif form == "json":
-        from pyharness.model.build import build
-        from pyharness.views.records import json_text, run_record
+        return records(trajectory)
 
-        text = json_text(run_record(scene, name, listing, trajectory, build()))
-    elif form == "csv":
-        text = tables.csv_text(*tables.trajectory_rows(trajectory))
-    elif form == "markdown":
-        text = tables.markdown_text(*tables.trajectory_rows(trajectory))
-    else:
-        text = tables.trajectory_table([title], scene, trajectory)
-    if options.plot is not None:
-        from pyharness.views.pictures import trajectory_picture
-
-        picture = trajectory_picture(f"{scene.name}: {title}", trajectory, options.plot)
-        shared.write(picture, "--plot")
-    shared.emit(text, options.out)
+    report = trajectory_report(scene, name, listing, title, trajectory)
+    shared.show(report, options, {"printer": page, "tape5": tape})
     return 0
 
 

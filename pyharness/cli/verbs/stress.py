@@ -3,9 +3,8 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.compare.checks import Check
-from pyharness.compare.checks_report import checks_record, junit_text
 from pyharness.model.errors import InputError, unknown
+from pyharness.stress.report import stress_report
 from pyharness.stress.run import TRIALS, Outcome, stress, trial, worst
 
 FORMATS = ("table", "json", "junit")
@@ -27,7 +26,7 @@ def declare(parser: shared.Parser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Try and show; 1 where a bound does not hold."""
-    form = shared.chosen_format(options, FORMATS)
+    shared.chosen_format(options, FORMATS)
     only = shared.names(options.only)
     for each in only:
         if each.partition("/")[0] not in TRIALS:
@@ -47,48 +46,18 @@ def run(options: argparse.Namespace) -> int:
     for outcome in stress(only):
         shared.progress(f"{len(outcomes) + 1}: {outcome.check.id}")
         outcomes.append(outcome)
-    shared.progress("")
     if not outcomes:
         raise unknown("check", ",".join(only), TRIALS, "--only")
     checks = [outcome.check for outcome in outcomes]
     if saves:
         _save(folder, outcomes)
-    if options.plot is not None:
-        shared.write(_picture(_chosen(only)[0], checks, options.plot), "--plot")
-    if form == "json":
-        from pyharness.model.build import build
-        from pyharness.views.records import json_text
-
-        text = json_text(checks_record(checks, build()))
-    elif form == "junit":
-        text = junit_text("stress", checks)
-    else:
-        from pyharness.stress.report import stress_table
-
-        text = stress_table([trial(name) for name in _chosen(only)], checks)
-    shared.emit(text, options.out)
+    shared.show(stress_report([trial(name) for name in _chosen(only)], checks), options)
     return 0 if all(check.passed for check in checks) else 1
 
 
 def _chosen(only: list[str]) -> list[str]:
     names = {each.partition("/")[0] for each in only} or set(TRIALS)
     return [name for name in TRIALS if name in names]
-
-
-def _picture(name: str, checks: list[Check], path: str) -> dict[str, bytes]:
-    if name == "regions":
-        from pyharness.stress.region_picture import regions_picture
-        from pyharness.theory.regions import regions
-
-        return regions_picture(regions(), path)
-    if name == "length":
-        from pyharness.stress.length_picture import picture
-        from pyharness.stress.trials.length import curves
-
-        return picture(list(curves()), path)
-    from pyharness.stress.pictures import stress_picture
-
-    return stress_picture(trial(name), checks, path)
 
 
 def _save(folder: str, outcomes: list[Outcome]) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pyharness.cli import options as shared
 from pyharness.compare.checks import Check
-from pyharness.compare.checks_report import checks_record, checks_table, junit_text, samples_lines
+from pyharness.compare.checks_report import checks_report, samples, summary
 from pyharness.model.errors import InputError, unknown
 from pyharness.verify.kinds import KINDS, verify
 from pyharness.verify.random_methods import ROUNDING
@@ -41,7 +41,7 @@ def declare(parser: shared.Parser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Verify and show; 1 where something is not as it should be."""
-    form = shared.chosen_format(options, FORMATS)
+    shared.chosen_format(options, FORMATS)
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
@@ -50,44 +50,34 @@ def run(options: argparse.Namespace) -> int:
         return _update(chosen.record)
     if options.self_test:
         shared.refuse(options, "--self-test", ("only", "draws", "external"))
-        return _self_test(options, chosen, form)
+        return _self_test(options, chosen)
     checks = []
     for check in verify(chosen):
         checks.append(check)
         if len(checks) % 20 == 0 or check.kind != "cells":
             shared.progress(f"{len(checks)}: {check.id}")
-    shared.progress("")
     if not checks:
         if not chosen.record.is_dir() and chosen.may_ask("golden"):
             raise InputError("there is no golden record here; give --record DIR, or a checkout")
         asked = f"--only {options.only}" if options.only else "--draws 0"
         raise InputError(f"{asked}: no such check; the kinds are {', '.join(KINDS)}")
-    if form != "table":
-        text = _machine_text(checks, form, chosen.seed)
-    else:
-        more = samples_lines(checks, ROUNDING) if options.draws is not None else []
-        text = checks_table([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
-    shared.emit(text, options.out)
+    more = samples(checks, ROUNDING) if options.draws is not None else []
+    text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
+    shared.show(checks_report("verify", checks, text, seed=chosen.seed), options)
     return 0 if all(check.passed for check in checks) else 1
 
 
-def _self_test(options: argparse.Namespace, chosen: Selection, form: str) -> int:
-    from pyharness.compare.checks_report import self_test_table
+def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
     from pyharness.verify.plants.plants import PLANTS
+    from pyharness.verify.plants.report import self_test_report
     from pyharness.verify.plants.self_test import as_check, self_test
 
     found = []
     for caught in self_test(chosen.seed, chosen.record):
         found.append(caught)
         shared.progress(f"{len(found)} of {len(PLANTS) + 1}: {as_check(caught).id}")
-    shared.progress("")
-    checks = [as_check(caught) for caught in found]
-    if form == "table":
-        text = self_test_table(_title(chosen), found)
-    else:
-        text = _machine_text(checks, form, chosen.seed)
-    shared.emit(text, options.out)
-    return 0 if all(check.passed for check in checks) else 1
+    shared.show(self_test_report(_title(chosen), found, chosen.seed), options)
+    return 0 if all(caught.passed for caught in found) else 1
 
 
 def _selection(options: argparse.Namespace) -> Selection:
@@ -130,15 +120,6 @@ def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
     if chosen.problems is None or not count:
         return []
     return [f"{count} of {len(checks)} judge nothing: too much for the method (--format json: why)"]
-
-
-def _machine_text(checks: list[Check], form: str, seed: str) -> str:
-    if form == "junit":
-        return junit_text("verify", checks)
-    from pyharness.model.build import build
-    from pyharness.views.records import json_text
-
-    return json_text(checks_record(checks, build(), seed=seed))
 
 
 def _update(record: Path) -> int:

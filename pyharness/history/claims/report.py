@@ -1,18 +1,36 @@
-"""The views of `claims`: the ledger, the story of one claim, the table of assignments."""
+"""The reports of `claims`: the ledger, the story of one claim, the assignments."""
 
 import math
-import textwrap
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from pyharness.history.claims.ledger import Assignment, Judgement
-from pyharness.views.text import WIDTH, aligned, short, wrapped
+from pyharness.model.report import Column, Field, Line, Report, Section, Table, short
 
-_HEAD = ("claim", "where", "as punched", "as mended", "hangs on")
+# A verdict in the ledger, and below it.
+_VERDICTS = {
+    "reproduced": ("yes", "reproduced (yes)"),
+    "reproduced in part": ("in part", "in part"),
+    "not reproduced": ("no", "not reproduced (no)"),
+    "false": ("FALSE", "false"),
+    "not testable": ("n/t", "not testable (n/t)"),
+}
 
 
-def claims_rows(judgements: Sequence[Judgement]) -> tuple[Sequence[str], list[list[str]]]:
-    """Return head and rows of the ledger."""
+def _verdict(verdict: str) -> str:
+    return _VERDICTS[verdict][0]
+
+
+_LEDGER = (
+    Column("claim", left=True), Column("where", left=True),
+    Column("as punched", _verdict, left=True), Column("as mended", _verdict, left=True),
+    Column("hangs on", left=True),
+)  # fmt: skip
+
+
+def claims_report(judgements: Sequence[Judgement]) -> Report:
+    """Report the ledger, one line for each claim."""
     rows = [
         [
             each.claim["id"],
@@ -23,90 +41,70 @@ def claims_rows(judgements: Sequence[Judgement]) -> tuple[Sequence[str], list[li
         ]
         for each in judgements
     ]
-    return _HEAD, rows
+    told = []
+    for verdict, (_, name) in _VERDICTS.items():
+        punched, mended = (sum(row[k] == verdict for row in rows) for k in (2, 3))
+        told.append(f"{name}: {punched} as punched, {mended} as mended")
+    note = "`claims --explain ID` tells the story with its numbers."
+    table = Table(_LEDGER, rows)
+    text: list[Section] = [[table], ["; ".join(told), note]]
+    return Report("claims", text, record=lambda: _record(judgements), data=table)
 
 
-def claims_table(judgements: Sequence[Judgement]) -> str:
-    """Return the ledger, one line for each claim."""
-    _, rows = claims_rows(judgements)
-    short_names = {
-        "reproduced": "yes",
-        "reproduced in part": "in part",
-        "not reproduced": "no",
-        "false": "FALSE",
-        "not testable": "n/t",
-    }
-    lines = aligned(
-        _HEAD,
-        [[*row[:2], short_names[row[2]], short_names[row[3]], row[4]] for row in rows],
-        left=5,
-    )
-    counts = "; ".join(
-        f"{name}: {sum(row[2] == verdict for row in rows)} as punched, "
-        f"{sum(row[3] == verdict for row in rows)} as mended"
-        for verdict, name in (
-            ("reproduced", "reproduced (yes)"),
-            ("reproduced in part", "in part"),
-            ("not reproduced", "not reproduced (no)"),
-            ("false", "false"),
-            ("not testable", "not testable (n/t)"),
-        )
-    )
-    lines += ["", *wrapped(counts), "`claims --explain ID` tells the story with its numbers."]
-    return "\n".join(lines) + "\n"
-
-
-def explanation(judgement: Judgement) -> str:
-    """Return the story of one claim."""
+def explanation(judgement: Judgement) -> Report:
+    """Report the story of one claim."""
     entry = judgement.claim
-    lines = wrapped(f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"')
-    lines += ["", *_field("says", entry["statement"]), *_field("rule", entry["rule"])]
-    for title, outcome in (
-        ("as punched", judgement.programs),
-        ("as mended", judgement.methods),
-    ):
-        lines += ["", f"{title}: {outcome.verdict}"]
+    text: list[Section] = [
+        [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
+        [Field("says  ", entry["statement"]), Field("rule  ", entry["rule"])],
+    ]
+    for title, outcome in (("as punched", judgement.programs), ("as mended", judgement.methods)):
         width = max(map(len, outcome.numbers), default=0)
-        lines += [f"  {name.ljust(width)}  {_number(x)}" for name, x in outcome.numbers.items()]
+        numbers = outcome.numbers.items()
+        lines = [Line(f"  {name.ljust(width)}  {_number(x)}") for name, x in numbers]
+        text.append([Line(f"{title}: {outcome.verdict}"), *lines])
     if judgement.survivals:
-        lines += ["", "without its assumptions (as punched, as mended):"]
-    for each in judgement.survivals:
-        mark = "stands" if each.survives else "TURNS"
-        lines.append(f"  {mark:7s}{each.assumption}: {each.programs}, {each.methods}")
-    return "\n".join(lines) + "\n"
+        lines = [Line("without its assumptions (as punched, as mended):")]
+        for each in judgement.survivals:
+            mark = "stands" if each.survives else "TURNS"
+            lines.append(Line(f"  {mark:7s}{each.assumption}: {each.programs}, {each.methods}"))
+        text.append(lines)
+    return claims_report([judgement])._replace(text=text)
 
 
-def assignments_table(assignments: Sequence[Assignment]) -> str:
-    """Return which starts let the claims of each case hold, for the programs as punched."""
-    lines = [
-        "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis shows,",
-        "the claims about that case alone, for the programs as punched:",
+def assignments_report(assignments: Sequence[Assignment]) -> Report:
+    """Report which starts let the claims of each case hold, for the programs as punched."""
+    text: list[Section] = [
+        [
+            Line(
+                "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
+                "shows,"
+            ),
+            Line("the claims about that case alone, for the programs as punched:"),
+        ]
     ]
+    holding = []
     for case in dict.fromkeys(each.case for each in assignments):
-        rows = [each for each in assignments if each.case == case]
-        lines += ["", f"Case {case}"]
-        for each in rows:
+        starts = [each for each in assignments if each.case == case]
+        lines = [f"Case {case}"]
+        for each in starts:
             start = ", ".join(f"{x:g}" for x in each.start)
-            lines.append(
-                f"  ({start}): {'all can hold' if each.holds else 'they can not all hold'}"
-            )
+            told = "all can hold" if each.holds else "they can not all hold"
+            lines.append(f"  ({start}): {told}")
             lines += [f"      {verdict:20s}{name}" for name, verdict in each.verdicts.items()]
-    holding = [
-        sum(each.holds for each in assignments if each.case == case)
-        for case in dict.fromkeys(each.case for each in assignments)
-    ]
+        text.append(list(map(Line, lines)))
+        holding.append(sum(each.holds for each in starts))
     every = (len(assignments) // len(holding)) ** len(holding)
-    lines += [
-        "",
+    end = (
         f"all hold at once for {math.prod(holding)} of {every} assignments, "
-        "but for claims that fail with every start",
-    ]
-    return "\n".join(lines) + "\n"
+        "but for claims that fail with every start"
+    )
+    record = {"assignments": [asdict(each) for each in assignments]}
+    return Report("claims", [*text, [Line(end)]], record=lambda: record)
 
 
-def claims_record(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
-    """Return the ledger for JSON."""
-    return [
+def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
+    entries = [
         {
             "id": each.claim["id"],
             "where": each.claim["where"],
@@ -114,18 +112,11 @@ def claims_record(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
             "programs": each.programs.verdict,
             "methods": each.methods.verdict,
             "numbers": {"programs": each.programs.numbers, "methods": each.methods.numbers},
-            "assumptions": [
-                {
-                    "assumption": survival.assumption,
-                    "programs": survival.programs,
-                    "methods": survival.methods,
-                    "survives": survival.survives,
-                }
-                for survival in each.survivals
-            ],
+            "assumptions": list(map(asdict, each.survivals)),
         }
         for each in judgements
     ]
+    return {"claims": entries}
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
@@ -135,10 +126,6 @@ def _hangs_on(judgement: Judgement) -> list[str]:
         if not each.survives:
             names.append("omega(0)" if each.assumption.startswith("omega") else each.assumption)
     return list(dict.fromkeys(names))
-
-
-def _field(name: str, text: str) -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent=f"{name:6s}", subsequent_indent=" " * 6)
 
 
 def _number(x: float) -> str:

@@ -1,0 +1,103 @@
+"""The picture of a comparison: components over time above the error, a column for each program."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyharness.compare.comparison import Comparison
+from pyharness.methods.picture import mark_end
+from pyharness.model.report import Picture, Table, numbers
+from pyharness.model.scene_report import heading
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Told apart without colour: by dash and width.
+_STYLES: dict[str, dict[str, Any]] = {
+    "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
+    "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
+    "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
+}
+_REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
+# Of what has one row, which no line shows; those of one place can all be seen.
+_MARKERS: dict[str, dict[str, Any]] = {
+    "reference": {"marker": "s", "markersize": 11.0},
+    "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
+    "custom": {"marker": "D", "markersize": 5.0, "markerfacecolor": "none"},
+    "corrected": {"marker": ".", "markersize": 5.0},
+}
+
+
+def comparison_picture(comparison: Comparison) -> Picture:
+    """Draw what was run, what is true, and how far they are apart."""
+    from matplotlib.figure import Figure
+
+    names = list(dict.fromkeys(each.listing.program for each in comparison.programs))
+    figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
+    axes = figure.subplots(4, len(names), sharex=True, sharey="row", squeeze=False)
+    truth = comparison.reference
+    for column, name in enumerate(names):
+        axes[0, column].set_title(name)
+        axes[3, column].set_xlabel("time (s)")
+        for row in range(3):
+            _line(axes[row, column], truth.time, truth.omega[:, row], "reference")
+        for each in comparison.programs:
+            if each.listing.program != name:
+                continue
+            run, label = each.trajectory, each.listing.label
+            for row in range(3):
+                _line(axes[row, column], run.time, run.omega[:, row], label)
+            error = each.accuracy.error
+            shown = np.isfinite(error) & (error > 0.0)
+            _line(axes[3, column], run.time[: len(error)][shown], error[shown], label)
+    ended = [each for each in comparison.programs if each.trajectory.ended != "complete"]
+    for row in range(3):
+        axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        _frame(axes[row, 0], truth.omega[:, row])
+        for each in ended:
+            mark_end(axes[row, names.index(each.listing.program)], each.trajectory, row)
+    axes[3, 0].set_yscale("log")
+    axes[3, 0].set_ylabel("error of any $\\omega$ (rad/s)")
+    for column in range(len(names)):
+        axes[3, column].axhline(truth.error, color="black", linewidth=0.8)
+        axes[3, column].grid(visible=True, linewidth=0.3)
+    _limit_errors(axes[3, 0])
+    axes[0, 0].legend(loc="best", handlelength=4)
+    note = "x: the program stopped or overflowed; at the edge: out of view" if ended else ""
+    title = (f"{heading(comparison.scene)[0]}; thin line: error of the reference", note)
+    return Picture(figure, _numbers(comparison), title)
+
+
+def _numbers(comparison: Comparison) -> Table:
+    truth = comparison.reference
+    rows = [
+        ["reference", "", t, *omega, truth.error]
+        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
+    ]
+    for each in comparison.programs:
+        run, name = each.trajectory, [each.listing.program, each.listing.label]
+        errors = each.accuracy.error.tolist()
+        for t, omega, error in zip(run.time.tolist(), run.omega.tolist(), errors, strict=False):
+            rows.append([*name, t, *omega, error])
+    return numbers("method listing time omega1 omega2 omega3 error", rows)
+
+
+def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> None:
+    style = _REFERENCE if label == "reference" else _STYLES[label]
+    marker = _MARKERS[label] if len(time) == 1 else {}
+    axes.plot(time, values, label=label, **style, **marker)
+
+
+def _frame(axes: "Axes", truth: np.ndarray) -> None:
+    """Keep the frame near the truth: a program that diverges leaves the picture."""
+    if not len(truth):
+        return
+    low, high = float(truth.min()), float(truth.max())
+    margin = max(0.6 * (high - low), 0.05 * max(abs(low), abs(high)), 1e-12)
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, low - margin), min(top, high + margin))
+
+
+def _limit_errors(axes: "Axes") -> None:
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, 1e-17), min(top, 1e4))

@@ -1,0 +1,48 @@
+"""The report of `figures`: what was drawn."""
+
+from collections.abc import Sequence
+
+from pyharness.history.figure_pictures import label
+from pyharness.history.figures import ENDINGS, Finding
+from pyharness.model.report import Column, Report, Table, build_record
+
+_COLUMNS = (Column("files", left=True), Column("case", left=True), Column("curves", left=True))
+
+
+def figures_report(findings: Sequence[Finding]) -> Report:
+    """Report the files, a line for each figure."""
+    rows = [
+        [
+            f"{finding.plan.stem}.{{{','.join(ENDINGS)}}}",
+            finding.plan.case,
+            ", ".join(map(label, finding.curves)),
+        ]
+        for finding in findings
+    ]
+    return Report(
+        "figures",
+        text=[[Table(_COLUMNS, rows)]],
+        record=lambda: {
+            "figures": [
+                {
+                    "figure": finding.plan.title,
+                    "case": finding.plan.case,
+                    "set": finding.plan.set,
+                    "caption": finding.plan.caption,
+                    "source": finding.plan.source,
+                    "curves": [
+                        {
+                            "program": each.listing.program,
+                            "listing": each.listing.label,
+                            "steps": each.trajectory.steps,
+                            "ended": each.trajectory.ended,
+                        }
+                        for each in finding.curves
+                    ],
+                    "files": finding.plan.files,
+                }
+                for finding in findings
+            ],
+            "build": build_record(),
+        },
+    )

@@ -1,0 +1,176 @@
+"""A report: what a finding has to say, as data; `pyharness.views` renders it.
+
+Tuples with names, where other rooms have dataclasses: these are made at every cold start, and a
+dataclass takes as long as five of them.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pyharness.model.trajectory import Array
+
+
+def exact(value: Any) -> str:
+    """Return a value in full: floats round-trip; empty where there is none."""
+    if isinstance(value, float):
+        return float.__repr__(value)  # NumPy's own would name their type
+    if value is None:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def plain(value: Any) -> str:
+    """Return a word or a whole number; a dash where there is none."""
+    return "-" if value is None else str(value)
+
+
+def short(x: float | None) -> str:
+    """Return two digits of a number in a few characters: 1.2e-3, 0, -, inf."""
+    if x is None:
+        return "-"
+    if math.isnan(x) or math.isinf(x) or x == 0:
+        return {"nan": "nan", "inf": "inf", "-inf": "-inf"}.get(str(x), "0")
+    mantissa, exponent = f"{x:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
+    """Return what writes a number in a form, as in ``.3g``, `scale` times it; a dash for none."""
+    return lambda x: "-" if x is None else f"{scale * x:{form}}"
+
+
+def counted(number: int, what: str) -> str:
+    """Say a number of things: 1 step, 2 steps."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+class Column(NamedTuple):
+    """A column of a table, and how its values are written.
+
+    Attributes
+    ----------
+    head : str
+        What stands above it.
+    write : callable
+        Writes a value for people.
+    left : bool
+        Whether it stands to the left; numbers stand to the right.
+    unit : str
+        Of the values, which `write` may scale.
+    name, full : str, callable
+        Its head, and what writes a value, where numbers are given in full; `head` where empty.
+    fit : {"", "wrap", "cut"}
+        What becomes of a last column that is too wide.
+    """
+
+    head: str
+    write: Callable[[Any], str] = plain
+    left: bool = False
+    unit: str = ""
+    name: str = ""
+    full: Callable[[Any], str] = exact
+    fit: str = ""
+
+
+class Table(NamedTuple):
+    """Columns, and rows of as many values; an array of (rows, columns) will do."""
+
+    columns: Sequence[Column]
+    rows: "Sequence[Sequence[Any]] | Array"
+
+    def written(self) -> list[list[str]]:
+        """Return the heads and all cells as people read them."""
+        return self._cells(
+            [each.head for each in self.columns], [each.write for each in self.columns]
+        )
+
+    def in_full(self) -> list[list[str]]:
+        """Return the heads and all cells, numbers in full."""
+        heads = [each.name or each.head for each in self.columns]
+        return self._cells(heads, [each.full for each in self.columns])
+
+    def _cells(self, heads: list[str], writers: list[Callable[[Any], str]]) -> list[list[str]]:
+        rows = ([write(x) for write, x in zip(writers, row, strict=True)] for row in self.rows)
+        return [heads, *rows]
+
+
+def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
+    """Return a table for CSV alone, of columns with these names."""
+    return Table([Column(name) for name in names.split()], rows)
+
+
+class Line(str):
+    """A line that is left as it is, however long."""
+
+    __slots__ = ()
+
+
+class Field(NamedTuple):
+    """A paragraph that stands behind its label."""
+
+    label: str
+    text: str
+
+
+# Paragraphs and tables without a blank line between them; a blank line is between sections.
+Section = Sequence[str | Field | Table]
+
+
+class Picture(NamedTuple):
+    """A figure, the table of its numbers, and what is written above it, a line or more each."""
+
+    figure: "Figure"
+    numbers: Table
+    title: Sequence[str] = ()
+
+
+class Case(NamedTuple):
+    """A check as JUnit knows it; `failure` is empty where it passed."""
+
+    kind: str
+    id: str
+    failure: str
+    replay: str
+
+
+class Report(NamedTuple):
+    """What a finding has to say.
+
+    Attributes
+    ----------
+    title : str
+        The verb that asked.
+    text : sequence of sections
+        What stands in the terminal; empty sections do not count.
+    record : callable
+        Returns what JSON gives.
+    data : Table or None
+        The table that CSV gives, in full.
+    page : sequence of sections or None
+        What Markdown gives; None for `data`.
+    cases : sequence of Case
+        What JUnit gives.
+    pictures : mapping
+        By name what makes a picture.
+    """
+
+    title: str
+    text: Sequence[Section]
+    record: Callable[[], dict[str, Any]]
+    data: Table | None = None
+    page: Sequence[Section] | None = None
+    cases: Sequence[Case] = ()
+    pictures: Mapping[str, Callable[[], Picture]] | None = None
+
+
+def build_record() -> dict[str, Any]:
+    """Return how this installation was built, for JSON."""
+    from dataclasses import asdict
+
+    from pyharness.model.build import build
+
+    return asdict(build())

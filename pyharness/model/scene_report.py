@@ -1,0 +1,102 @@
+"""What reports say of a scene, a listing and the end of a run: in lines, and for JSON."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from pyharness.model.listing import Listing
+from pyharness.model.report import counted, short
+from pyharness.model.scene import Scene, Wave
+from pyharness.model.trajectory import Trajectory
+
+
+def heading(scene: Scene) -> list[str]:
+    """Say what a scene is: name; body, torque, start, steps; that there is no such body."""
+    if scene.moments is not None:
+        body = f"I = {_tuple(scene.moments)} kg m2"
+    else:
+        body = f"A, B, C = {_tuple(scene.euler_coefficients)}"
+    unit = "N m" if scene.moments is not None else "1/s2"
+    torque = f"N = {_law(scene)} {unit}" if not scene.torque.is_zero else "no torque"
+    lines = [
+        f"Case {scene.case}: {scene.name}" if scene.case else scene.name,
+        f"{body}; {torque}; omega(0) = {_tuple(scene.omega)} rad/s; "
+        f"{counted(scene.steps, 'step')} of {scene.step_size:g} s",
+    ]
+    if scene.is_impossible:
+        lines.append("no rigid body has these moments: the largest exceeds the sum of the others")
+    return lines
+
+
+def _law(scene: Scene) -> str:
+    law = scene.torque
+    if not law.varies:
+        return _tuple(law.constant)
+    parts = [_tuple(law.constant)] if any(law.constant) else []
+    if any(law.rate):
+        parts.append(f"{_tuple(law.rate)} t")
+    for name, waves in (("sin", law.sines), ("cos", law.cosines)):
+        parts += [f"{_tuple(a)} {name} {f:g}t" for a, f in waves]
+    return " + ".join(parts)
+
+
+def _tuple(values: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{x:g}" for x in values) + ")"
+
+
+def ending(trajectory: Trajectory) -> str:
+    """Say in a line how a run ended."""
+    steps = counted(trajectory.steps, "step")
+    counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
+    if trajectory.stop is not None:
+        stop = trajectory.stop
+        return (
+            f"stopped at step {stop.step} by {stop.variable}: "
+            f"Lipschitz quotient {short(stop.quotient)} ({counts})"
+        )
+    if trajectory.ended == "overflow":
+        return f"overflow: the rows end before the first omega that is not finite ({counts})"
+    return f"complete ({counts})"
+
+
+def scene_record(scene: Scene) -> dict[str, Any]:
+    """Return a scene in the form of the scene file, with the number of its case."""
+    body = "moments" if scene.moments is not None else "coefficients"
+    return {
+        "name": scene.name,
+        "case": scene.case,
+        "body": {body: list(scene.moments or scene.coefficients or ())},
+        "initial": {"omega": list(scene.omega)},
+        "torque": {
+            "constant": list(scene.torque.constant),
+            "rate": list(scene.torque.rate),
+            "sines": [_wave(wave) for wave in scene.torque.sines],
+            "cosines": [_wave(wave) for wave in scene.torque.cosines],
+        },
+        "run": {"step_size": scene.step_size, "steps": scene.steps},
+    }
+
+
+def _wave(wave: Wave) -> dict[str, Any]:
+    amplitude, frequency = wave
+    return {"amplitude": list(amplitude), "frequency": frequency}
+
+
+def listing_record(listing: Listing) -> dict[str, Any]:
+    """Return a listing: its label, its active defects and its readings."""
+    return {
+        "label": listing.label,
+        "defects": sorted(listing.defects),
+        "readings": sorted(listing.readings),
+    }
+
+
+def ending_record(trajectory: Trajectory) -> dict[str, Any]:
+    """Return how far a run came, what it cost, and how it ended."""
+    stop = trajectory.stop
+    return {
+        "steps": trajectory.steps,
+        "evaluations": trajectory.evaluations,
+        "stop": None if stop is None else asdict(stop),
+        "ended": trajectory.ended,
+    }

@@ -9,7 +9,7 @@ import pytest
 from pyharness.cli.main import main
 from pyharness.history import figures
 from pyharness.history.figure_pictures import curve_numbers
-from pyharness.views.render import csv_text
+from pyharness.views.csv import csv_text
 
 ROOT = Path(__file__).parent.parent
 DOCS = sorted((ROOT / "docs").glob("*.md"))

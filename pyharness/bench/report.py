@@ -7,22 +7,28 @@ from typing import Any
 
 from pyharness.bench.growth import Growth
 from pyharness.bench.measure import TARGETS, Finding, Workload
+from pyharness.bench.pictures import bench_picture, growth_picture
 from pyharness.bench.savings import Saving
 from pyharness.bench.scores import groups, means, scores, yardstick
 from pyharness.model.build import build, machine
 from pyharness.model.report import (
     Column,
     Line,
-    Picture,
     Report,
     Section,
     Table,
     digits,
     numbers,
     short,
+    words,
 )
 
 _MOST_SHOWN = 3
+_RATIO = Column("ratio", digits(".2f"), full=digits(".2f"))
+_DRIFT = (
+    "One process and one run: medians of interleaved batches. Times drift with the machine and "
+    "with what else it does: compare the ratios, not the times."
+)
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
@@ -31,12 +37,7 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
     `packages` are those whose versions count, `command` what makes the page again.
     """
     parts, notes = _parts(finding), _notes(finding)
-    here, built = machine(packages), build()
-
-    def draw() -> Picture:
-        from pyharness.bench.pictures import bench_picture
-
-        return bench_picture(finding, data_table(finding))
+    here, built, data = machine(packages), build(), _data(finding)
 
     versions = [
         *here.items(),
@@ -51,12 +52,7 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
     page: list[Section] = [
         [Line("# Run time against error")],
         [Line(f"Made by `{command}`; run that again to have it for another machine.")],
-        [
-            Line(
-                "One process and one run: medians of interleaved batches. Times drift with the "
-                "machine and with what else it does: compare the ratios, not the times."
-            )
-        ],
+        [Line(_DRIFT)],
         [Table((Column(""), Column("version")), versions)],
         *tables,
         [Line("## Notes")],
@@ -66,14 +62,13 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
         "bench",
         text=[*parts, notes],
         record=lambda: _record(finding) | {"machine": here, "build": asdict(built)},
-        data=data_table(finding),
+        data=data,
         page=page,
-        pictures={"precision": draw},
+        pictures={"precision": lambda: bench_picture(finding, data)},
     )
 
 
-def data_table(finding: Finding) -> Table:
-    """Return all that was measured."""
+def _data(finding: Finding) -> Table:
     rows = [
         [
             row.workload.scene.case or None, row.workload.horizon, row.method, row.kind,
@@ -86,31 +81,25 @@ def data_table(finding: Finding) -> Table:
 
 def savings_report(found: Sequence[Saving]) -> Report:
     """Report what each skip of the plan saves."""
-    microseconds, quotient = digits(".3g", 1e6), digits(".2f")
+    time = digits(".3g", 1e6)
     columns = (
-        Column("skipped", left=True),
-        Column("where", left=True),
-        Column("us with it", microseconds, unit="s", full=microseconds),
-        Column("us without", microseconds, unit="s", full=microseconds),
-        Column("ratio", quotient, full=quotient),
-    )
+        *words("skipped where"), Column("us with it", time, unit="s", full=time),
+        Column("us without", time, unit="s", full=time), _RATIO,
+    )  # fmt: skip
     rows = [[each.part, each.where, each.with_it, each.without, each.ratio] for each in found]
     table = Table(columns, rows)
     record = {"savings": [asdict(each) for each in found]}
-    return Report("bench", text=[[table]], record=lambda: record, data=table)
+    return Report("bench", [[table]], lambda: record, table)
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
     """Report errors of the Taylor method over time, by case."""
-    time, error, quotient = digits(".3g"), digits(".2g"), digits(".2f")
+    time, error = digits(".3g"), digits(".2g")
     columns = (
-        Column("case", left=True),
-        Column("time", time, unit="s", full=time),
-        Column("error", error, full=error),
-        Column("one rounding of time", error, full=error),
-        Column("ratio", quotient, full=quotient),
-        Column("steps"),
-    )
+        *words("case"), Column("time", time, unit="s", full=time),
+        Column("error", error, full=error), Column("one rounding of time", error, full=error),
+        _RATIO, Column("steps"),
+    )  # fmt: skip
     rows = [
         [case, each.time, each.error, each.conditioning, each.error / each.conditioning, each.steps]
         for case, growths in found.items()
@@ -118,19 +107,9 @@ def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
     ]
     table = Table(columns, rows)
 
-    def draw() -> Picture:
-        from pyharness.bench.pictures import growth_picture
-
-        return growth_picture(found)
-
     record = {str(case): [asdict(each) for each in growths] for case, growths in found.items()}
-    return Report(
-        "bench",
-        text=[[table]],
-        record=lambda: {"growth": record},
-        data=table,
-        pictures={"growth": draw},
-    )
+    pictures = {"growth": lambda: growth_picture(found)}
+    return Report("bench", [[table]], lambda: {"growth": record}, table, pictures=pictures)
 
 
 def _record(finding: Finding) -> dict[str, Any]:

@@ -96,11 +96,25 @@ def chosen_effort(options: argparse.Namespace) -> float:
     return positive(options.effort, "--effort", 1.0)
 
 
-def add_output_options(parser: Parser, formats: Sequence[str] = FORMATS) -> None:
-    """Declare where results go, and in what form."""
-    parser.add_argument("--format", metavar="F", help=", ".join(formats))
-    parser.add_argument("--plot", metavar="FILE", help="draw a picture, with its numbers as CSV")
+def add_output_options(
+    parser: Parser, formats: Sequence[str] = FORMATS, plot: str = "draw a picture"
+) -> None:
+    """Declare where results go, and in what form; `plot` is empty where nothing is drawn."""
+    parser.add_argument("--format", metavar="F", type=one_of(formats), help=", ".join(formats))
+    if plot:
+        parser.add_argument("--plot", metavar="FILE", help=f"{plot}, with its numbers as CSV")
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+
+
+def one_of(formats: Sequence[str]) -> Callable[[str], str]:
+    """Return what reads a format, and refuses others."""
+
+    def read(form: str) -> str:
+        if form not in formats:
+            raise unknown("format", form, formats, "--format")
+        return form
+
+    return read
 
 
 def chosen_scene(options: argparse.Namespace) -> Scene:
@@ -159,14 +173,6 @@ def listing_text(listing: Listing) -> str:
 def default_lipschitz() -> float:
     """Return the constant of the decks (1/s)."""
     return float(facts("cases")["deck"]["lipschitz"])
-
-
-def chosen_format(options: argparse.Namespace, allowed: Sequence[str]) -> str:
-    """Return the form asked for, the first of those allowed by default."""
-    form = options.format or allowed[0]
-    if form not in allowed:
-        raise unknown("format", form, allowed, "--format")
-    return str(form)
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:

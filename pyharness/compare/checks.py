@@ -73,6 +73,17 @@ def described(id: str, value: float | None, replay: str, note: str = "") -> Chec
     return Check(id, True, None if value is None else float(value), None, replay, note)
 
 
+def severity(check: Check) -> tuple[bool, float]:
+    """Return what orders checks: those that failed last, then by their share of the limit."""
+    if check.value is None or check.limit is None:
+        return not check.passed, 0.0
+    if check.limit == 0.0:
+        return not check.passed, 0.0 if check.value == 0.0 else float("inf")
+    share = abs(check.value) / check.limit
+    # NaN compares with nothing.
+    return not check.passed, share if share == share else float("inf")
+
+
 def selected(id: str, only: Sequence[str]) -> bool:
     """Whether a check is asked for: all are where nothing is named, else whole leading parts.
 

@@ -5,23 +5,23 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from pyharness.compare.checks import Check, Sample
+from pyharness.compare.checks import Check, Sample, severity
+from pyharness.model.records import build_record
 from pyharness.model.report import (
-    Case,
     Column,
     Line,
     Report,
     Section,
     Table,
-    build_record,
     counted,
     short,
+    words,
 )
 
 _MOST_FAILURES = 50
 _FEW = 10  # checks, each of which is told
 _GROUPS = (
-    Column("checks", left=True), Column("made"), Column("failed"), Column("worst/limit", short),
+    *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
 )  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def checks_report(
             **extra,
             "build": build_record(),
         },
-        cases=[Case(each.kind, each.id, _failure(each), each.replay) for each in checks],
+        cases=[(each.kind, each.id, _failure(each), each.replay) for each in checks],
     )
 
 
@@ -61,7 +61,7 @@ def summary(
         groups.setdefault("/".join(check.id.split("/")[:depth]), []).append(check)
     rows = []
     for name, members in groups.items():
-        worst = max((_share(check) for check in members if check.limit), default=None)
+        worst = max((severity(check)[1] for check in members if check.limit), default=None)
         rows.append([name, len(members), sum(not check.passed for check in members), worst])
     return [title, told_singly(checks), [Table(_GROUPS, rows)], more, [verdict(checks)]]
 
@@ -89,9 +89,8 @@ def _seen(check: Check, against: str) -> str:
 _BANDS = ((1e-6, "1e-3 to 1e-6"), (1e-9, "1e-6 to 1e-9"), (0.0, "finer"))
 _GROWTHS = (10.0, 1e3, math.inf)
 _SAMPLES = (
-    Column("entrance", left=True), Column("tolerance", left=True),
-    Column("K<10"), Column("worst", short), Column("K<1e3"), Column("worst", short),
-    Column("K>1e3"), Column("worst", short),
+    *words("entrance tolerance"), Column("K<10"), Column("worst", short),
+    Column("K<1e3"), Column("worst", short), Column("K>1e3"), Column("worst", short),
 )  # fmt: skip
 
 
@@ -126,9 +125,3 @@ def verdict(checks: Sequence[Check]) -> str:
     failed = sum(not check.passed for check in checks)
     made = counted(len(checks), "check")
     return f"{made}, {failed} failed" if failed else f"{made}, all well"
-
-
-def _share(check: Check) -> float:
-    if check.value is None or not check.limit:
-        return 0.0
-    return abs(check.value) / check.limit

@@ -11,12 +11,12 @@ from pyharness.model.report import (
     Picture,
     Report,
     Table,
-    build_record,
     digits,
     numbers,
     short,
+    words,
 )
-from pyharness.model.scene_report import ending_record, heading, listing_record, scene_record
+from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import Stop, Trajectory
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
@@ -78,8 +78,8 @@ def _seen(order: Order) -> str:
 
 def _programs(comparison: Comparison) -> Table:
     columns = (
-        Column("program", left=True), Column("listing", left=True), Column("steps"),
-        Column("stop"), *_OMEGA, Column("V", short, unit="m/s"), *_DRIFTS, Column("ulp", _count),
+        *words("program listing"), Column("steps"), Column("stop"), *_OMEGA,
+        Column("V", short, unit="m/s"), *_DRIFTS, Column("ulp", _count),
         Column("us/step", digits(".2f", 1e6), unit="s"),
     )  # fmt: skip
     rows = []
@@ -93,7 +93,7 @@ def _programs(comparison: Comparison) -> Table:
 
 def _methods(comparison: Comparison) -> Table:
     columns = (
-        Column("solve_ivp", left=True), Column("tolerance", short), *_OMEGA, *_DRIFTS,
+        *words("solve_ivp"), Column("tolerance", short), *_OMEGA, *_DRIFTS,
         Column("evaluations"), Column("ms", digits(".1f", 1e3), unit="s"),
     )  # fmt: skip
     rows: list[list[Any]] = []
@@ -157,6 +157,8 @@ def _count(ulps: float) -> str:
 
 
 def _record(comparison: Comparison) -> dict[str, Any]:
+    from pyharness.model.records import build_record, ending_record, listing_record, scene_record
+
     return {
         "scene": scene_record(comparison.scene),
         "lipschitz": comparison.lipschitz,

@@ -9,29 +9,30 @@ from typing import Any
 
 from pyharness.history.ablation import CaseEffects, Effect
 from pyharness.model.listing import names_of
-from pyharness.model.report import Column, Field, Line, Report, Section, Table, numbers, short
+from pyharness.model.records import listing_record, scene_record
+from pyharness.model.report import (
+    Column,
+    Field,
+    Line,
+    Report,
+    Section,
+    Table,
+    numbers,
+    short,
+    words,
+)
 from pyharness.model.scene import Scene
-from pyharness.model.scene_report import heading, listing_record, scene_record
+from pyharness.model.scene_report import heading
 
 _FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "why")
-_ENTRIES = (
-    *(Column(head, left=True) for head in ("name", "kind", "certainty", "flag")),
-    Column("what it is", left=True, fit="wrap"),
-)
-_EFFECTS = (
-    Column("case", left=True),
-    *(
-        column
-        for letter in "abcd"
-        for column in (
-            Column(f"w.{letter}", short, unit="rad/s"),
-            Column(f"V.{letter}", short, unit="m/s"),
-            Column(f"stop.{letter}"),
-        )
-    ),
-)
+_ENTRIES = (*words("name kind certainty flag"), Column("what it is", left=True, fit="wrap"))
+_LISTINGS = ("punched", "mended_alone", "kept_alone", "mended")
+_EFFECTS = words("case")
+for _a in "abcd":
+    _EFFECTS += [Column(f"w.{_a}", short, unit="rad/s"), Column(f"V.{_a}", short, unit="m/s")]
+    _EFFECTS += [Column(f"stop.{_a}")]
 _SUBSETS = (
-    Column("active", left=True), Column("error of w", short, unit="rad/s"),
+    *words("active"), Column("error of w", short, unit="rad/s"),
     Column("error of V", short, unit="m/s"), Column("steps"), Column("stop"),
 )  # fmt: skip
 _HALF = 48  # columns of a text that stands beside another
@@ -72,10 +73,7 @@ def entry_report(entry: dict[str, Any], effects: Sequence[CaseEffects]) -> Repor
                 {
                     "program": each.program,
                     "case": each.case,
-                    "punched": _effect_record(each.punched),
-                    "mended_alone": _effect_record(each.mended_alone),
-                    "kept_alone": _effect_record(each.kept_alone),
-                    "mended": _effect_record(each.mended),
+                    **{name: _effect_record(getattr(each, name)) for name in _LISTINGS},
                 }
                 for each in effects
             ],
@@ -109,7 +107,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
         for each in effects:
             if each.program == program:
                 row: list[Any] = [each.case]
-                for found in (each.punched, each.mended_alone, each.kept_alone, each.mended):
+                for found in (getattr(each, name) for name in _LISTINGS):
                     row += [found.omega, found.velocity, _stop(found)]
                 rows.append(row)
         told.append([program, Table(_EFFECTS, rows)])

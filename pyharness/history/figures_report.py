@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 from pyharness.history.figure_pictures import label
 from pyharness.history.figures import ENDINGS, Finding
-from pyharness.model.report import Column, Report, Table, build_record
-
-_COLUMNS = (Column("files", left=True), Column("case", left=True), Column("curves", left=True))
+from pyharness.model.records import build_record
+from pyharness.model.report import Report, Table, words
 
 
 def figures_report(findings: Sequence[Finding]) -> Report:
@@ -21,7 +20,7 @@ def figures_report(findings: Sequence[Finding]) -> Report:
     ]
     return Report(
         "figures",
-        text=[[Table(_COLUMNS, rows)]],
+        text=[[Table(words("files case curves"), rows)]],
         record=lambda: {
             "figures": [
                 {

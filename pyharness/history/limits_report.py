@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
 from pyharness.history.limits import Limit
+from pyharness.model.records import scene_record
 from pyharness.model.report import Column, Report, Section, Table, digits, short
 from pyharness.model.scene import Scene
-from pyharness.model.scene_report import heading, scene_record
+from pyharness.model.scene_report import heading
 
 _STEP = digits("g")
 _COLUMNS = (

@@ -1,20 +1,13 @@
-"""The reports of `run` and `plan`."""
+"""The report of `run`."""
 
-from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
-from pyharness.methods.plan import Plan
 from pyharness.model.listing import Listing
-from pyharness.model.report import Column, Picture, Report, Table, build_record, digits
+from pyharness.model.report import Column, Picture, Report, Table, digits
 from pyharness.model.scene import Scene
-from pyharness.model.scene_report import (
-    ending,
-    ending_record,
-    heading,
-    listing_record,
-    scene_record,
-)
+from pyharness.model.scene_report import ending, heading
 from pyharness.model.trajectory import Trajectory
 
 _NUMBER = digits(".6g")
@@ -24,7 +17,6 @@ _TIMES = (
 )
 _OMEGA = tuple(Column(f"U{i}", _NUMBER, unit="rad/s", name=f"omega{i}") for i in (1, 2, 3))
 _VELOCITY = tuple(Column(f"V{i}", _NUMBER, unit="m/s", name=f"velocity{i}") for i in (1, 2, 3))
-_DECISIONS = (Column("part", left=True), Column("computed", left=True), Column("why", left=True))
 
 
 def trajectory_report(
@@ -41,6 +33,29 @@ def trajectory_report(
     steps = np.arange(1, len(rows) + 1)
     counted = Table([Column("step", digits(".0f")), *columns], np.column_stack([steps, rows]))
 
+    def record() -> dict[str, Any]:
+        from pyharness.model.records import (
+            build_record,
+            ending_record,
+            listing_record,
+            scene_record,
+        )
+
+        velocity = trajectory.velocity
+        return {
+            "scene": scene_record(scene),
+            "method": method,
+            "listing": None if listing is None else listing_record(listing),
+            "trajectory": {
+                "time": trajectory.time.tolist(),
+                "recorded_time": trajectory.recorded_time.tolist(),
+                "omega": trajectory.omega.tolist(),
+                "velocity": None if velocity is None else velocity.tolist(),
+            },
+            **ending_record(trajectory),
+            "build": build_record(),
+        }
+
     def draw() -> Picture:
         from pyharness.methods.picture import trajectory_picture
 
@@ -49,31 +64,7 @@ def trajectory_report(
     return Report(
         "run",
         text=[[*heading(scene), title], [counted], [ending(trajectory)]],
-        record=lambda: {
-            "scene": scene_record(scene),
-            "method": method,
-            "listing": None if listing is None else listing_record(listing),
-            "trajectory": {
-                "time": trajectory.time.tolist(),
-                "recorded_time": trajectory.recorded_time.tolist(),
-                "omega": trajectory.omega.tolist(),
-                "velocity": None if trajectory.velocity is None else trajectory.velocity.tolist(),
-            },
-            **ending_record(trajectory),
-            "build": build_record(),
-        },
+        record=record,
         data=numbers,
         pictures={"omega": draw},
-    )
-
-
-def plan_report(scene: Scene, plan: Plan) -> Report:
-    """Report what is decided for a scene."""
-    rows = [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions]
-    table = Table(_DECISIONS, rows)
-    return Report(
-        "plan",
-        text=[[*heading(scene), f"method: {plan.method}"], [table]],
-        record=lambda: {"scene": scene_record(scene), "plan": asdict(plan)},
-        data=table,
     )

@@ -76,6 +76,11 @@ class Column(NamedTuple):
     fit: str = ""
 
 
+def words(heads: str) -> list[Column]:
+    """Return columns of words, which stand to the left."""
+    return [Column(head, left=True) for head in heads.split()]
+
+
 class Table(NamedTuple):
     """Columns, and rows of as many values; an array of (rows, columns) will do."""
 
@@ -120,21 +125,16 @@ class Field(NamedTuple):
 Section = Sequence[str | Field | Table]
 
 
-class Picture(NamedTuple):
+class Picture:
     """A figure, the table of its numbers, and what is written above it, a line or more each."""
 
-    figure: "Figure"
-    numbers: Table
-    title: Sequence[str] = ()
+    def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
+        """Keep all three."""
+        self.figure, self.numbers, self.title = figure, numbers, title
 
 
-class Case(NamedTuple):
-    """A check as JUnit knows it; `failure` is empty where it passed."""
-
-    kind: str
-    id: str
-    failure: str
-    replay: str
+# A check as JUnit knows it: kind, id, why it failed (empty where it did not), replay.
+Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
@@ -165,12 +165,3 @@ class Report(NamedTuple):
     page: Sequence[Section] | None = None
     cases: Sequence[Case] = ()
     pictures: Mapping[str, Callable[[], Picture]] | None = None
-
-
-def build_record() -> dict[str, Any]:
-    """Return how this installation was built, for JSON."""
-    from dataclasses import asdict
-
-    from pyharness.model.build import build
-
-    return asdict(build())

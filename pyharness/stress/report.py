@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from functools import partial
 
-from pyharness.compare.checks import Check
+from pyharness.compare.checks import Check, severity
 from pyharness.compare.checks_report import checks_report, told_singly, verdict
-from pyharness.model.report import Column, Picture, Report, Section, Table, short
+from pyharness.model.report import Column, Picture, Report, Section, Table, short, words
 from pyharness.stress.run import Trial
 
 _COLUMNS = (
-    Column("method", left=True), Column("checks"), Column("failed"), Column("bounded"),
+    *words("method"), Column("checks"), Column("failed"), Column("bounded"),
     Column("share", short), Column("value", short), Column("limit", short),
     Column("worst at", left=True, fit="cut"),
 )  # fmt: skip
@@ -64,17 +64,6 @@ def _picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     from pyharness.stress.pictures import stress_picture
 
     return stress_picture(trial, checks)
-
-
-def severity(check: Check) -> tuple[bool, float]:
-    """Return what orders checks: those that failed last, then by their share of the limit."""
-    if check.value is None or check.limit is None:
-        return not check.passed, 0.0
-    if check.limit == 0.0:
-        return not check.passed, 0.0 if check.value == 0.0 else float("inf")
-    share = abs(check.value) / check.limit
-    # NaN compares with nothing.
-    return not check.passed, share if share == share else float("inf")
 
 
 def _size(value: float | None) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
-from pyharness.compare.checks import Check, may_hold, selected
+from pyharness.compare.checks import Check, may_hold, selected, severity
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
@@ -108,13 +108,6 @@ def worst(outcomes: Iterable[Outcome]) -> dict[str, Outcome]:
         if outcome.scene is None or outcome.check.limit is None:
             continue
         name = "/".join(outcome.check.id.split("/")[:2])
-        if name not in found or _severity(outcome) > _severity(found[name]):
+        if name not in found or severity(outcome.check) > severity(found[name].check):
             found[name] = outcome
     return found
-
-
-def _severity(outcome: Outcome) -> tuple[bool, float]:
-    value, limit = outcome.check.value, outcome.check.limit
-    share = 0.0 if value is None or not limit else value / limit
-    # NaN compares with nothing, and is always a failure.
-    return not outcome.check.passed, share if share == share else float("inf")

@@ -21,8 +21,9 @@ from pyharness.methods.report import trajectory_report
 from pyharness.model.listing import corrected, original, subset
 from pyharness.model.trajectory import Trajectory
 from pyharness.truth.reference import reference
+from pyharness.views.json import json_text
 from pyharness.views.pictures import saved
-from pyharness.views.render import json_text, render
+from pyharness.views.render import render
 
 
 def _text(found: room.Comparison) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from pyharness.compare.checks import Check
 from pyharness.compare.checks_report import checks_report, summary
 from pyharness.model.facts import facts
-from pyharness.views.text import text
+from pyharness.views.render import render
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
 from tests.cross.comparison import compared, inside
 from tests.instruction_sets import fuses_here
@@ -84,7 +84,8 @@ def main() -> int:
             for found in pool.map(lambda job: list(_checked(job, twin.result())), ordered)
             for check in found
         ]
-    print(text(checks_report("cross", checks, summary(skipped, checks, 2))), end="")
+    report = checks_report("cross", checks, summary(skipped, checks, 2))
+    print(render(report, "table"), end="")
     return 0 if all(check.passed for check in checks) else 1
 
 

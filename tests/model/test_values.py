@@ -28,8 +28,10 @@ from pyharness import (
 from pyharness.methods import kernels
 from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY
 from pyharness.methods.report import trajectory_report
-from pyharness.model.scene_report import heading, scene_record
-from pyharness.views.render import json_text, render
+from pyharness.model.records import scene_record
+from pyharness.model.scene_report import heading
+from pyharness.views.json import json_text
+from pyharness.views.render import render
 
 PLAIN = Scene(
     "brick",

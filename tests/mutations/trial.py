@@ -128,7 +128,7 @@ NEAR = {
     "pyharness/model/errors": ("model/scene", "methods/prepared", "cli/main"),
     "pyharness/views/": ("compare/comparison", "cli/main"),
     "pyharness/model/report": ("cli/main",),
-    "pyharness/model/scene_report": ("cli/main",),
+    "pyharness/model/records": ("cli/main",),
     "pyharness/compare/report": ("cli/main",),
     "pyharness/methods/report": ("compare/comparison", "cli/main"),
     "pyharness/cli/output": ("cli/output", "cli/main", "history/figures"),

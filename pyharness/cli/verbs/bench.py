@@ -34,7 +34,6 @@ def declare(parser: shared.Parser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure and show."""
-    shared.chosen_format(options, shared.FORMATS)
     if options.plan or options.growth:
         meaningless = ["case", "horizon", "methods", "peers"]
         meaningless += ["plot", "growth"] if options.plan else []

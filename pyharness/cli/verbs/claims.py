@@ -13,16 +13,14 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--assignments", action="store_true", help="which initial conditions let all claims hold"
     )
-    parser.add_argument("--format", metavar="F", help=", ".join(shared.FORMATS))
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+    shared.add_output_options(parser, plot="")
 
 
 def run(options: argparse.Namespace) -> int:
     """Judge and show."""
-    shared.chosen_format(options, shared.FORMATS)
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain",))
-        shared.chosen_format(options, ("table", "json"))
+        shared.one_of(("table", "json"))(options.format or "table")
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)
     if options.assignments:

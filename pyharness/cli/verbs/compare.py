@@ -29,7 +29,6 @@ def run(options: argparse.Namespace) -> int:
     scene = shared.chosen_scene(options)
     if options.program is not None and options.program not in PROGRAMS:
         raise unknown("program", options.program, PROGRAMS, "--program")
-    shared.chosen_format(options, shared.FORMATS)
     shared.check_base(options)
     tolerance = shared.positive(options.tolerance, "--tolerance", 1e-8)
     finest = max(METHODS[name].finest for name in SCIPY_METHODS)

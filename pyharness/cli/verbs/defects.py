@@ -11,13 +11,11 @@ def declare(parser: shared.Parser) -> None:
     """Declare the options."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="an entry, with its effect")
     parser.add_argument("--kind", metavar="K", help="only the entries of one kind")
-    parser.add_argument("--format", metavar="F", help="table (default) or json")
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+    shared.add_output_options(parser, ("table", "json"), plot="")
 
 
 def run(options: argparse.Namespace) -> int:
     """Show the list, or one entry with its effect in every case."""
-    shared.chosen_format(options, ("table", "json"))
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)

@@ -20,8 +20,7 @@ def declare(parser: shared.Parser) -> None:
         "--points", metavar="P", help="one member: thesis, gauss or a,b,... in parts of the step"
     )
     parser.add_argument("--corrections", metavar="K", help="one member: corrections (default 1)")
-    parser.add_argument("--format", metavar="F", help=", ".join(shared.FORMATS))
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+    shared.add_output_options(parser, plot="")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -29,7 +28,6 @@ def run(options: argparse.Namespace) -> int:
     if options.case is None and options.scene is None:
         options.case = _DEFAULT_CASE
     scene = shared.chosen_scene(options)
-    shared.chosen_format(options, shared.FORMATS)
     one = any(getattr(options, name) is not None for name in _OF_A_MEMBER)
     members = [_member(options)] if one else None
     shared.check_outputs(options)

@@ -10,7 +10,13 @@ from pyharness.model.errors import InputError
 def declare(parser: shared.Parser) -> None:
     """Declare the options."""
     parser.add_argument("--out", metavar="DIR", help="folder for SVG, PNG and CSV; made if missing")
-    parser.add_argument("--format", metavar="F", help="table (default) or json: of what was drawn")
+    parser.add_argument(
+        "--format",
+        metavar="F",
+        type=shared.one_of(("table", "json")),
+        default="table",
+        help="table (default) or json: of what was drawn",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -21,7 +27,6 @@ def run(options: argparse.Namespace) -> int:
     from pyharness.views.pictures import check_matplotlib, saved
     from pyharness.views.render import render
 
-    form = shared.chosen_format(options, ("table", "json"))
     if options.out is None:
         raise InputError("figures: give --out DIR, a folder for the files")
     plans = room.plans()
@@ -38,5 +43,5 @@ def run(options: argparse.Namespace) -> int:
     shared.progress("")
     write_folder(options.out, content, "--out")
     # The folder takes the files; what was drawn is told here.
-    shared.emit(render(figures_report(drawn), form), None)
+    shared.emit(render(figures_report(drawn), options.format), None)
     return 0

@@ -15,14 +15,12 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument("--program", metavar="P", help="this program only")
     parser.add_argument("--halvings", metavar="K", help="how often the step is halved (default 6)")
     shared.add_effort_option(parser)
-    parser.add_argument("--format", metavar="F", help=", ".join(shared.FORMATS))
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+    shared.add_output_options(parser, plot="")
 
 
 def run(options: argparse.Namespace) -> int:
     """Hold the programs as punched against their limits and against the truth."""
     scene = shared.chosen_scene(options)
-    shared.chosen_format(options, shared.FORMATS)
     if options.program is not None and options.program not in PROGRAMS:
         raise unknown("program", options.program, PROGRAMS, "--program")
     programs = PROGRAMS if options.program is None else (options.program,)

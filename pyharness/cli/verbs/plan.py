@@ -4,8 +4,8 @@ import argparse
 
 from pyharness.cli import options as shared
 from pyharness.methods.plan import plan
+from pyharness.methods.plan_report import plan_report
 from pyharness.methods.prepared import PREPARED
-from pyharness.methods.report import plan_report
 from pyharness.model.errors import unknown
 
 
@@ -18,14 +18,12 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--rows", action="store_true", help="results on the way are wanted too, as in run"
     )
-    parser.add_argument("--format", metavar="F", help=", ".join(shared.FORMATS))
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+    shared.add_output_options(parser, plot="")
 
 
 def run(options: argparse.Namespace) -> int:
     """Show the decisions for a scene."""
     scene = shared.chosen_scene(options)
-    shared.chosen_format(options, shared.FORMATS)
     method = options.method or "auto"
     if method not in PREPARED:
         raise unknown("method", method, PREPARED, "--method")

@@ -36,14 +36,13 @@ def declare(parser: shared.Parser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run and show."""
     scene = shared.chosen_scene(options)
-    form = shared.chosen_format(options, FORMATS)
     if (options.program is None) == (options.method is None):
         raise InputError(
             f"run: give either --program ({', '.join(PROGRAMS)}) "
             f"or --method ({', '.join(methods.METHODS)})"
         )
-    if form in PROGRAM_FORMATS:
-        _check_program_format(options, scene, form)
+    if options.format in PROGRAM_FORMATS:
+        _check_program_format(options, scene, options.format)
     listing: Listing | None = None
     if options.program is not None:
         name, listing, title, trajectory = _program(options, scene)

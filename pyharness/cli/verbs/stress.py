@@ -19,14 +19,11 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--save", metavar="DIR", help="where the worst inputs go, as scene files (default: worst)"
     )
-    parser.add_argument("--plot", metavar="FILE", help="draw one trial, with its numbers as CSV")
-    parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+    shared.add_output_options(parser, FORMATS, plot="draw one trial")
 
 
 def run(options: argparse.Namespace) -> int:
     """Try and show; 1 where a bound does not hold."""
-    shared.chosen_format(options, FORMATS)
     only = shared.names(options.only)
     for each in only:
         if each.partition("/")[0] not in TRIALS:
@@ -46,6 +43,7 @@ def run(options: argparse.Namespace) -> int:
     for outcome in stress(only):
         shared.progress(f"{len(outcomes) + 1}: {outcome.check.id}")
         outcomes.append(outcome)
+    shared.progress("")
     if not outcomes:
         raise unknown("check", ",".join(only), TRIALS, "--only")
     checks = [outcome.check for outcome in outcomes]

@@ -35,13 +35,11 @@ def declare(parser: shared.Parser) -> None:
     parser.add_argument(
         "--record", metavar="DIR", help="the golden record (default: the checkout's)"
     )
-    parser.add_argument("--format", metavar="F", help=", ".join(FORMATS))
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+    shared.add_output_options(parser, FORMATS, plot="")
 
 
 def run(options: argparse.Namespace) -> int:
     """Verify and show; 1 where something is not as it should be."""
-    shared.chosen_format(options, FORMATS)
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:

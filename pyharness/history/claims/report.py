@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from pyharness.history.claims.ledger import Assignment, Judgement
-from pyharness.model.report import Column, Field, Line, Report, Section, Table, short
+from pyharness.model.report import Column, Field, Line, Report, Section, Table, short, words
 
 # A verdict in the ledger, and below it.
 _VERDICTS = {
@@ -23,9 +23,8 @@ def _verdict(verdict: str) -> str:
 
 
 _LEDGER = (
-    Column("claim", left=True), Column("where", left=True),
-    Column("as punched", _verdict, left=True), Column("as mended", _verdict, left=True),
-    Column("hangs on", left=True),
+    *words("claim where"), Column("as punched", _verdict, left=True),
+    Column("as mended", _verdict, left=True), Column("hangs on", left=True),
 )  # fmt: skip
 
 
@@ -33,14 +32,11 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
     """Report the ledger, one line for each claim."""
     rows = [
         [
-            each.claim["id"],
-            each.claim["where"],
-            each.programs.verdict,
-            each.methods.verdict,
+            each.claim["id"], each.claim["where"], each.programs.verdict, each.methods.verdict,
             ", ".join(_hangs_on(each)) or "-",
         ]
         for each in judgements
-    ]
+    ]  # fmt: skip
     told = []
     for verdict, (_, name) in _VERDICTS.items():
         punched, mended = (sum(row[k] == verdict for row in rows) for k in (2, 3))
@@ -76,11 +72,9 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
     """Report which starts let the claims of each case hold, for the programs as punched."""
     text: list[Section] = [
         [
-            Line(
-                "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
-                "shows,"
-            ),
-            Line("the claims about that case alone, for the programs as punched:"),
+            "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
+            "shows,",
+            "the claims about that case alone, for the programs as punched:",
         ]
     ]
     holding = []

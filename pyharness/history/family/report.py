@@ -5,9 +5,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from pyharness.history.family.orders import SLACK, OrderFinding
-from pyharness.model.report import Column, Report, Section, Table, build_record, numbers, short
+from pyharness.model.records import build_record, scene_record
+from pyharness.model.report import (
+    Column,
+    Report,
+    Section,
+    Table,
+    numbers,
+    short,
+    words,
+)
 from pyharness.model.scene import Scene
-from pyharness.model.scene_report import heading, scene_record
+from pyharness.model.scene_report import heading
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
@@ -84,7 +93,7 @@ def _tables(found: Sequence[OrderFinding]) -> list[Section]:
         key = (member.weighting, member.points_label[:24], member.terms)
         groups.setdefault(key, {})[member.corrections] = each
     rows = [[*key, *map(row.get, corrections)] for key, row in groups.items()]
-    names = [Column("weighting", left=True), Column("points", left=True), Column("n")]
+    names = [*words("weighting points"), Column("n")]
 
     def table(write: Callable[[OrderFinding | None], str]) -> Table:
         return Table([*names, *(Column(f"k={k}", write) for k in corrections)], rows)

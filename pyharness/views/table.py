@@ -9,7 +9,7 @@ _MOST_ROWS = 200
 _END_ROWS = 10
 
 
-def text(report: Report) -> str:
+def write(report: Report) -> str:
     """Return the sections of a report with a blank line between them."""
     sections = ["\n".join(_lines(section)) for section in report.text if section]
     return "\n\n".join(sections) + "\n"

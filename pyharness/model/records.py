@@ -1,0 +1,57 @@
+"""What JSON says of a scene, a listing, the end of a run and the installation."""
+
+from dataclasses import asdict
+from typing import Any
+
+from pyharness.model.build import build
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene, Wave
+from pyharness.model.trajectory import Trajectory
+
+
+def scene_record(scene: Scene) -> dict[str, Any]:
+    """Return a scene in the form of the scene file, with the number of its case."""
+    body = "moments" if scene.moments is not None else "coefficients"
+    return {
+        "name": scene.name,
+        "case": scene.case,
+        "body": {body: list(scene.moments or scene.coefficients or ())},
+        "initial": {"omega": list(scene.omega)},
+        "torque": {
+            "constant": list(scene.torque.constant),
+            "rate": list(scene.torque.rate),
+            "sines": [_wave(wave) for wave in scene.torque.sines],
+            "cosines": [_wave(wave) for wave in scene.torque.cosines],
+        },
+        "run": {"step_size": scene.step_size, "steps": scene.steps},
+    }
+
+
+def _wave(wave: Wave) -> dict[str, Any]:
+    amplitude, frequency = wave
+    return {"amplitude": list(amplitude), "frequency": frequency}
+
+
+def listing_record(listing: Listing) -> dict[str, Any]:
+    """Return a listing: its label, its active defects and its readings."""
+    return {
+        "label": listing.label,
+        "defects": sorted(listing.defects),
+        "readings": sorted(listing.readings),
+    }
+
+
+def ending_record(trajectory: Trajectory) -> dict[str, Any]:
+    """Return how far a run came, what it cost, and how it ended."""
+    stop = trajectory.stop
+    return {
+        "steps": trajectory.steps,
+        "evaluations": trajectory.evaluations,
+        "stop": None if stop is None else asdict(stop),
+        "ended": trajectory.ended,
+    }
+
+
+def build_record() -> dict[str, Any]:
+    """Return how this installation was built."""
+    return asdict(build())

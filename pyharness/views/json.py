@@ -1,0 +1,32 @@
+"""The record of a report as strict JSON."""
+
+import json
+import math
+from typing import Any
+
+from pyharness.model.report import Report
+
+SCHEMA = 1
+
+
+def write(report: Report) -> str:
+    """Return the record of a report, with the number of its schema."""
+    return json_text({"schema": SCHEMA, **report.record()})
+
+
+def json_text(record: dict[str, Any]) -> str:
+    """Return strict JSON in one line; floats round-trip, a non-finite number is null."""
+    try:
+        return json.dumps(record, allow_nan=False) + "\n"
+    except ValueError:
+        return json.dumps(_finite(record), allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(each) for each in value]
+    return value

@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES
+from pyharness.original.programs import PROGRAM_REGISTRY
 
 # Finer than decades: a method whose error stays well below its tolerance must not be judged by it.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
-# Order, and right-hand sides a step (Gauss collocation iterates: the kernel counts).
-FIXED_STEP = {"improved-euler": (2, 2), "taylor-3": (2, 2), "rk4": (4, 4)}
-_GAUSS = {f"gauss-{stages}": 2 * stages for stages in range(1, 9)}
 
 
 class RefusedError(Exception):
@@ -83,10 +81,9 @@ def own() -> list[Contender]:
         for name in ("auto", "taylor")
     ]
     methods.append(Contender("closed-form", "method", "none", _closed_form, (0.0,)))
-    orders = {name: order for name, (order, _) in FIXED_STEP.items()} | _GAUSS
     methods += [
-        Contender(name, "method", "steps", partial(_fixed_step, name), order=order)
-        for name, order in orders.items()
+        Contender(name, "method", "steps", partial(_fixed_step, name), order=METHODS[name].order)
+        for name in (*FIXED_STEP, *GAUSS)
     ]
     programs = [
         Contender(
@@ -162,11 +159,12 @@ def _evaluations(method: str, steps: int) -> int | None:
         return None
     if method.startswith("gauss-"):
         return steps
-    return steps * FIXED_STEP[method][1] if method in FIXED_STEP else 0
+    return steps * METHODS[method].evaluations if method in FIXED_STEP else 0
 
 
 def _program(listing: Listing, scene: Scene) -> Maker:
-    from pyharness.methods.kernels import extension, program_arguments
+    from pyharness.model.extension import extension
+    from pyharness.original.compiled import program_arguments
 
     def make(horizon: float, setting: float) -> Ready:
         steps = int(setting)

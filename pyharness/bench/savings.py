@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.methods import kernels
 from pyharness.methods.prepared import prepare
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.original import compiled
 
 _BATCHES = 9
 _SECONDS = 2e-3  # of a batch
@@ -83,8 +83,8 @@ def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
             _saving(
                 "velocity",
                 f"{program}, 1000 steps",
-                partial(kernels.run, scene, listing),
-                partial(kernels.run, scene, listing, velocity=False),
+                partial(compiled.run, scene, listing),
+                partial(compiled.run, scene, listing, velocity=False),
             )
         )
     for part, module in (("SciPy", "scipy.integrate"), ("reference", "pyharness.truth.reference")):

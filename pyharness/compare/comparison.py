@@ -13,12 +13,14 @@ from functools import partial
 
 from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
 from pyharness.compare.orders import Order, measured_order
-from pyharness.methods.registry import IMPLEMENTATIONS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.methods.registry import SCIPY_METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 _TIMING_BATCHES = 3
@@ -83,9 +85,9 @@ class Comparison:
         )
 
 
-def compare(
+def compare_programs(
     scene: Scene,
-    listings: Sequence[Listing],
+    listings: Sequence[Listing] | None = None,
     lipschitz: float = 500.0,
     may_stop: bool = True,
     tolerance: float = 1e-8,
@@ -97,8 +99,9 @@ def compare(
     ----------
     scene : Scene
         What to integrate.
-    listings : sequence of Listing
-        The programs to run, each with its active defects (see `listings_for`).
+    listings : sequence of Listing, optional
+        The programs to run, each with its active defects; by default all three, as punched and as
+        mended.
     lipschitz : float
         Constant of the stop test (1/s).
     may_stop : bool
@@ -120,6 +123,7 @@ def compare(
     InputError
         Where the reference or a program would need too many steps.
     """
+    listings = listings_for() if listings is None else listings
     for listing, implementation in itertools.product(listings, IMPLEMENTATIONS):
         check_steps(scene, listing.program, implementation, effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)

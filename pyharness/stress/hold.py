@@ -8,16 +8,18 @@ from fractions import Fraction
 import numpy as np
 
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
-from pyharness.methods.plan import closed_form
+from pyharness.methods.plan import FEW_DIGITS, closed_form
 from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress.run import Outcome, replay
 from pyharness.theory import promises
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.theory.promises import FIXED, GAUSS, may_refuse
+from pyharness.theory.promises import may_refuse
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import Reference, reference
 
@@ -114,12 +116,12 @@ def hold_methods(
 
 def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float | None]:
     """Return the tolerances at which a method is tried, None for the scene's own steps."""
-    if name in FIXED:
+    if name in FIXED_STEP:
         return [None]
     if name == "closed-form" or (name == "auto" and closed_form(scene)):
         return [METHODS["closed-form"].finest]
     flow = truth.flow
-    least = promises.QUICK_FINEST if name == "quick" else promises.finest(name, scene, truth.time)
+    least = FEW_DIGITS if name == "quick" else promises.finest(name, scene, truth.time)
     if name in GAUSS:
         # Two solutions that are to agree can't where rounding parts them.
         least = max(least, _ceiling(4.0 * flow.rounding))
@@ -204,7 +206,7 @@ def made_on_the_way(name: str, scene: Scene, truth: Truth, tolerance: float | No
     None where it promises none.
     """
     radians = promises.speed(scene, truth.flow.largest) * abs(truth.time)
-    if name in FIXED and truth.exact:
+    if name in FIXED_STEP and truth.exact:
         steps = _steps(scene, truth.time)
         return promises.fixed_step_sum(name, radians / steps, steps)
     return tolerance

@@ -16,11 +16,13 @@ import numpy as np
 from pyharness.compare.checks import REFUSED, Check, bounded, may_hold, selected
 from pyharness.methods.plan import closed_form
 from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, finest, solve
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.verify.external_file import UNITS, Problem, Value, problems, read_problem
 
 __all__ = ["Problem", "external_checks", "problems", "read_problem"]

@@ -19,12 +19,14 @@ import numpy as np
 from pyharness.compare.agreement import ulps
 from pyharness.compare.checks import Check
 from pyharness.methods.plan import closed_form
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.methods.registry import METHODS, SCIPY_METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.conditioning import conditioning
 from pyharness.verify.selection import RECORD, Selection, replay
 

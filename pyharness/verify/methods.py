@@ -6,19 +6,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.bench.contenders import FIXED_STEP
 from pyharness.compare.agreement import ulps
 from pyharness.compare.checks import REFUSED, Check, bounded
 from pyharness.compare.orders import Order, measured_order, order_of
-from pyharness.methods.kernels import extension, normalized
-from pyharness.methods.plan import closed_form
+from pyharness.methods.plan import FEW_DIGITS, closed_form
 from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, finest, solve
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
+from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.conditioning import Conditioning, conditioning
 from pyharness.truth.reference import Reference, reference
 from pyharness.verify.selection import Selection, replay
@@ -29,8 +31,6 @@ _SCIPY_TOLERANCES = (1e-6, 1e-9)
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
 _PREPARED = ("auto", "taylor", "quick", "closed-form")
-_FINEST_QUICK = 1e-7
-_GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
 # The truth that solve_ivp gives is asked for as finely as it goes.
 _IVP = "dop853"
 # Halvings in which an order has to show, one after another, and what may be missing in the last;
@@ -83,7 +83,7 @@ def prepared(chosen: Selection) -> Iterator[Check]:
                 (name, tolerance, id)
                 for name in forms
                 for tolerance in ((1e-6,) if chosen.thin else _TOLERANCES)
-                if not (name == "quick" and tolerance < _FINEST_QUICK)
+                if not (name == "quick" and tolerance < FEW_DIGITS)
                 and chosen.asks(id := f"prepared/{name}/case-{case}/{t_end:g}/{tolerance:.1e}")
             ]
             if names:
@@ -95,7 +95,7 @@ def prepared(chosen: Selection) -> Iterator[Check]:
 
 def _same_steps(chosen: Selection, scene: Scene, case: int) -> Iterator[Check]:
     """Hold prepared solvers in the scene's own steps to the bits of the kernel itself."""
-    for name in (*FIXED_STEP, *_GAUSS):
+    for name in (*FIXED_STEP, *GAUSS):
         id = f"prepared/{name}/case-{case}/bits"
         if not chosen.asks(id):
             continue
@@ -137,7 +137,7 @@ def orders(chosen: Selection) -> Iterator[Check]:
         if any(asks[name] for name in FIXED_STEP):
             truth = reference(scene, scene.times())
             for name in filter(asks.get, FIXED_STEP):
-                due = FIXED_STEP[name][0]
+                due = METHODS[name].order
                 found = order_of(scene, _steps_of(name), due, truth, pairs=_PAIRS)
                 yield _order(f"orders/{name}/case-{case}", found)
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from pyharness.compare.checks import REFUSED, Check, Sample
 from pyharness.compare.random_scenes import Draw, draw
-from pyharness.methods.plan import FINEST_QUICK, closed_form
+from pyharness.methods.plan import closed_form
 from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, SCIPY_METHODS, finest, solve
+from pyharness.methods.registry import REGISTRY, SCIPY_METHODS
+from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 from pyharness.theory.conditioning import along
@@ -111,7 +112,7 @@ class Answer:
 
 def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
     def answer(drawn: Draw, truth: Truth) -> Answer:
-        tolerance = drawn.tolerance(METHODS[name].finest)
+        tolerance = drawn.tolerance(REGISTRY[name].finest)
         try:
             run = solve(drawn.scene, truth.times, name, tolerance)
         except InputError as refusal:
@@ -125,8 +126,7 @@ def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
 
 def _prepared(name: str) -> Callable[[Draw, Truth], Answer]:
     def answer(drawn: Draw, truth: Truth) -> Answer:
-        finest = FINEST_QUICK if name == "quick" else METHODS[name].finest
-        tolerance = drawn.tolerance(finest)
+        tolerance = drawn.tolerance(REGISTRY[name].finest)
         solver = prepare(drawn.scene, name, tolerance)
         start, t_end = np.array(drawn.scene.omega), truth.times[-1]
         # Another start before it: nothing of that may be left.

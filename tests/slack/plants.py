@@ -13,9 +13,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pyharness.methods.kernels import extension
-from pyharness.methods.registry import solve
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -250,7 +250,7 @@ def roundings(more: float) -> Callable[[Scene, float], float]:
 
 def stop_test(size: float) -> AbstractContextManager[Any]:
     """Let the program be given another constant."""
-    target = "pyharness.methods.registry.Program.run"
+    target = "pyharness.original.programs.Program.run"
     right = pkgutil.resolve_name(target)
 
     def faulty(*rest: Any, **named: Any) -> Any:
@@ -347,7 +347,7 @@ def linear(change: Callable[[Any, float], Any]) -> Plant:
             return factors, change(x, size), ier
 
         return patch(
-            "pyharness.methods.kernels.extension", lambda: SimpleNamespace(solve_linear=faulty)
+            "pyharness.model.extension.extension", lambda: SimpleNamespace(solve_linear=faulty)
         )
 
     return planted

@@ -49,8 +49,8 @@ from tests.slack.plants import (
     without,
 )
 
-_RUN = "pyharness.methods.registry.Program.run"
-_COMPILED = "pyharness.methods.kernels.run"
+_RUN = "pyharness.original.programs.Program.run"
+_COMPILED = "pyharness.original.compiled.run"
 _CASES = "pyharness.verify.methods"
 _DRAWN = "pyharness.verify.random_methods"
 _RECORDED = "pyharness.verify.golden.solve"

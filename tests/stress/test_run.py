@@ -15,12 +15,13 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.compare.checks import Check
-from pyharness.methods import registry as methods
-from pyharness.methods.registry import METHODS
+from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import read_scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress import hold as truth
 from pyharness.stress.hold import Run, in_steps
 from pyharness.stress.run import Outcome, stress, worst
@@ -39,9 +40,9 @@ def test_bounds_hold(name: str) -> None:
         assert check.replay == f"python -m pyharness stress --only {check.id}"
     # Every method is tried, and the programs are described, never judged.
     subjects = {check.id.split("/")[1] for check in checks}
-    assert subjects == {*promises.METHODS, *methods.PROGRAM_REGISTRY}
+    assert subjects == {*promises.METHODS, *PROGRAM_REGISTRY}
     for check in checks:
-        if check.id.split("/")[1] in methods.PROGRAM_REGISTRY:
+        if check.id.split("/")[1] in PROGRAM_REGISTRY:
             assert check.limit is None
     bounded = {check.id.split("/")[1] for check in checks if check.limit is not None}
     assert bounded == set(promises.METHODS)
@@ -70,10 +71,10 @@ def _failed(*only: str) -> list[str]:
 def _shifted(share: float) -> Callable[..., Trajectory]:
     """Return a solver whose time is wrong by a part: it conserves all that there is."""
 
-    def solve(scene: Scene, times: Sequence[float], name: str, tolerance: float) -> Trajectory:
-        return methods.solve(scene, [t * (1.0 + share) for t in times], name, tolerance)
+    def shifted(scene: Scene, times: Sequence[float], name: str, tolerance: float) -> Trajectory:
+        return solve(scene, [t * (1.0 + share) for t in times], name, tolerance)
 
-    return solve
+    return shifted
 
 
 @pytest.mark.parametrize(
@@ -155,7 +156,7 @@ def test_an_overflow_reported_as_complete_is_caught(
 def test_products_that_underflow_are_caught(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """Without other units omega stays as it was, which no status tells."""
     assert not _failed(f"scales/{name}/1e-200")
-    monkeypatch.setattr(methods, "factor_near_one", lambda *_: 1.0)
+    monkeypatch.setattr("pyharness.methods.solve.factor_near_one", lambda *_: 1.0)
     assert _failed(f"scales/{name}/1e-200")
 
 
@@ -177,7 +178,8 @@ def test_a_refusal_is_described() -> None:
 
 def test_sums_of_fixed_steps_bound_the_order() -> None:
     """Against y' = y**2, whose derivatives are the largest: y(0) = 1, one step."""
-    for name, order in promises.FIXED.items():
+    for name in FIXED_STEP:
+        order = METHODS[name].order
         for z in (0.01, 0.1):
             exact = 1.0 / (1.0 - z)
             own = sum(c * z**k for k, c in enumerate(promises._series(name)))

@@ -4,7 +4,7 @@ import argparse
 
 from pyharness.cli import options as shared
 from pyharness.compare import report as views
-from pyharness.compare.comparison import compare, listings_for
+from pyharness.compare.comparison import compare_programs, listings_for
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, names_of
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     )
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
-    found = compare(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
+    found = compare_programs(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
 
     if form == "json":
         from pyharness.model.build import build

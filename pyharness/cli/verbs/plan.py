@@ -39,7 +39,12 @@ def run(options: argparse.Namespace) -> int:
     if form == "json":
         from pyharness.views.records import SCHEMA, json_text, scene_record
 
-        text = json_text({"schema": SCHEMA, "scene": scene_record(scene), "plan": asdict(found)})
+        record = {
+            "method": found.method,
+            "closed_form": found.closed_form,
+            "decisions": [asdict(each) for each in found.decisions],
+        }
+        text = json_text({"schema": SCHEMA, "scene": scene_record(scene), "plan": record})
     elif form == "table":
         lines = [*heading(scene), *wrapped(f"method: {found.method}"), ""]
         text = "\n".join([*lines, *aligned(_HEAD, rows, left=3)]) + "\n"

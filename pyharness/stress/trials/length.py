@@ -8,13 +8,16 @@ from functools import cache
 import numpy as np
 
 from pyharness.compare.checks import bounded, described, may_hold
-from pyharness.methods.kernels import COMPLETE, extension, normalized
 from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
+from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory import brouwer, promises
 from pyharness.theory.brouwer import LAWS, Noise, Orbit

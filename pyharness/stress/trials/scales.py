@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.compare.checks import Check, may_hold
+from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw
@@ -21,7 +22,6 @@ from pyharness.stress.hold import (
 )
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory.conditioning import conditioning
-from pyharness.theory.promises import FIXED, SCIPY
 
 _TIME = 15.0  # s
 _FREE = Scene("scales", (0.5, 1.0, -0.7), moments=(40.0, 30.0, 20.0))
@@ -53,11 +53,11 @@ def _bit_for_bit(only: Sequence[str]) -> Iterator[Outcome]:
     ):
         time = scene.step_size * scene.steps
         for name in ALL:
-            if name in SCIPY or not may_hold(f"scales/{name}", only):
+            if name in SCIPY_METHODS or not may_hold(f"scales/{name}", only):
                 continue
             if name == "closed-form" and kind != "same":
                 continue
-            setting = None if name in FIXED else 1e-6
+            setting = None if name in FIXED_STEP else 1e-6
             plain = _tried(name, scene, time, setting)
             for power in powers:
                 id = f"scales/{name}/{kind}-2^{power}"
@@ -82,7 +82,7 @@ def _beyond(only: Sequence[str]) -> Iterator[Outcome]:
         id = f"scales/{name}/beyond"
         if not may_hold(id, only):
             continue
-        run = _tried(name, scene, 1e300, None if name in FIXED else 1e-6)
+        run = _tried(name, scene, 1e300, None if name in FIXED_STEP else 1e-6)
         silent = run.ended == "complete"
         note = "a silent wrong number" if silent else run.ended
         yield Outcome(Check(id, not silent, float(silent), 0.0, replay(id), note), scene)

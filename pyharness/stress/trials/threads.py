@@ -14,13 +14,15 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.compare.checks import bounded, may_hold
-from pyharness.methods.kernels import extension
 from pyharness.methods.prepared import PREPARED, Solver, prepare
-from pyharness.methods.registry import IMPLEMENTATIONS, METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
+from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory import promises
 

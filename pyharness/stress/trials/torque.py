@@ -8,11 +8,13 @@ import numpy as np
 
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
 from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import PROGRAM_REGISTRY, solve
+from pyharness.methods.registry import FIXED_STEP
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress.hold import Truth, describe_programs, truth_of
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory import promises
@@ -32,7 +34,6 @@ _ALL = (
 # What follows a wave for a million radians in seconds.
 _LONG = ("taylor", "auto", *_PREPARED)
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
-_FIXED_STEP = ("improved-euler", "taylor-3", "rk4")
 
 _BODY = (40.0, 30.0, 20.0)
 _START = (0.3, 1.0, 2.0)
@@ -234,7 +235,7 @@ def _describe_axial(name: str, each: Circumstance, only: Sequence[str]) -> Itera
     ]
     runs += [
         (f"torque/{m}/{name}/own-steps", lambda m=m: solve(scene, scene.times(), m, 1.0).omega)  # type: ignore[misc]
-        for m in _FIXED_STEP
+        for m in FIXED_STEP
     ]
     wanted = [(id, call) for id, call in runs if selected(id, only)]
     if not wanted:

@@ -7,14 +7,15 @@ error against the truth (in rad/s, never below what the reference itself may be 
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
+from pyharness.compare.candidates import listed, solved
 from pyharness.compare.orders import Order, measured_order
+from pyharness.compare.timing import seconds as timed
 from pyharness.methods.registry import SCIPY_METHODS
-from pyharness.methods.solve import solve
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
@@ -129,21 +130,22 @@ def compare_programs(
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:
-        program = PROGRAM_REGISTRY[listing.program]
-        run = partial(
-            program.run, scene, listing, lipschitz=lipschitz, may_stop=may_stop, effort=effort
+        compiled, twin = (
+            listed(listing, each, lipschitz, may_stop, effort=effort) for each in IMPLEMENTATIONS
         )
-        compiled, twin = run("fortran"), run("python")
+        run, other = compiled.rows(scene), twin.rows(scene)
         judged = not listing.defects and not listing.readings
+        program = PROGRAM_REGISTRY[listing.program]
+        (seconds,) = timed([partial(compiled.rows, scene)], _TIMING_SECONDS, _TIMING_BATCHES)
         programs.append(
             ProgramFinding(
                 listing=listing,
-                trajectory=compiled,
-                accuracy=accuracy(scene, compiled, truth),
-                ulps=distance(compiled, twin),
-                differences=tuple(differences(compiled, twin)),
+                trajectory=run,
+                accuracy=accuracy(scene, run, truth),
+                ulps=distance(run, other),
+                differences=tuple(differences(run, other)),
                 order=measured_order(scene, program, listing, truth) if judged else None,
-                seconds_per_step=_seconds(partial(run, "fortran")) / max(compiled.steps, 1),
+                seconds_per_step=seconds / max(run.steps, 1),
             )
         )
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
@@ -195,22 +197,8 @@ def _method(
 ) -> MethodFinding:
     start = time.perf_counter()
     try:
-        trajectory = solve(scene, scene.times(), name, tolerance, effort)
+        trajectory = solved(name, tolerance, effort).rows(scene)
     except InputError as error:
         return MethodFinding(name, tolerance, None, None, math.nan, str(error))
     seconds = time.perf_counter() - start
     return MethodFinding(name, tolerance, trajectory, accuracy(scene, trajectory, truth), seconds)
-
-
-def _seconds(run: Callable[[], object]) -> float:
-    """Return the median time of a call, over batches long enough for the clock."""
-    start = time.perf_counter()
-    run()
-    calls = max(1, round(_TIMING_SECONDS / max(time.perf_counter() - start, 1e-7)))
-    batches = []
-    for _ in range(_TIMING_BATCHES):
-        start = time.perf_counter()
-        for _ in range(calls):
-            run()
-        batches.append((time.perf_counter() - start) / calls)
-    return sorted(batches)[_TIMING_BATCHES // 2]

@@ -17,16 +17,15 @@ from typing import Any
 import numpy as np
 
 from pyharness.compare.agreement import ulps
+from pyharness.compare.candidates import listed, solved
 from pyharness.compare.checks import Check
 from pyharness.methods.plan import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
-from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.conditioning import conditioning
 from pyharness.verify.selection import RECORD, Selection, replay
 
@@ -64,8 +63,8 @@ class Recorded:
         """Compute the trajectory."""
         if self.source in PROGRAMS:
             listing = (original if self.name.endswith("original") else corrected)(self.source)
-            return PROGRAM_REGISTRY[self.source].run(self.scene, listing)
-        return solve(self.scene, self.scene.times(), self.source, self.tolerance or 1.0)
+            return listed(listing).rows(self.scene)
+        return solved(self.source, self.tolerance or 1.0).rows(self.scene)
 
 
 def recorded() -> Iterator[Recorded]:

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.compare.candidates import called, solved
 from pyharness.compare.checks import REFUSED, Check, Sample
 from pyharness.compare.random_scenes import Draw, draw
 from pyharness.methods.plan import closed_form
-from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import REGISTRY, SCIPY_METHODS
-from pyharness.methods.solve import finest, solve
+from pyharness.methods.solve import finest
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 from pyharness.theory.conditioning import along
@@ -114,7 +114,7 @@ def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
     def answer(drawn: Draw, truth: Truth) -> Answer:
         tolerance = drawn.tolerance(REGISTRY[name].finest)
         try:
-            run = solve(drawn.scene, truth.times, name, tolerance)
+            run = solved(name, tolerance).rows(drawn.scene, truth.times)
         except InputError as refusal:
             return Answer(name, tolerance, None, f"{REFUSED}{refusal}")
         if run.ended != "complete" or run.time.tolist() != truth.times:
@@ -127,14 +127,10 @@ def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
 def _prepared(name: str) -> Callable[[Draw, Truth], Answer]:
     def answer(drawn: Draw, truth: Truth) -> Answer:
         tolerance = drawn.tolerance(REGISTRY[name].finest)
-        solver = prepare(drawn.scene, name, tolerance)
-        start, t_end = np.array(drawn.scene.omega), truth.times[-1]
-        # Another start before it: nothing of that may be left.
-        solver(start[::-1].copy(), 0.5 * t_end)
-        found = solver(start, t_end)
-        if solver.status != "complete":
-            return Answer(name, tolerance, None, f"{REFUSED}{solver.status}")
-        return Answer(name, tolerance, found[None, :].copy())
+        end = called(name, tolerance, primed=True).end(drawn.scene, truth.times[-1])
+        if end.ended != "complete":
+            return Answer(name, tolerance, None, f"{REFUSED}{end.ended}")
+        return Answer(name, tolerance, end.omega[None, :])
 
     return answer
 

@@ -211,7 +211,7 @@ def test_diverging_program_leaves_the_picture_whole(tmp_path: Path) -> None:
 
 def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its order is nobody's due, and its steps are those that were run."""
-    monkeypatch.setattr(room, "_seconds", lambda run: 1.0)
+    monkeypatch.setattr(room, "timed", lambda *_: [1.0])
     listings = [corrected("two-term", ["c1-for-c"]), original("runge-kutta")]
     reading, punched = compare_programs(case_scene(2), listings).programs
     assert reading.listing.label == "corrected"

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from pyharness.cli.main import main
+from pyharness.compare.candidates import End
 from pyharness.compare.checks import Check
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import solve
@@ -23,7 +24,7 @@ from pyharness.model.scene_file import read_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress import hold as truth
-from pyharness.stress.hold import Run, in_steps
+from pyharness.stress.hold import in_steps
 from pyharness.stress.run import Outcome, stress, worst
 from pyharness.theory import promises
 
@@ -71,8 +72,8 @@ def _failed(*only: str) -> list[str]:
 def _shifted(share: float) -> Callable[..., Trajectory]:
     """Return a solver whose time is wrong by a part: it conserves all that there is."""
 
-    def shifted(scene: Scene, times: Sequence[float], name: str, tolerance: float) -> Trajectory:
-        return solve(scene, [t * (1.0 + share) for t in times], name, tolerance)
+    def shifted(scene: Scene, times: Sequence[float], *rest: Any) -> Trajectory:
+        return solve(scene, [t * (1.0 + share) for t in times], *rest)
 
     return shifted
 
@@ -89,7 +90,7 @@ def _shifted(share: float) -> Callable[..., Trajectory]:
 )
 def test_a_phase_error_of_1e9_is_caught(monkeypatch: pytest.MonkeyPatch, only: str) -> None:
     assert not _failed(only)
-    monkeypatch.setattr(truth, "solve", _shifted(1e-9))
+    monkeypatch.setattr("pyharness.compare.candidates.solve", _shifted(1e-9))
     assert _failed(only) == [f"{only}/1e-14/error"]
 
 
@@ -97,7 +98,7 @@ def test_a_phase_error_of_1e9_is_caught(monkeypatch: pytest.MonkeyPatch, only: s
 def test_a_shift_of_time_is_caught_though_it_conserves_all(
     monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    monkeypatch.setattr(truth, "solve", _shifted(1e-5))
+    monkeypatch.setattr("pyharness.compare.candidates.solve", _shifted(1e-5))
     only = f"separatrix/{name}/flip-1e-01"
     fine = min(float(o.check.id.split("/")[3]) for o in stress([only]) if "steps" not in o.check.id)
     failed = _failed(only)
@@ -106,10 +107,10 @@ def test_a_shift_of_time_is_caught_though_it_conserves_all(
     assert all(id.endswith("/error") for id in failed)
 
 
-def _changed(change: Callable[[Run], Run]) -> Callable[..., Run]:
+def _changed(change: Callable[[End], End]) -> Callable[..., End]:
     right = truth.run_method
 
-    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> Run:
+    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
         return change(right(name, scene, time, tolerance))
 
     return run
@@ -132,7 +133,7 @@ def test_energy_that_drifts_is_caught_where_no_digit_is_left(
 def test_a_method_of_lower_order_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     right = truth.run_method
 
-    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> Run:
+    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
         return right("improved-euler", scene, time, tolerance)
 
     monkeypatch.setattr(truth, "run_method", run)
@@ -143,7 +144,7 @@ def test_a_method_of_lower_order_is_caught(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_overflow_reported_as_complete_is_caught(
     monkeypatch: pytest.MonkeyPatch, number: float
 ) -> None:
-    wrong = _changed(lambda run: Run(np.full(3, number), "complete", run.steps))
+    wrong = _changed(lambda run: End(np.full(3, number), "complete", run.steps))
     monkeypatch.setattr(truth, "run_method", wrong)
     for name in ("closed-form", "taylor", "rk45", "rk4"):
         assert f"scales/{name}/1e150/" in _failed(f"scales/{name}/1e150")[0]
@@ -161,7 +162,7 @@ def test_products_that_underflow_are_caught(monkeypatch: pytest.MonkeyPatch, nam
 
 
 def test_leaving_the_axis_undisturbed_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    def off(run: Run) -> Run:
+    def off(run: End) -> End:
         return replace(run, omega=run.omega + np.array([0.0, 0.0, 1e-30]))
 
     assert not _failed("separatrix/rk4/none", "separatrix/quick/none")
@@ -255,7 +256,7 @@ def test_table_is_narrow_and_json_tells_all(
 def test_a_failure_is_told_in_every_form(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(truth, "solve", _shifted(1e-9))
+    monkeypatch.setattr("pyharness.compare.candidates.solve", _shifted(1e-9))
     only = "separatrix/closed-form/flip-1e-02"
     code, text = _run(capsys, "--only", only)
     assert code == 1

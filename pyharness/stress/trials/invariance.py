@@ -4,7 +4,6 @@ Where the operations of a method are those of the turned problem in another orde
 other signs or other exponents, not a bit may differ; where they are not, the bound holds.
 """
 
-import math
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,8 +11,8 @@ from functools import cache
 
 import numpy as np
 
+from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
-from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
@@ -22,7 +21,6 @@ from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
 from pyharness.model.turned_scenes import shifted, turned
-from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress.hold import OURS
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory import promises
@@ -168,10 +166,7 @@ def tolerances(name: str, circumstance: str) -> list[float]:
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
     """Return omega at `time`; NaN where a prepared kernel did not get there."""
-    if name in _PREPARED:
-        return prepare(scene, name, tolerance)(np.array(scene.omega), time).copy()
-    rows = solve(scene, [time], name, tolerance).omega
-    return rows[-1] if len(rows) else np.full(3, math.nan)
+    return (called if name in _PREPARED else solved)(name, tolerance).end(scene, time).omega
 
 
 def _checks(name: str, circumstance: str, tolerance: float, only: Sequence[str]) -> Iterator[Check]:
@@ -264,10 +259,7 @@ def _program(listing: Listing, circumstance: str, only: Sequence[str]) -> Iterat
         if not selected(id, only):
             continue
         plain, other = (
-            PROGRAM_REGISTRY[listing.program]
-            .run(each, listing, may_stop=False, velocity=False)
-            .omega
-            for each in (scene, symmetry.turn(scene))
+            unstopped(listing).rows(each).omega for each in (scene, symmetry.turn(scene))
         )
         n = min(len(plain), len(other))
         other = np.array([symmetry.back(row) for row in other[:n]]).reshape(-1, 3)

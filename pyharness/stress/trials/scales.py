@@ -3,9 +3,11 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from pyharness.compare.candidates import End, not_finite
 from pyharness.compare.checks import Check, may_hold
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
@@ -13,9 +15,8 @@ from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.stress.hold import (
     ALL,
-    Run,
     describe_programs,
-    hold_methods,
+    hold,
     in_steps,
     run_method,
     truth_of,
@@ -88,11 +89,11 @@ def _beyond(only: Sequence[str]) -> Iterator[Outcome]:
         yield Outcome(Check(id, not silent, float(silent), 0.0, replay(id), note), scene)
 
 
-def _tried(name: str, scene: Scene, time: float, tolerance: float | None) -> Run:
+def _tried(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
     try:
         return run_method(name, scene, time, tolerance)
     except InputError as refusal:
-        return Run(np.full(3, math.nan), f"refused: {refusal}", 0.0)
+        return not_finite(f"refused: {refusal}")
 
 
 def _run(only: Sequence[str]) -> Iterator[Outcome]:
@@ -100,8 +101,8 @@ def _run(only: Sequence[str]) -> Iterator[Outcome]:
     flow = conditioning(_FREE, _TIME)
     for name, scene, time in circumstances():
         size = max(map(abs, scene.omega)) / max(map(abs, _FREE.omega))
-        truth = truth_of(scene, time, replace(flow, largest=flow.largest * size))
-        yield from hold_methods("scales", name, scene, time, only, ALL, truth)
+        truth = partial(truth_of, flow=replace(flow, largest=flow.largest * size))
+        yield from hold("scales", name, scene, time, only, ALL, truth)
         yield from describe_programs("scales", name, scene, only)
     yield from _bit_for_bit(only)
     yield from _beyond(only)

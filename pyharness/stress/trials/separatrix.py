@@ -8,7 +8,7 @@ import numpy as np
 from pyharness.compare.checks import Check, may_hold
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene
-from pyharness.stress.hold import ALL, describe_programs, hold_methods, in_steps, run_method
+from pyharness.stress.hold import ALL, describe_programs, hold, in_steps, run_method
 from pyharness.stress.run import Outcome, Trial, replay
 
 # A = C = 1/2 hold in binary64: a disturbance that is the same about axes 1 and 3 lies on the
@@ -64,7 +64,7 @@ def _undisturbed(only: Sequence[str]) -> Iterator[Outcome]:
 
 def _run(only: Sequence[str]) -> Iterator[Outcome]:
     for name, scene, time in circumstances():
-        yield from hold_methods("separatrix", name, scene, time, only, ALL)
+        yield from hold("separatrix", name, scene, time, only, ALL)
         if not name.startswith("early"):
             yield from describe_programs("separatrix", name, scene, only)
     yield from _undisturbed(only)

@@ -7,6 +7,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from pyharness.compare.candidates import unstopped
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
 from pyharness.methods.fixed_step import fixed_step
 from pyharness.methods.registry import FIXED_STEP
@@ -15,7 +16,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.linear_solver import SINGULAR
-from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress.divergence import divergence, smallest_divergent
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory.amplification import amplification
@@ -126,7 +126,7 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
     largest = _path(case).flow.largest
     note = ""
     if listing is not None:
-        run = PROGRAM_REGISTRY[name].run(scene, listing, may_stop=False, velocity=False)
+        run = unstopped(listing).rows(scene)
         if run.ended != "complete":
             return math.inf, f"{run.ended} after {run.steps} steps"
         omega = run.omega[-1]
@@ -194,7 +194,7 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 
 
 def _program(listing: Listing, scene: Scene) -> Trajectory:
-    return PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=False, velocity=False)
+    return unstopped(listing).rows(scene)
 
 
 @cache

@@ -4,12 +4,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pyharness.methods.prepared import Solver, prepare, solve
+    from pyharness.compare.comparison import Comparison, compare_programs
+    from pyharness.methods.prepared import Solver, prepare
+    from pyharness.methods.solve import solve
     from pyharness.model.errors import InputError, NotBuiltError
     from pyharness.model.listing import Listing, subset
     from pyharness.model.scene import Scene, TorqueLaw
     from pyharness.model.scene_file import case_scene, read_scene
     from pyharness.model.trajectory import Stop, Trajectory
+    from pyharness.original.programs import run_program
 
     __version__: str
     # What the build makes.
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
     _kernels: Any
 
 __all__ = [
+    "Comparison",
     "InputError",
     "Listing",
     "NotBuiltError",
@@ -26,20 +30,25 @@ __all__ = [
     "TorqueLaw",
     "Trajectory",
     "case_scene",
+    "compare_programs",
     "prepare",
     "read_scene",
+    "run_program",
     "solve",
     "subset",
 ]
 
 # A name loads its room when it is first asked for: a program that needs one pays for one.
 _ROOMS = {
+    "compare.comparison": ("Comparison", "compare_programs"),
     "model.errors": ("InputError", "NotBuiltError"),
     "model.listing": ("Listing", "subset"),
     "model.scene": ("Scene", "TorqueLaw"),
     "model.scene_file": ("case_scene", "read_scene"),
     "model.trajectory": ("Stop", "Trajectory"),
-    "methods.prepared": ("Solver", "prepare", "solve"),
+    "original.programs": ("run_program",),
+    "methods.prepared": ("Solver", "prepare"),
+    "methods.solve": ("solve",),
 }
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from pyharness.methods.kernels import extension
+from pyharness.model.extension import extension
 from tests.instruction_sets import BEST, LEVELS, level_here
 from tests.traps import guard
 

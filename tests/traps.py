@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.methods.kernels import GAVE_UP, OVERFLOW
 from pyharness.methods.plan import EITHER
 from pyharness.methods.prepared import _CODES
+from pyharness.model.extension import GAVE_UP, OVERFLOW
 
 _METHOD_AT = 0
 _ON_ARM = platform.machine().lower() in ("arm64", "aarch64")

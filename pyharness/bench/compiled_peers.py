@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.bench.contenders import Maker, Outcome, Ready, not_finite, plain, refuse_rounding
+from pyharness.bench.contenders import Maker, refuse_rounding
+from pyharness.compare.candidates import End, Ready, not_finite, plain
 from pyharness.model.scene import Scene
 
 _MOST_STEPS = 10_000_000
@@ -44,7 +45,7 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
             kernel(omega0, horizon, steps, omega)
             return omega
 
-        return Ready(run, lambda result: Outcome(plain(result), steps * len(weights)))
+        return Ready(run, lambda result: End(plain(result), evaluations=steps * len(weights)))
 
     return make
 
@@ -69,13 +70,13 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
         def run() -> Any:
             return solver(address, omega0, times, calls, setting, setting * largest, _MOST_STEPS)
 
-        def read(result: Any) -> Outcome:
+        def read(result: Any) -> End:
             rows, success = result
             if not success:
                 return not_finite("the solver reports a failure")
             calls[0] = 0.0
             solver(counting.address, omega0, times, calls, setting, setting * largest, _MOST_STEPS)
-            return Outcome(plain(rows[-1]), int(calls[0]))
+            return End(plain(rows[-1]), evaluations=int(calls[0]))
 
         return Ready(run, read)
 

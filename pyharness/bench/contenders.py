@@ -1,44 +1,22 @@
 """Who takes part in `bench`: the interface of a contender, our methods and the programs."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
-import numpy as np
-
-from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.compare.candidates import Candidate, Ready, called, listed
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import STOP_VARIABLES
+from pyharness.original.programs import PROGRAM_REGISTRY
 
 # Finer than decades: a method whose error stays well below its tolerance must not be judged by it.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
-# Order, and right-hand sides a step (Gauss collocation iterates: the kernel counts).
-FIXED_STEP = {"improved-euler": (2, 2), "taylor-3": (2, 2), "rk4": (4, 4)}
-_GAUSS = {f"gauss-{stages}": 2 * stages for stages in range(1, 9)}
 
 
 class RefusedError(Exception):
     """A contender does not take a scene or a setting; the text says why."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a call came to: omega at the end, right-hand sides if counted, why it failed."""
-
-    omega: Sequence[float] | None
-    evaluations: int | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class Ready:
-    """A call that goes from omega(0) to omega(T) and does nothing else; and how to read it."""
-
-    run: Callable[[], Any]
-    read: Callable[[Any], Outcome]
 
 
 # From the horizon (s) and the setting to a call.
@@ -79,37 +57,33 @@ class Contender:
 def own() -> list[Contender]:
     """Return our methods and the three programs, as punched and as mended."""
     methods = [
-        Contender(name, "method", "tolerance", partial(_method, name), TOLERANCES)
+        Contender(name, "method", "tolerance", _made(partial(called, name)), TOLERANCES)
         for name in ("auto", "taylor")
     ]
-    methods.append(Contender("closed-form", "method", "none", _closed_form, (0.0,)))
-    orders = {name: order for name, (order, _) in FIXED_STEP.items()} | _GAUSS
+    closed = _made(lambda _: called("closed-form", 1e-12))
+    methods.append(Contender("closed-form", "method", "none", closed, (0.0,)))
     methods += [
-        Contender(name, "method", "steps", partial(_fixed_step, name), order=order)
-        for name, order in orders.items()
+        Contender(
+            name,
+            "method",
+            "steps",
+            _made(_in_steps(name), in_steps=True),
+            order=METHODS[name].order,
+        )
+        for name in (*FIXED_STEP, *GAUSS)
     ]
     programs = [
         Contender(
             f"{name}-{listing.label}",
             "program",
             "steps",
-            partial(_program, listing),
+            _made(_listed(listing), in_steps=True),
             order=PROGRAM_REGISTRY[name].order,
         )
         for name in PROGRAMS
         for listing in (original(name), corrected(name))
     ]
     return methods + programs
-
-
-def plain(values: Iterable[float]) -> tuple[float, ...]:
-    """Return plain floats: a buffer is used again by the next call."""
-    return tuple(map(float, values))
-
-
-def not_finite(note: str = "overflow") -> Outcome:
-    """Return the outcome of a call that got nowhere."""
-    return Outcome(None, None, note)
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
@@ -119,70 +93,30 @@ def refuse_rounding(solver: str, setting: float) -> None:
         raise RefusedError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")
 
 
-def _method(name: str, scene: Scene) -> Maker:
-    def make(horizon: float, setting: float) -> Ready:
-        return _solver(name, scene, horizon, setting)
+def _made(
+    candidate: Callable[[float], Candidate], in_steps: bool = False
+) -> Callable[[Scene], Maker]:
+    """Return what makes calls of a candidate, given its setting: a tolerance, or steps."""
 
-    return make
+    def prepare(scene: Scene) -> Maker:
+        def make(horizon: float, setting: float) -> Ready:
+            try:
+                given = scene
+                if in_steps:
+                    steps = int(setting)
+                    given = replace(scene, step_size=horizon / steps, steps=steps)
+                return candidate(setting).ready(given, horizon)
+            except InputError as error:
+                raise RefusedError(str(error)) from None
 
+        return make
 
-def _closed_form(scene: Scene) -> Maker:
-    def make(horizon: float, setting: float) -> Ready:
-        return _solver("closed-form", scene, horizon, 1e-12)
-
-    return make
-
-
-def _fixed_step(name: str, scene: Scene) -> Maker:
-    def make(horizon: float, setting: float) -> Ready:
-        return _solver(name, replace(scene, step_size=horizon / setting), horizon, 1.0)
-
-    return make
-
-
-def _solver(name: str, scene: Scene, horizon: float, tolerance: float) -> Ready:
-    from pyharness.methods.prepared import prepare
-
-    try:
-        solver = prepare(scene, name, tolerance)
-    except InputError as error:
-        raise RefusedError(str(error)) from None
-
-    def read(omega: Any) -> Outcome:
-        if solver.status != "complete":
-            return not_finite(solver.status)
-        return Outcome(plain(omega), _evaluations(solver.plan.method, solver.steps))
-
-    return Ready(partial(solver, np.array(scene.omega), horizon), read)
+    return prepare
 
 
-def _evaluations(method: str, steps: int) -> int | None:
-    """Return right-hand sides; a Taylor series evaluates none, it expands one."""
-    if method == "taylor":
-        return None
-    if method.startswith("gauss-"):
-        return steps
-    return steps * FIXED_STEP[method][1] if method in FIXED_STEP else 0
+def _in_steps(name: str) -> Callable[[float], Candidate]:
+    return lambda _: called(name, 1.0)
 
 
-def _program(listing: Listing, scene: Scene) -> Maker:
-    from pyharness.methods.kernels import extension, program_arguments
-
-    def make(horizon: float, setting: float) -> Ready:
-        steps = int(setting)
-        try:
-            stepped = replace(scene, step_size=horizon / steps, steps=steps)
-        except InputError as error:
-            raise RefusedError(str(error)) from None
-        arguments = program_arguments(stepped, listing, velocity=False)
-        return Ready(partial(extension().run_program, *arguments), read)
-
-    def read(result: Any) -> Outcome:
-        rows, _, n_rows, status, evaluations, variable, _ = result
-        if status == 1:
-            return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")
-        if status != 0:
-            return not_finite()
-        return Outcome(plain(rows[2:5, n_rows - 1]), evaluations)
-
-    return make
+def _listed(listing: Listing) -> Callable[[float], Candidate]:
+    return lambda _: listed(listing, velocity=False)

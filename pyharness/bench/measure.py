@@ -14,10 +14,12 @@ from time import perf_counter
 
 import numpy as np
 
-from pyharness.bench.contenders import Contender, Maker, Outcome, RefusedError
+from pyharness.bench.contenders import Contender, Maker, RefusedError
+from pyharness.compare.candidates import not_finite
 from pyharness.compare.timing import Entry, time_calls
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array
 from pyharness.truth.reference import Reference, reference
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
@@ -174,12 +176,12 @@ def _say_at(say: Progress, place: str, text: str) -> None:
     say(f"{place}: {text}")
 
 
-def relative_error(omega: Sequence[float], truth: Reference) -> float | None:
+def relative_error(omega: Array, truth: Reference) -> float | None:
     """Return the largest error of omega over the largest component of the truth; None if none."""
     if len(truth.omega) == 0:
         return None
     # Near the truth the difference is exact: what the reference has beyond binary64 then counts.
-    difference = np.asarray(omega) - truth.omega[0]
+    difference = omega - truth.omega[0]
     if truth.remainder is not None:
         difference -= truth.remainder[0]
     size = float(np.abs(truth.omega[0]).max()) or 1.0
@@ -233,7 +235,7 @@ def _first_calls(
                 middle = perf_counter()
                 result = ready.run()
                 first = perf_counter() - middle
-                outcome = ready.read(result)
+                end = ready.read(result)
         except RefusedError as refusal:
             named = None if contender.setting == "none" else setting
             refused.append(Refusal(load, contender.name, named, str(refusal)))
@@ -245,10 +247,10 @@ def _first_calls(
         preparing += max(0.0, middle - begin - first)
         spent += first
         before = last
-        error = None if outcome.omega is None else relative_error(outcome.omega, truth)
-        if error is None and not outcome.note:
-            outcome = Outcome(None, None, "overflow")
-        entries.append(Entry(ready, first, outcome, error, setting))
+        error = relative_error(end.omega, truth)
+        if error is None and end.ended == "complete":
+            end = not_finite()
+        entries.append(Entry(ready, first, end, error, setting))
         if contender.setting == "steps" and _at_rounding([entry.error for entry in entries]):
             break
     return entries, preparing
@@ -268,6 +270,6 @@ def _row(load: Workload, contender: Contender, entry: Entry) -> Row:
         setting=None if contender.setting == "none" else entry.setting,
         seconds=entry.seconds,
         error=entry.error,
-        evaluations=entry.outcome.evaluations if entry.error is not None else None,
-        note=entry.outcome.note,
+        evaluations=entry.end.evaluations if entry.error is not None else None,
+        note="" if entry.end.ended == "complete" else entry.end.ended,
     )

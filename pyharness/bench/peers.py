@@ -9,16 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.bench.contenders import (
-    TOLERANCES,
-    Contender,
-    Maker,
-    Outcome,
-    Ready,
-    not_finite,
-    plain,
-    refuse_rounding,
-)
+from pyharness.bench.contenders import TOLERANCES, Contender, Maker, refuse_rounding
+from pyharness.compare.candidates import End, Ready, not_finite, plain
 from pyharness.model.scene import Scene, Triple
 
 _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
@@ -89,8 +81,8 @@ def _heyoka(scene: Scene) -> Maker:
             state[:] = omega0
             return integrator.propagate_until(horizon)
 
-        def read(result: Any) -> Outcome:
-            return Outcome(plain(state)) if result[0] == reached else not_finite(str(result[0]))
+        def read(result: Any) -> End:
+            return End(plain(state)) if result[0] == reached else not_finite(str(result[0]))
 
         return Ready(run, read)
 
@@ -132,10 +124,10 @@ def _solve_ivp(name: str, scene: Scene) -> Maker:
         )  # fmt: skip
         return Ready(run, read)
 
-    def read(result: Any) -> Outcome:
+    def read(result: Any) -> End:
         if not result.success:
             return not_finite(str(result.message))
-        return Outcome(plain(result.y[:, -1]), int(result.nfev))
+        return End(plain(result.y[:, -1]), evaluations=int(result.nfev))
 
     return make
 
@@ -152,14 +144,14 @@ def _odeint(scene: Scene) -> Maker:
             rtol=setting, atol=setting * largest, tfirst=True, mxstep=_MOST_STEPS,
         )  # fmt: skip
 
-        def read(rows: Any) -> Outcome:
+        def read(rows: Any) -> End:
             # The counts come with an output of their own, which the timed call need not make.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 _, told = run(full_output=True)
             if "successful" not in told["message"]:
                 return not_finite(told["message"])
-            return Outcome(plain(rows[-1]), int(told["nfe"][-1]))
+            return End(plain(rows[-1]), evaluations=int(told["nfe"][-1]))
 
         return Ready(run, read)
 

@@ -2,18 +2,18 @@
 
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from pyharness.methods import kernels
+from pyharness.compare.timing import seconds
 from pyharness.methods.prepared import prepare
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
+from pyharness.original import compiled
 
 _BATCHES = 9
 _SECONDS = 2e-3  # of a batch
@@ -83,8 +83,8 @@ def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
             _saving(
                 "velocity",
                 f"{program}, 1000 steps",
-                partial(kernels.run, scene, listing),
-                partial(kernels.run, scene, listing, velocity=False),
+                partial(compiled.run, scene, listing),
+                partial(compiled.run, scene, listing, velocity=False),
             )
         )
     for part, module in (("SciPy", "scipy.integrate"), ("reference", "pyharness.truth.reference")):
@@ -119,19 +119,4 @@ def _python(code: str) -> None:
 def _saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    counts = [_calls(run) for run in (with_it, without)]
-    seconds: tuple[list[float], list[float]] = ([], [])
-    for _ in range(_BATCHES):
-        for run, count, list_ in zip((with_it, without), counts, seconds, strict=True):
-            start = time.perf_counter()
-            for _ in range(count):
-                run()
-            list_.append((time.perf_counter() - start) / count)
-    medians = [sorted(each)[_BATCHES // 2] for each in seconds]
-    return Saving(part, where, medians[0], medians[1])
-
-
-def _calls(run: Callable[[], object]) -> int:
-    start = time.perf_counter()
-    run()
-    return max(1, round(_SECONDS / max(time.perf_counter() - start, 1e-8)))
+    return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

@@ -7,18 +7,21 @@ error against the truth (in rad/s, never below what the reference itself may be 
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
+from pyharness.compare.candidates import listed, solved
 from pyharness.compare.orders import Order, measured_order
-from pyharness.methods.registry import IMPLEMENTATIONS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.compare.timing import seconds as timed
+from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 _TIMING_BATCHES = 3
@@ -83,9 +86,9 @@ class Comparison:
         )
 
 
-def compare(
+def compare_programs(
     scene: Scene,
-    listings: Sequence[Listing],
+    listings: Sequence[Listing] | None = None,
     lipschitz: float = 500.0,
     may_stop: bool = True,
     tolerance: float = 1e-8,
@@ -97,8 +100,9 @@ def compare(
     ----------
     scene : Scene
         What to integrate.
-    listings : sequence of Listing
-        The programs to run, each with its active defects (see `listings_for`).
+    listings : sequence of Listing, optional
+        The programs to run, each with its active defects; by default all three, as punched and as
+        mended.
     lipschitz : float
         Constant of the stop test (1/s).
     may_stop : bool
@@ -120,26 +124,28 @@ def compare(
     InputError
         Where the reference or a program would need too many steps.
     """
+    listings = listings_for() if listings is None else listings
     for listing, implementation in itertools.product(listings, IMPLEMENTATIONS):
         check_steps(scene, listing.program, implementation, effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:
-        program = PROGRAM_REGISTRY[listing.program]
-        run = partial(
-            program.run, scene, listing, lipschitz=lipschitz, may_stop=may_stop, effort=effort
+        compiled, twin = (
+            listed(listing, each, lipschitz, may_stop, effort=effort) for each in IMPLEMENTATIONS
         )
-        compiled, twin = run("fortran"), run("python")
+        run, other = compiled.rows(scene), twin.rows(scene)
         judged = not listing.defects and not listing.readings
+        program = PROGRAM_REGISTRY[listing.program]
+        (seconds,) = timed([partial(compiled.rows, scene)], _TIMING_SECONDS, _TIMING_BATCHES)
         programs.append(
             ProgramFinding(
                 listing=listing,
-                trajectory=compiled,
-                accuracy=accuracy(scene, compiled, truth),
-                ulps=distance(compiled, twin),
-                differences=tuple(differences(compiled, twin)),
+                trajectory=run,
+                accuracy=accuracy(scene, run, truth),
+                ulps=distance(run, other),
+                differences=tuple(differences(run, other)),
                 order=measured_order(scene, program, listing, truth) if judged else None,
-                seconds_per_step=_seconds(partial(run, "fortran")) / max(compiled.steps, 1),
+                seconds_per_step=seconds / max(run.steps, 1),
             )
         )
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
@@ -191,22 +197,8 @@ def _method(
 ) -> MethodFinding:
     start = time.perf_counter()
     try:
-        trajectory = solve(scene, scene.times(), name, tolerance, effort)
+        trajectory = solved(name, tolerance, effort).rows(scene)
     except InputError as error:
         return MethodFinding(name, tolerance, None, None, math.nan, str(error))
     seconds = time.perf_counter() - start
     return MethodFinding(name, tolerance, trajectory, accuracy(scene, trajectory, truth), seconds)
-
-
-def _seconds(run: Callable[[], object]) -> float:
-    """Return the median time of a call, over batches long enough for the clock."""
-    start = time.perf_counter()
-    run()
-    calls = max(1, round(_TIMING_SECONDS / max(time.perf_counter() - start, 1e-7)))
-    batches = []
-    for _ in range(_TIMING_BATCHES):
-        start = time.perf_counter()
-        for _ in range(calls):
-            run()
-        batches.append((time.perf_counter() - start) / calls)
-    return sorted(batches)[_TIMING_BATCHES // 2]

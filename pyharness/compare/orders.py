@@ -8,12 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from pyharness.methods.registry import Program, solve
+from pyharness.methods.solve import solve
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import Program
 from pyharness.theory.conditioning import ROUNDING, conditioning
 from pyharness.truth.reference import Reference
 

@@ -10,7 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
-from pyharness.bench.contenders import Outcome, Ready
+from pyharness.compare.candidates import End, Ready
 
 ROUNDS = 9
 _BATCH = 1e-3  # s; calls faster than this are batched
@@ -23,7 +23,7 @@ class Entry:
 
     ready: Ready
     first: float
-    outcome: Outcome
+    end: End
     error: float | None
     setting: float
     seconds: float | None = None
@@ -66,3 +66,10 @@ def batch(run: Callable[[], object], calls: int) -> float:
     for _ in repeat(None, calls):
         run()
     return (perf_counter() - begin) / calls
+
+
+def seconds(runs: Sequence[Callable[[], object]], length: float, rounds: int) -> list[float]:
+    """Return the median seconds of a call of each, in rounds of batches of `length` seconds."""
+    calls = [max(1, round(length / max(batch(run, 1), 1e-8))) for run in runs]
+    seen = [[batch(run, n) for run, n in zip(runs, calls, strict=True)] for _ in range(rounds)]
+    return [statistics.median(each) for each in zip(*seen, strict=True)]

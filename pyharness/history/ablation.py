@@ -7,7 +7,6 @@ from functools import cache
 from typing import Any
 
 from pyharness.compare.agreement import accuracy
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
@@ -15,6 +14,7 @@ from pyharness.model.listing import Listing, corrected, names_of, original, subs
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Stop
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 

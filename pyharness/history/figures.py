@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 SETS = {"punched": original, "mended": corrected}

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, names_of, original, subset
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 _TOLERANCE = 1e-11

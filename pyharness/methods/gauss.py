@@ -1,4 +1,4 @@
-"""The modern kernels: scenes and times in, trajectories out; one solver per kind of method."""
+"""Gauss collocation, steps halved until two solutions agree."""
 
 import itertools
 import math
@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.methods.kernels import COMPLETE, GAVE_UP, REFUSED, extension, normalized
+from pyharness.methods.problem import normalized, trajectory_of
 from pyharness.model.effort import Solver, advice, waves
-from pyharness.model.errors import InputError, TimedError
+from pyharness.model.errors import TimedError
+from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
-
-FIXED_STEP = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
 
 # Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
 # as much as half of one.
@@ -23,77 +22,6 @@ _ORDER_THAT_SHOWS = 8
 _ROUNDING = 16 * 2.0**-53
 # Of the range of numbers (rad/s): a solution that reached it twice leaves it.
 _NEAR_THE_END = 1e300
-
-
-def closed_form(
-    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
-) -> Trajectory:
-    """Solve a scene that has a closed form; the tolerance plays no part.
-
-    Raises
-    ------
-    InputError
-        Where the scene has none: torque on a body that is no sphere, or coefficients all of
-        one sign; and where the phase is so large that it has no digit left, or the times and
-        waves are too many.
-    """
-    work = np.array([effort, 0.0])
-    if not any(scene.euler_coefficients):
-        rows, n_rows, status = extension().sphere_solution(
-            *normalized(scene)[1:], scene.omega, times, effort=work
-        )
-        if status == GAVE_UP:
-            raise InputError(
-                f"closed-form: {waves(scene)} waves at {len(times)} times would take too long; "
-                + advice("take fewer times", effort, work[1])
-            )
-    elif not scene.torque.is_zero:
-        raise InputError(
-            "closed-form: the scene has torque, and its body is no sphere; "
-            "allowed: a sphere, or no torque"
-        )
-    else:
-        rows, n_rows, status = extension().torque_free_solution(
-            scene.euler_coefficients, scene.omega, times
-        )
-    if status == REFUSED:
-        raise InputError(
-            "closed-form: no bounded motion, or a disturbance too faint to square; allowed: "
-            "coefficients A, B, C not all of one sign, none of them zero between equal signs"
-        )
-    if status == GAVE_UP:
-        raise TimedError(
-            "closed-form: at t = {time} s the phase is beyond 1e15 radians and has no digit left; "
-            "take a shorter time",
-            times[n_rows],
-        )
-    return _trajectory(times, rows, n_rows, status, len(times), 0)
-
-
-def fixed_step(name: str) -> Solver:
-    """Return the solver of a method of III.2: steps of the scene's size, no error control.
-
-    Before each time the last step is shortened to hit it.
-    """
-    number = FIXED_STEP[name]
-
-    def solve(
-        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
-    ) -> Trajectory:
-        work = np.array([effort, 0.0])
-        rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(
-            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
-            scene.step_size, effort=work,
-        )  # fmt: skip
-        if status == GAVE_UP:
-            raise TimedError(
-                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s are too many; "
-                + advice("take a larger step or a shorter time", effort, work[1]),
-                scene.step_size,
-            )
-        return _trajectory(times, rows, n_rows, status, steps, evaluations)
-
-    return solve
 
 
 def gauss(stages: int) -> Solver:
@@ -109,7 +37,7 @@ def gauss(stages: int) -> Solver:
     ) -> Trajectory:
         torque = normalized(scene)[1:]
         if times[-1] == 0.0:
-            return _trajectory(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
+            return trajectory_of(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
         scale = max(map(abs, scene.omega))
         start = max(scale, _driven(torque, times[-1]))
         step, spent, reached = _first_step(scene, times), 0, 0.0
@@ -160,7 +88,7 @@ def gauss(stages: int) -> Solver:
                     more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
                 if (close and found.status == COMPLETE) or found.blows_up(before, start):
                     count = int(counts.sum())
-                    return _trajectory(times, found.rows, n, found.status, count, spent)
+                    return trajectory_of(times, found.rows, n, found.status, count, spent)
             before, previous = found, counts
             step *= 0.5
             counts = _counts(times, step)
@@ -222,11 +150,3 @@ def _driven(torque: tuple[Array, ...], time: float) -> float:
         push += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
         driven = float(push.max()) * abs(time)
     return driven if math.isfinite(driven) else math.inf
-
-
-def _trajectory(
-    times: Sequence[float], rows: Array, n_rows: int, status: int, steps: int, evaluations: int
-) -> Trajectory:
-    time = np.array(times[:n_rows], dtype=float)
-    ended = "complete" if status == COMPLETE else "overflow"
-    return Trajectory(time, time, rows.T[:n_rows], None, steps, evaluations, ended)

@@ -1,17 +1,18 @@
 """What a scene needs, and what is therefore not computed: decided before anything is computed."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
+from pyharness.methods.registry import REGISTRY
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
-FINEST = 1e-15  # relative; below it a tolerance asks for more digits than binary64 has
-FINEST_QUICK = 1e-12  # below it the rounding of its many steps would count, which it does not see
+FINEST = REGISTRY["auto"].finest
 # For few digits Runge-Kutta takes fewer operations than a series; which, the kernel decides.
 EITHER = "quick or taylor"
-_FEW_DIGITS = 1e-7  # below it never, so that it is not asked
+FEW_DIGITS = 1e-7  # below it never, so that it is not asked
 _WAVES_DIGITS = 1e-9
-_SCIPY = ("dop853", "rk45", "lsoda", "radau")
 
 
 @dataclass(frozen=True)
@@ -39,17 +40,29 @@ class Plan:
 
     Attributes
     ----------
+    scene : Scene
+        What is to be solved.
     method : str
         The method that was chosen, or asked for.
     closed_form : {"sphere", "symmetric", "elliptic"} or None
         Which closed form solves the scene, where one does.
-    decisions : tuple of Decision
-        Part by part.
+    fallback : str or None
+        The method that takes over where the one chosen finds, at run time, that it can't.
+    velocity, rows : bool
+        What is asked for.
     """
 
+    scene: Scene
     method: str
     closed_form: str | None
-    decisions: tuple[Decision, ...]
+    fallback: str | None
+    velocity: bool
+    rows: bool
+
+    @cached_property
+    def decisions(self) -> tuple[Decision, ...]:
+        """Part by part."""
+        return tuple(_decisions(self))
 
     @property
     def skipped(self) -> frozenset[str]:
@@ -84,71 +97,64 @@ def plan(
     InputError
         Where the method can't take the scene, or the tolerance is out of range.
     """
-    finest = FINEST_QUICK if method == "quick" else FINEST
+    finest = REGISTRY["quick"].finest if method == "quick" else FINEST
     if not finest <= tolerance <= 1.0:
         place = " for quick" if method == "quick" else ""
         raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
     form = closed_form(scene)
+    fallback = None
     if method == "auto":
-        few_digits = tolerance >= (_WAVES_DIGITS if scene.torque.varies else _FEW_DIGITS)
+        few_digits = tolerance >= (_WAVES_DIGITS if scene.torque.varies else FEW_DIGITS)
         # Runge-Kutta gives the end alone.
         method = "closed-form" if form else EITHER if few_digits and not rows else "taylor"
+        # A disturbance of the middle axis may be too faint for a closed form, not for a series.
+        fallback = "taylor" if form else None
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
-    closed = method == "closed-form"
-    law = scene.torque
-    a, b, c = scene.euler_coefficients
-    decisions = [
-        Decision(
-            "integration",
-            not closed,
-            f"closed form: {form}" if closed else _why_no_form(scene) if not form else "asked for",
-        )
-    ]
-    for name, value, product in (
-        ("A w2 w3", a, "I2 = I3"),
-        ("B w1 w3", b, "I3 = I1"),
-        ("C w1 w2", c, "I1 = I2"),
+    form = form if method == "closed-form" else None
+    return Plan(scene, method, form, fallback, velocity, rows)
+
+
+def _decisions(chosen: Plan) -> Iterator[Decision]:
+    scene, law = chosen.scene, chosen.scene.torque
+    closed = chosen.method == "closed-form"
+    if closed:
+        yield Decision("integration", False, f"closed form: {chosen.closed_form}")
+    else:
+        why = "asked for" if closed_form(scene) else _why_no_form(scene)
+        yield Decision("integration", True, why)
+    for name, value, product in zip(
+        ("A w2 w3", "B w1 w3", "C w1 w2"),
+        scene.euler_coefficients,
+        ("I2 = I3", "I3 = I1", "I1 = I2"),
+        strict=True,
     ):
         if value != 0.0:
-            decisions.append(Decision(name, True, f"coefficient {value:g}"))
+            yield Decision(name, True, f"coefficient {value:g}")
         elif closed:
-            decisions.append(Decision(name, False, product))
+            yield Decision(name, False, product)
         else:
             # The kernels sum three products side by side in one register.
-            decisions.append(
-                Decision(name, True, f"{product}: zero, beside the others for nothing")
-            )
-    decisions.append(Decision("torque", not law.is_zero, "zero" if law.is_zero else "acts"))
+            yield Decision(name, True, f"{product}: zero, beside the others for nothing")
+    yield Decision("torque", not law.is_zero, "zero" if law.is_zero else "acts")
     for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
         acts = any(any(amplitude) for amplitude, _ in waves)
-        decisions.append(Decision(name, acts, f"{len(waves)} in the law" if acts else "none act"))
-    decisions += [
-        Decision(
-            "torque of time",
-            law.varies,
-            "the law varies" if law.varies else "constant: read once",
-        ),
-        Decision("velocity", velocity, "asked for" if velocity else "not asked for"),
-        Decision(
-            "dense output",
-            rows and not closed,
-            "rows asked for"
-            if rows and not closed
-            else "only the end"
-            if not rows
-            else "closed form",
-        ),
-        Decision(
-            "reference",
-            method == "reference",
-            "asked for" if method == "reference" else "not asked for",
-        ),
-        Decision(
-            "SciPy", method in _SCIPY, "the method is SciPy's" if method in _SCIPY else "ours"
-        ),
-    ]
-    return Plan(method, form if closed else None, tuple(decisions))
+        yield Decision(name, acts, f"{len(waves)} in the law" if acts else "none act")
+    varies = "the law varies" if law.varies else "constant: read once"
+    yield Decision("torque of time", law.varies, varies)
+    for part, wanted in (
+        ("velocity", chosen.velocity),
+        ("dense output", chosen.rows),
+        ("reference", chosen.method == "reference"),
+    ):
+        why = "asked for" if wanted else "not asked for"
+        if part == "dense output":
+            why = "rows asked for" if wanted else "only the end"
+            if wanted and closed:
+                wanted, why = False, "closed form"
+        yield Decision(part, wanted, why)
+    scipy = chosen.method in REGISTRY and bool(REGISTRY[chosen.method].scipy)
+    yield Decision("SciPy", scipy, "the method is SciPy's" if scipy else "ours")
 
 
 def closed_form(scene: Scene) -> str | None:

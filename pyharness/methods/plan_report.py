@@ -16,6 +16,13 @@ def plan_report(scene: Scene, plan: Plan) -> Report:
     return Report(
         "plan",
         text=[[*heading(scene), f"method: {plan.method}"], [table]],
-        record=lambda: {"scene": scene_record(scene), "plan": asdict(plan)},
+        record=lambda: {
+            "scene": scene_record(scene),
+            "plan": {
+                "method": plan.method,
+                "closed_form": plan.closed_form,
+                "decisions": [asdict(each) for each in plan.decisions],
+            },
+        },
         data=table,
     )

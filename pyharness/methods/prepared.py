@@ -1,7 +1,7 @@
 """Solvers: prepared once, called in a loop at little more than the cost of the kernel itself.
 
 `prepare` validates the scene, decides what it needs (`plan`) and packs it; a call then looks at
-three arguments and enters the kernel. `solve` is the same for one use, with rows at many times.
+three arguments and enters the kernel.
 """
 
 import reprlib
@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from pyharness.methods.kernels import ENDS, extension, normalized
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
+from pyharness.methods.problem import normalized
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
+from pyharness.model.extension import ENDS, extension
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.values import (
@@ -88,7 +89,7 @@ class Solver(BoundKernel):
     ) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
         kernel = extension().solve_packed
-        packed = _pack(scene, _code(chosen, asked), tolerance, effort)
+        packed = _pack(scene, _code(chosen), tolerance, effort)
         solver = super().__new__(cls, kernel, packed, _check)
         solver.plan = chosen
         solver._scene = scene
@@ -141,13 +142,13 @@ class Solver(BoundKernel):
         from dataclasses import replace
 
         from pyharness.methods.registry import METHODS
-        from pyharness.methods.registry import solve as solve_by_name
+        from pyharness.methods.solve import solve
 
         scene = replace(self._scene, omega=three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
         # What was prepared in the scene's steps has no tolerance of its own.
         tolerance = max(self._tolerance, METHODS[method].finest)
-        return solve_by_name(scene, times, method, tolerance, self._effort)
+        return solve(scene, times, method, tolerance, self._effort)
 
 
 def prepare(
@@ -197,54 +198,6 @@ def prepare(
     return Solver(scene, plan(scene, method, tolerance), tolerance, method, effort)
 
 
-def solve(
-    scene: Scene,
-    times: Number | Numbers,
-    method: str = "auto",
-    tolerance: Number = 1e-12,
-    effort: float = 1.0,
-) -> Trajectory:
-    """Solve a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        What to solve.
-    times : float or iterable of float, shape (n,)
-        Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
-        twice, from 0 backward and from 0 forward.
-    method : str
-        A name in `pyharness.methods.registry.METHODS`.
-    tolerance : float
-        Largest error of any component at `times`, relative to the largest from 0 to the last of
-        them.
-    effort : float
-        Factor on the work after which the method gives up: 1 is some ten seconds.
-
-    Returns
-    -------
-    Trajectory
-        One row per time, in the order of `times`; fewer where the solution overflows: those between
-        0 and the overflow, on either side. Steps and evaluations are of both sides together.
-
-    Raises
-    ------
-    InputError
-        For an unknown method, one that can't take the scene, times out of order, a tolerance
-        that the method can't meet, or one that takes more work than `effort` allows.
-
-    Examples
-    --------
-    >>> from pyharness import case_scene, solve
-    >>> solve(case_scene(1), [1.0, 2.0]).omega
-    array([[3.5, 3.5, 3.5],
-           [6. , 6. , 6. ]])
-    """
-    from pyharness.methods.registry import solve as solve_by_name
-
-    return solve_by_name(scene, times, method, tolerance, effort)
-
-
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
     """Convert what a call was given and can't read at once.
 
@@ -280,13 +233,13 @@ def _refused(where: str, value: object, allowed: str) -> InputError:
     return InputError(f"{where}: {shown}; allowed: {allowed}")
 
 
-def _code(chosen: Plan, asked: str) -> int:
+def _code(chosen: Plan) -> int:
     """Return the number by which the kernel knows what was decided."""
     if chosen.method == "closed-form":
         if chosen.closed_form == "sphere":
             return _CODES["sphere"]
         # A disturbance too faint to square: then the series, if that is not against the order.
-        return _FREE_OR_SERIES if asked == "auto" else _CODES["closed-form"]
+        return _FREE_OR_SERIES if chosen.fallback else _CODES["closed-form"]
     return _CODES[chosen.method]
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyharness.methods.linearised import growth, propagators
+from pyharness.methods.problem import rows_trajectory
 from pyharness.model.effort import Solver, advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
@@ -299,11 +300,3 @@ def _in_units(right_hand_side: RightHandSide, unit: float) -> RightHandSide:
     if unit == 1.0:
         return right_hand_side
     return lambda time, omega: [unit * slope for slope in right_hand_side(unit * time, omega)]
-
-
-def rows_trajectory(
-    times: Sequence[float], omega: np.ndarray, evaluations: int, steps: int, ended: str
-) -> Trajectory:
-    """Return a trajectory without velocity, recorded at its true times."""
-    time = np.array(times, dtype=float)
-    return Trajectory(time, time, omega, None, steps, evaluations, ended)

@@ -9,12 +9,12 @@ from fractions import Fraction
 
 import numpy as np
 
-from pyharness.methods import registry as methods
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
 from pyharness.original import collocation
 from pyharness.original.equations import omega_rate
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.amplification import NEAREST, amplification, boundary, weight_of_squares
 from pyharness.theory.collocation_matrices import points, solver_roundings
 from pyharness.theory.conditioning import ROUNDING
@@ -256,7 +256,7 @@ def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Arra
 
 
 def _run(scene: Scene, listing: Listing) -> Array:
-    program = methods.PROGRAM_REGISTRY[listing.program]
+    program = PROGRAM_REGISTRY[listing.program]
     return program.run(scene, listing, may_stop=False, velocity=False).omega
 
 

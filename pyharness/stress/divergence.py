@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.methods.registry import solve
+from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.theory.amplification import Amplification

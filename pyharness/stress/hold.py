@@ -1,23 +1,24 @@
 """Methods and programs against the truth on one scene, each within a bound derived beforehand."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
+from pyharness.compare.candidates import End, called, solved, unstopped
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
-from pyharness.methods.plan import closed_form
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods.plan import FEW_DIGITS, closed_form
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.stress.run import Outcome, replay
 from pyharness.theory import promises
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.theory.promises import FIXED, GAUSS, may_refuse
+from pyharness.theory.promises import may_refuse
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import Reference, reference
 
@@ -59,15 +60,6 @@ class Truth:
     exact: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """What a method made of a scene at one time: omega, and steps that lose what they round."""
-
-    omega: np.ndarray
-    ended: str
-    steps: float
-
-
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
     """Return the truth at `time` (s); the flow's conditioning, where it is known, as given."""
     flow = flow or conditioning(scene, time)
@@ -82,16 +74,22 @@ def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Tru
     return Truth(time, known.omega[-1], known.error, flow)
 
 
-def hold_methods(
+# What makes checks of one method: id, scene, truth, name, tolerance (None in the scene's steps).
+Held = Callable[[str, Scene, Truth, str, float | None], Iterable[Check]]
+
+
+def hold(
     trial: str,
     circumstance: str,
     scene: Scene,
     time: float,
     only: Sequence[str] = (),
     methods: Sequence[str] = (*OURS, *SCIPY),
-    truth: Truth | None = None,
+    truth: Callable[[Scene, float], Truth] = truth_of,
+    tolerances: Callable[[str, Scene, Truth], Sequence[float | None]] | None = None,
+    held: Held | None = None,
 ) -> Iterator[Outcome]:
-    """Hold each method against the truth at `time`, at its finest tolerance and a coarse one.
+    """Hold each method against the truth at `time`: by default at two tolerances, fine and coarse.
 
     The limit is what the method promises to be wrong by on the way, amplified by the flow;
     rounding amplified likewise; and what the truth itself may be wrong by. Where no more than two
@@ -101,25 +99,41 @@ def hold_methods(
     names = [m for m in methods if may_hold(f"{trial}/{m}/{circumstance}", only)]
     if not names:
         return
-    truth = truth or truth_of(scene, time)
+    known = truth(scene, time)
     for name in names:
-        for tolerance in _tolerances(name, scene, truth):
+        for tolerance in (tolerances or _tolerances)(name, scene, known):
             setting = "steps" if tolerance is None else f"{tolerance:.0e}"
             id = f"{trial}/{name}/{circumstance}/{setting}"
             if may_hold(id, only):
-                for check in _held(id, scene, truth, name, tolerance):
+                for check in (held or _held)(id, scene, known, name, tolerance):
                     if selected(check.id, only):
                         yield Outcome(check, scene)
 
 
+def attempt(id: str, name: str, scene: Scene, time: float, run: Callable[[], End]) -> End | Check:
+    """Return what a method made of a scene, or the check of its refusal.
+
+    It may refuse no more than `may_refuse` tells.
+    """
+    try:
+        end = run()
+    except InputError as refusal:
+        why = str(refusal)
+    else:
+        if not end.is_refused:
+            return end
+        why = f"{name}: {end.ended}"
+    return Check(id, may_refuse(name, scene, time), None, None, replay(id), f"refused: {why}")
+
+
 def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float | None]:
     """Return the tolerances at which a method is tried, None for the scene's own steps."""
-    if name in FIXED:
+    if name in FIXED_STEP:
         return [None]
     if name == "closed-form" or (name == "auto" and closed_form(scene)):
         return [METHODS["closed-form"].finest]
     flow = truth.flow
-    least = promises.QUICK_FINEST if name == "quick" else promises.finest(name, scene, truth.time)
+    least = FEW_DIGITS if name == "quick" else promises.finest(name, scene, truth.time)
     if name in GAUSS:
         # Two solutions that are to agree can't where rounding parts them.
         least = max(least, _ceiling(4.0 * flow.rounding))
@@ -133,24 +147,20 @@ def _ceiling(tolerance: float) -> float:
     return min((each for each in promises.LADDER if each >= tolerance), default=math.inf)
 
 
-def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> Run:
-    """Run a method; in the scene's steps where the tolerance is None.
-
-    Raises
-    ------
-    InputError
-        Where it refuses, or gives up.
-    """
+def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
+    """Run a method; in the scene's steps where the tolerance is None; InputError on refusal."""
     if name in ("auto", "quick") or tolerance is None:
-        solver = prepare(scene, name, tolerance or 1.0)
-        omega = solver(np.array(scene.omega), time)
-        if solver.status in ("refused", "gave up"):
-            raise InputError(f"{name}: {solver.status}")
-        steps = solver.steps if tolerance is not None else _steps(scene, time)
-        return Run(omega, solver.status, 0.0 if name in GAUSS else float(steps))
-    found = solve(scene, [time], name, tolerance)
-    omega = found.omega[-1] if len(found.omega) else np.full(3, math.nan)
-    return Run(omega, found.ended, promises.steps_of(name, found.steps, found.evaluations))
+        return called(name, tolerance or 1.0).end(scene, time)
+    return solved(name, tolerance).end(scene, time)
+
+
+def _rounded(name: str, scene: Scene, time: float, tolerance: float | None, end: End) -> float:
+    """Return the steps after which a method rounds omega and forgets what it took off."""
+    if tolerance is None:
+        return 0.0 if name in GAUSS else float(_steps(scene, time))
+    if name == "auto":
+        return float(end.steps)
+    return promises.steps_of(name, end.steps, end.evaluations or 0)
 
 
 def _steps(scene: Scene, time: float) -> int:
@@ -162,13 +172,14 @@ def _held(
 ) -> Iterator[Check]:
     flow = truth.flow
     error_id, drift_id = f"{id}/error", f"{id}/drift"
-    try:
-        run = run_method(name, scene, truth.time, tolerance)
-    except InputError as refusal:
-        may = may_refuse(name, scene, truth.time)
-        yield Check(error_id, may, None, None, replay(error_id), f"refused: {refusal}")
+    run = attempt(
+        error_id, name, scene, truth.time, partial(run_method, name, scene, truth.time, tolerance)
+    )
+    if isinstance(run, Check):
+        yield run
         return
     complete = run.ended == "complete"
+    rounded = _rounded(name, scene, truth.time, tolerance, run)
     error = float(np.abs(run.omega - truth.omega).max()) / flow.largest if complete else math.inf
     note = "" if complete else run.ended
     made = made_on_the_way(name, scene, truth, tolerance)
@@ -179,7 +190,7 @@ def _held(
         # It claims no error in steps of this size, only that it conserves.
         limit = math.inf
     else:
-        limit = flow.limit(made, run.steps) + truth.error / flow.largest
+        limit = flow.limit(made, rounded) + truth.error / flow.largest
         if limit > LINEAR:
             limit, note = math.inf, note or "the flow leaves no two digits"
     if limit < math.inf or math.isnan(error) or not complete:
@@ -187,11 +198,11 @@ def _held(
     else:
         yield described(error_id, error, replay(error_id), note)
     if truth.exact and complete:
-        rounded = flow.unamplified + run.steps * ROUNDING
+        lost = flow.unamplified + rounded * ROUNDING
         if made is None:
             # Each step rounds omega, its sums, and the last iteration.
-            rounded += 4.0 * ROUNDING * _steps(scene, truth.time)
-        total = (made or 0.0) + rounded
+            lost += 4.0 * ROUNDING * _steps(scene, truth.time)
+        total = (made or 0.0) + lost
         # An error of omega changes what is conserved by no more than itself.
         most = min(limit, total + total * total)
         drift = conserved(scene, run.omega, flow.largest)
@@ -204,7 +215,7 @@ def made_on_the_way(name: str, scene: Scene, truth: Truth, tolerance: float | No
     None where it promises none.
     """
     radians = promises.speed(scene, truth.flow.largest) * abs(truth.time)
-    if name in FIXED and truth.exact:
+    if name in FIXED_STEP and truth.exact:
         steps = _steps(scene, truth.time)
         return promises.fixed_step_sum(name, radians / steps, steps)
     return tolerance
@@ -255,7 +266,7 @@ def describe_programs(
             id = f"{trial}/{program}/{circumstance}/{listing.label}"
             if not selected(id, only):
                 continue
-            run = PROGRAM_REGISTRY[program].run(scene, listing, may_stop=False, velocity=False)
+            run = unstopped(listing).rows(scene)
             found = run.omega[every - 1 :: every]
             n = min(len(found), len(wanted))
             error = float(np.abs(found[:n] - wanted[:n]).max()) / scale if n else None

@@ -93,7 +93,7 @@ def right_hand_sides(count: int) -> list[list[float]]:
 
 def solved(program: str, step: float) -> Solved:
     """Solve one matrix: `step` is what the points are parts of (s)."""
-    from pyharness.methods.kernels import extension
+    from pyharness.model.extension import extension
 
     matrix = collocation_matrix(points(program, step))
     sides = right_hand_sides(len(matrix))
@@ -201,7 +201,7 @@ def singular_below(program: str, bits: int = 53) -> float:
 
 def declared_singular_below(program: str) -> float:
     """Return the largest step that the compiled LEQT1F declares singular, by bisection (s)."""
-    from pyharness.methods.kernels import extension
+    from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
         matrix = collocation_matrix(points(program, step))

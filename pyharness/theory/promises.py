@@ -13,20 +13,16 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import polynomial
 
-from pyharness.methods import registry as methods
 from pyharness.methods.plan import closed_form
-from pyharness.methods.registry import SCIPY_METHODS
+from pyharness.methods.registry import FIXED_STEP, GAUSS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.scipy_ivp import steps_sum
+from pyharness.methods.solve import finest as finest_of
 from pyharness.model.scene import Scene
 
-GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
-SCIPY = tuple(SCIPY_METHODS)
-FIXED = {"improved-euler": 2, "taylor-3": 2, "rk4": 4}
-METHODS = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY, *FIXED)
+METHODS = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 
 LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 COARSE = 1e-6
-QUICK_FINEST = 1e-7  # below it `auto` never asks the Runge-Kutta method for few digits
 _PATIENCE = 10.0  # times the budget, for the coarsest tolerance
 _SERIES = ("taylor", "auto", "prepared-auto")
 _TOO_MANY_RADIANS = 1e8  # of a wave, for a series
@@ -41,9 +37,9 @@ def speed(scene: Scene, largest: float) -> float:
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
     """Return the steps after which a method rounds omega and forgets what it took off."""
-    if name in SCIPY:
+    if name in SCIPY_METHODS:
         return evaluations / (1 if name == "lsoda" else 6)
-    return float(run_steps) if name in FIXED or name == "quick" else 0.0
+    return float(run_steps) if name in FIXED_STEP or name == "quick" else 0.0
 
 
 def fixed_step_sum(name: str, angle: float, steps: int) -> float:
@@ -53,7 +49,7 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
     """
     if angle >= 0.5:
         return math.inf
-    order = FIXED[name]
+    order = REGISTRY[name].order
     own = sum(c * angle**k for k, c in enumerate(_series(name)) if k > order)
     return steps * (angle ** (order + 1) / (1.0 - angle) + own)
 
@@ -89,8 +85,8 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
     The one that it claims; where `solve_ivp` can't meet that in the scene, the next of the ladder.
     """
-    met = methods.finest(name, scene, time)
-    claimed = methods.METHODS[name].finest
+    met = finest_of(name, scene, time)
+    claimed = REGISTRY[name].finest
     return claimed if met <= claimed else min((t for t in LADDER if t >= 1.1 * met), default=1.0)
 
 
@@ -115,7 +111,7 @@ def tolerances(name: str, least: float, radians: float, amplification: float) ->
 
 
 def _most(name: str) -> float:
-    return 1_000_000.0 if name in GAUSS else 4_000.0 if name in SCIPY else math.inf
+    return 1_000_000.0 if name in GAUSS else 4_000.0 if name in SCIPY_METHODS else math.inf
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
@@ -125,7 +121,7 @@ def _cost(name: str, tolerance: float, radians: float, amplification: float) -> 
         # The error of steps of z radians each, amplified: radians z**order.
         z = math.pow(tolerance / (max(radians, 1.0) * amplification), 0.5 / stages)
         return 12.0 * stages * radians / min(z, 1.0)
-    if name in SCIPY:
+    if name in SCIPY_METHODS:
         a_step = tolerance / steps_sum(SCIPY_METHODS[name], radians, amplification)
         return _STAGES[name] * radians / math.pow(a_step, 1.0 / (_ORDERS[name] + 1))
     return 0.0

@@ -208,7 +208,7 @@ def gauss(stages: int) -> Scheme:
     return scheme
 
 
-FIXED_STEP = {
+SCHEMES = {
     each.name: each
     for each in (
         FixedStep("two-term", 2, collocation("two-term"), 2.0),

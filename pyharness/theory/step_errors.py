@@ -15,7 +15,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.theory.collocation_matrices import PARTS, singular_below, solver_roundings
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.theory.schemes import FIXED_STEP, TERMS, collocation_singular, local_error
+from pyharness.theory.schemes import SCHEMES, TERMS, collocation_singular, local_error
 
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
@@ -96,7 +96,7 @@ def path(scene: Scene, time: float) -> Path:
     InputError
         Where the solution leaves every bound before `time` (s).
     """
-    from pyharness.methods.registry import solve
+    from pyharness.methods.solve import solve
 
     flow = conditioning(scene, time)
     count = _FEWEST_NODES
@@ -118,9 +118,9 @@ class Forecaster:
     """Forecasts for one method on one path, at any step."""
 
     def __init__(self, along: Path, method: str) -> None:
-        """Take the path and a name in `pyharness.theory.schemes.FIXED_STEP`."""
+        """Take the path and a name in `pyharness.theory.schemes.SCHEMES`."""
         self._path = along
-        self.method = FIXED_STEP[method]
+        self.method = SCHEMES[method]
         self._missed = cache(self._series)
         self._wandering = self._of_one_step()
 

@@ -13,14 +13,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from pyharness.compare.candidates import called, listed, solved
 from pyharness.compare.checks import REFUSED, Check, bounded, may_hold, selected
 from pyharness.methods.plan import closed_form
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, finest, solve
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import finest
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.verify.external_file import UNITS, Problem, Value, problems, read_problem
 
 __all__ = ["Problem", "external_checks", "problems", "read_problem"]
@@ -154,9 +156,7 @@ def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
     if method == "closed-form":
         return closed_form(scene) is not None
     if method == "quick":
-        solver = prepare(scene, method, _TOLERANCES[method])
-        solver(np.array(scene.omega), times[0])
-        return solver.status != "refused"
+        return called(method, _TOLERANCES[method]).end(scene, times[0]).ended != "refused"
     return method not in PROGRAMS or times[0] > 0.0
 
 
@@ -165,15 +165,12 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
     if method != "quick":
         tolerance = max(tolerance, finest(method, scene, times[-1]))
     if method == "quick":
-        solver, start = prepare(scene, method, tolerance), np.array(scene.omega)
-        found = []
-        for time in times:
-            found.append(solver(start, time))
-            if solver.status in ("refused", "gave up"):
-                raise InputError(f"{method} {solver.status}")
-        rows = np.array(found)
+        ends = [called(method, tolerance).end(scene, time) for time in times]
+        if refused := next((end.ended for end in ends if end.is_refused), ""):
+            raise InputError(f"{method} {refused}")
+        rows = np.array([end.omega for end in ends])
     else:
-        rows = solve(scene, times, method, tolerance).omega
+        rows = solved(method, tolerance).rows(scene, times).omega
     for omega in rows:
         yield _Result(omega, np.full(3, tolerance * _scale(scene, omega)))
 
@@ -184,13 +181,13 @@ def _program(scene: Scene, time: float, program: str, accuracy: float) -> _Resul
     The error is taken from the last halving, and twice that for safety; rounding may add half a
     unit in the last place a step. None where no step is long enough for its linear equations.
     """
-    run = PROGRAM_REGISTRY[program].run
+    run = listed(corrected(program), may_stop=False, velocity=False).rows
     order = PROGRAM_REGISTRY[program].order
     result, before, steps, ended = None, None, _FEWEST_STEPS, ""
     previous = 0.0
     while steps <= _MOST_STEPS:
         stepped = replace(scene, step_size=time / steps, steps=steps)
-        rows = run(stepped, corrected(program), may_stop=False, velocity=False)
+        rows = run(stepped)
         if rows.ier is not None and rows.ier.any():
             # LEQT1F takes the matrices of tiny steps for singular and leaves a step of order 1.
             break
@@ -268,9 +265,10 @@ def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     the motion does not have.
     """
     moved = np.zeros((len(times), 3))
-    here = solve(scene, times, method, METHODS[method].finest).omega
+    run = solved(method, METHODS[method].finest).rows
+    here = run(scene, times).omega
     for other in _moved(scene):
-        there = solve(other, times, method, METHODS[method].finest).omega
+        there = run(other, times).omega
         rows = min(len(here), len(there))
         moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
     slope = scene.right_hand_side()

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 
 from pyharness.compare.agreement import ulps
+from pyharness.compare.candidates import listed, solved
 from pyharness.compare.checks import Check
 from pyharness.methods.plan import closed_form
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, solve
+from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene
@@ -62,8 +63,8 @@ class Recorded:
         """Compute the trajectory."""
         if self.source in PROGRAMS:
             listing = (original if self.name.endswith("original") else corrected)(self.source)
-            return PROGRAM_REGISTRY[self.source].run(self.scene, listing)
-        return solve(self.scene, self.scene.times(), self.source, self.tolerance or 1.0)
+            return listed(listing).rows(self.scene)
+        return solved(self.source, self.tolerance or 1.0).rows(self.scene)
 
 
 def recorded() -> Iterator[Recorded]:

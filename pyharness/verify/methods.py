@@ -6,19 +6,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.bench.contenders import FIXED_STEP
 from pyharness.compare.agreement import ulps
+from pyharness.compare.candidates import called, listed, solved
 from pyharness.compare.checks import REFUSED, Check, bounded
 from pyharness.compare.orders import Order, measured_order, order_of
-from pyharness.methods.kernels import extension, normalized
-from pyharness.methods.plan import closed_form
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, finest, solve
+from pyharness.methods.plan import FEW_DIGITS, closed_form
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
+from pyharness.methods.solve import finest
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.conditioning import Conditioning, conditioning
 from pyharness.truth.reference import Reference, reference
 from pyharness.verify.selection import Selection, replay
@@ -29,8 +31,6 @@ _SCIPY_TOLERANCES = (1e-6, 1e-9)
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
 _PREPARED = ("auto", "taylor", "quick", "closed-form")
-_FINEST_QUICK = 1e-7
-_GAUSS = tuple(f"gauss-{stages}" for stages in range(1, 9))
 # The truth that solve_ivp gives is asked for as finely as it goes.
 _IVP = "dop853"
 # Halvings in which an order has to show, one after another, and what may be missing in the last;
@@ -83,7 +83,7 @@ def prepared(chosen: Selection) -> Iterator[Check]:
                 (name, tolerance, id)
                 for name in forms
                 for tolerance in ((1e-6,) if chosen.thin else _TOLERANCES)
-                if not (name == "quick" and tolerance < _FINEST_QUICK)
+                if not (name == "quick" and tolerance < FEW_DIGITS)
                 and chosen.asks(id := f"prepared/{name}/case-{case}/{t_end:g}/{tolerance:.1e}")
             ]
             if names:
@@ -95,14 +95,14 @@ def prepared(chosen: Selection) -> Iterator[Check]:
 
 def _same_steps(chosen: Selection, scene: Scene, case: int) -> Iterator[Check]:
     """Hold prepared solvers in the scene's own steps to the bits of the kernel itself."""
-    for name in (*FIXED_STEP, *_GAUSS):
+    for name in (*FIXED_STEP, *GAUSS):
         id = f"prepared/{name}/case-{case}/bits"
         if not chosen.asks(id):
             continue
         time = 100.0 * scene.step_size
-        found = prepare(scene, name)(np.array(scene.omega), time)
+        found = called(name, 1.0).end(scene, time).omega
         if name in FIXED_STEP:
-            wanted = solve(scene, [time], name, 1.0).omega[0]
+            wanted = solved(name, 1.0).end(scene, time).omega
         else:
             stages = int(name.partition("-")[2])
             rows = extension().gauss_solution(
@@ -137,7 +137,7 @@ def orders(chosen: Selection) -> Iterator[Check]:
         if any(asks[name] for name in FIXED_STEP):
             truth = reference(scene, scene.times())
             for name in filter(asks.get, FIXED_STEP):
-                due = FIXED_STEP[name][0]
+                due = METHODS[name].order
                 found = order_of(scene, _steps_of(name), due, truth, pairs=_PAIRS)
                 yield _order(f"orders/{name}/case-{case}", found)
 
@@ -167,7 +167,7 @@ def _held(
     has_form = name != "closed-form" or closed_form(scene) is not None
     times = standard.truth.time
     try:
-        run = solve(scene, times.tolist(), name, tolerance)
+        run = solved(name, tolerance).rows(scene, times.tolist())
     except InputError as refusal:
         return Check(id, not has_form, None, None, again, f"{REFUSED}{refusal}")
     if not has_form:
@@ -182,17 +182,13 @@ def _held_prepared(
     id: str, again: str, scene: Scene, name: str, tolerance: float, standard: Standard
 ) -> Check:
     """Return the check that a prepared solver keeps a tolerance at the end."""
-    solver = prepare(scene, name, tolerance)
-    start, t_end = np.array(scene.omega), float(standard.truth.time[-1])
-    # Another start before it: nothing of that may be left.
-    solver(start[::-1].copy(), 0.5 * t_end)
-    found = solver(start, t_end)
-    if name == "quick" and solver.status in ("refused", "gave up"):
+    end = called(name, tolerance, primed=True).end(scene, float(standard.truth.time[-1]))
+    if name == "quick" and end.is_refused:
         # Its unknowns need three products.
-        may = solver.status == "refused" and not all(scene.euler_coefficients)
-        return Check(id, may, None, None, again, f"{REFUSED}{solver.status}")
-    error = float(np.abs(found - standard.truth.omega[-1]).max()) / standard.flow.largest
-    note = solver.status if math.isnan(error) else ""
+        may = end.ended == "refused" and not all(scene.euler_coefficients)
+        return Check(id, may, None, None, again, f"{REFUSED}{end.ended}")
+    error = float(np.abs(end.omega - standard.truth.omega[-1]).max()) / standard.flow.largest
+    note = end.ended if math.isnan(error) else ""
     return bounded(id, error, standard.flow.limit(tolerance), again, note)
 
 
@@ -213,14 +209,14 @@ def _order(id: str, found: Order) -> Check:
 
 def _steps_of(name: str) -> Callable[[Scene], Array]:
     def run(scene: Scene) -> Array:
-        return solve(scene, scene.times(), name, 1.0).omega
+        return solved(name, 1.0).rows(scene).omega
 
     return run
 
 
 def _velocity_of(program: str) -> Callable[[Scene], Array]:
     def run(scene: Scene) -> Array:
-        velocity = PROGRAM_REGISTRY[program].run(scene, corrected(program), may_stop=False).velocity
+        velocity = listed(corrected(program), may_stop=False).rows(scene).velocity
         # None is as good as no rows: nothing settles.
         return np.empty((0, 3)) if velocity is None else velocity
 
@@ -231,6 +227,6 @@ def _by_ivp(scene: Scene) -> Reference:
     """Return what `solve_ivp` takes for the truth, good to its tolerance."""
     times = scene.times()
     tolerance = 1.01 * finest(_IVP, scene, times[-1])
-    run = solve(scene, times, _IVP, tolerance)
+    run = solved(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())
     return Reference(run.time, run.omega, None, "solve_ivp", tolerance * largest)

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.compare.candidates import called, solved
 from pyharness.compare.checks import REFUSED, Check, Sample
 from pyharness.compare.random_scenes import Draw, draw
-from pyharness.methods.plan import FINEST_QUICK, closed_form
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, SCIPY_METHODS, finest, solve
+from pyharness.methods.plan import closed_form
+from pyharness.methods.registry import REGISTRY, SCIPY_METHODS
+from pyharness.methods.solve import finest
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 from pyharness.theory.conditioning import along
@@ -111,9 +112,9 @@ class Answer:
 
 def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
     def answer(drawn: Draw, truth: Truth) -> Answer:
-        tolerance = drawn.tolerance(METHODS[name].finest)
+        tolerance = drawn.tolerance(REGISTRY[name].finest)
         try:
-            run = solve(drawn.scene, truth.times, name, tolerance)
+            run = solved(name, tolerance).rows(drawn.scene, truth.times)
         except InputError as refusal:
             return Answer(name, tolerance, None, f"{REFUSED}{refusal}")
         if run.ended != "complete" or run.time.tolist() != truth.times:
@@ -125,16 +126,11 @@ def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
 
 def _prepared(name: str) -> Callable[[Draw, Truth], Answer]:
     def answer(drawn: Draw, truth: Truth) -> Answer:
-        finest = FINEST_QUICK if name == "quick" else METHODS[name].finest
-        tolerance = drawn.tolerance(finest)
-        solver = prepare(drawn.scene, name, tolerance)
-        start, t_end = np.array(drawn.scene.omega), truth.times[-1]
-        # Another start before it: nothing of that may be left.
-        solver(start[::-1].copy(), 0.5 * t_end)
-        found = solver(start, t_end)
-        if solver.status != "complete":
-            return Answer(name, tolerance, None, f"{REFUSED}{solver.status}")
-        return Answer(name, tolerance, found[None, :].copy())
+        tolerance = drawn.tolerance(REGISTRY[name].finest)
+        end = called(name, tolerance, primed=True).end(drawn.scene, truth.times[-1])
+        if end.ended != "complete":
+            return Answer(name, tolerance, None, f"{REFUSED}{end.ended}")
+        return Answer(name, tolerance, end.omega[None, :])
 
     return answer
 

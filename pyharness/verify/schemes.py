@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.compare.checks import Check, bounded
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.collocation_matrices import PARTS
 from pyharness.theory.conditioning import ROUNDING, magnitudes
 from pyharness.verify.selection import Selection, replay

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.compare.checks import Check, bounded
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.listing import Listing, corrected, names_of
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.original.cells import listing_name, subsets
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.conditioning import ROUNDING
 from pyharness.verify.schemes import Stage, is_whole, rows, stages
 from pyharness.verify.selection import Selection, replay

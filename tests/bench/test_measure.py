@@ -14,7 +14,7 @@ import pytest
 
 from pyharness.bench import measure as bench
 from pyharness.bench.compiled_peers import _compiled, _steps_source
-from pyharness.bench.contenders import Contender, Maker, Outcome, Ready, RefusedError, own
+from pyharness.bench.contenders import Contender, Maker, RefusedError, own
 from pyharness.bench.measure import (
     Finding,
     Refusal,
@@ -32,6 +32,7 @@ from pyharness.bench.scores import groups, means, scores, yardstick
 from pyharness.cli.main import main
 from pyharness.cli.verbs.bench import chosen
 from pyharness.compare import timing as bench_timing
+from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.truth.reference import reference
@@ -187,7 +188,7 @@ def test_error_is_relative_to_the_largest_component() -> None:
     assert relative_error(omega, replace(truth, remainder=None)) == 0.0
     omega[0] += 1e-5
     assert relative_error(omega, truth) == pytest.approx(1e-5 / abs(truth.omega[0]).max())
-    assert relative_error([math.nan, 0.0, 0.0], truth) is None
+    assert relative_error(np.array([math.nan, 0.0, 0.0]), truth) is None
 
 
 def test_ladder_begins_too_coarse_for_anyone_and_has_rungs_between_powers_of_two() -> None:
@@ -198,7 +199,7 @@ def test_ladder_begins_too_coarse_for_anyone_and_has_rungs_between_powers_of_two
     assert next(ladder(by_name["auto"], case_scene(4), 3.0)) == 0.5
 
 
-def _fake(answer: Callable[[float], Outcome]) -> Callable[[Scene], Maker]:
+def _fake(answer: Callable[[float], End]) -> Callable[[Scene], Maker]:
     def prepare(scene: Scene) -> Maker:
         def make(horizon: float, setting: float) -> Ready:
             if setting < 1e-9:
@@ -225,10 +226,10 @@ def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_measure_judges_refuses_and_goes_on() -> None:
     truth = reference(SHORT.scene, [3.0], precise=True).omega[0]
 
-    def answer(setting: float) -> Outcome:
+    def answer(setting: float) -> End:
         if setting > 1e-4:
-            return Outcome(None, None, "stopped")
-        return Outcome((truth[0], truth[1], truth[2] * (1.0 + setting)), 11)
+            return not_finite("stopped")
+        return End(truth * [1.0, 1.0, 1.0 + setting], evaluations=11)
 
     settings = (1e-3, 1e-6, 1e-12)
     told: list[str] = []
@@ -289,7 +290,7 @@ def test_slow_contenders_are_left_out_and_it_is_said(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(bench, "perf_counter", lambda: next(clock))
     monkeypatch.setattr(bench_timing, "ROUNDS", 1)
     truth = reference(SHORT.scene, [3.0], precise=True).omega[0]
-    made = _fake(lambda setting: Outcome(list(truth)))
+    made = _fake(lambda setting: End(truth))
     slow = Contender("slow", "peer", "tolerance", made, (1e-3, 1e-4))
     found = measure([SHORT], [slow])
     assert [row.setting for row in found.rows] == [1e-3]
@@ -330,9 +331,8 @@ def test_peer_solves_every_law(name: str) -> None:
     for scene in (LAWS[4], LAWS[-1]):
         ready = peer.prepare(scene)(2.0, 1000.0 if peer.setting == "steps" else 1e-12)
         for _ in range(2):
-            outcome = ready.read(ready.run())
-            assert outcome.omega is not None
-            error = relative_error(outcome.omega, reference(scene, [2.0]))
+            end = ready.read(ready.run())
+            error = relative_error(end.omega, reference(scene, [2.0]))
             assert error is not None
             assert error < 1e-10
 

@@ -13,10 +13,11 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.cli.main import main
-from pyharness.methods import kernels
+from pyharness.model import extension
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import original
 from pyharness.model.report import short
+from pyharness.original import compiled
 
 Capture = pytest.CaptureFixture[str]
 
@@ -135,7 +136,7 @@ def test_run_json_is_as_contracted(capsys: Capture) -> None:
     assert record["schema"] == 1
     assert record["stop"] == {"step": 24, "variable": "V2", "quotient": record["stop"]["quotient"]}
     assert record["ended"] == "stopped"
-    wanted = kernels.run(case_scene(3), original("runge-kutta"))
+    wanted = compiled.run(case_scene(3), original("runge-kutta"))
     trajectory = record["trajectory"]
     np.testing.assert_array_equal(trajectory["omega"], wanted.omega)
     np.testing.assert_array_equal(trajectory["velocity"], wanted.velocity)
@@ -163,7 +164,7 @@ def test_run_csv_round_trips_and_both_implementations_agree(capsys: Capture) -> 
         texts.append(capsys.readouterr().out)
     assert texts[0] == texts[1]
     rows = list(csv.DictReader(texts[0].splitlines()))
-    wanted = kernels.run(case_scene(3), original("two-term"))
+    wanted = compiled.run(case_scene(3), original("two-term"))
     assert [float(row["omega2"]) for row in rows] == wanted.omega[:, 1].tolist()
 
 
@@ -265,7 +266,7 @@ def test_extension_that_is_not_built_is_exit_code_3(
     def missing() -> None:
         raise NotBuiltError("the Fortran extension is not built; run 'make compare'")
 
-    monkeypatch.setattr("pyharness.methods.kernels.extension", missing)
+    monkeypatch.setattr("pyharness.original.compiled.extension", missing)
     assert main([*RUN, "--program", "two-term"]) == 3
     captured = capsys.readouterr()
     assert captured.err == "pyharness: the Fortran extension is not built; run 'make compare'\n"
@@ -278,7 +279,7 @@ def test_extension_that_can_not_be_imported_says_how_to_build(
     monkeypatch.setitem(sys.modules, "pyharness._kernels", None)
     monkeypatch.delattr("pyharness._kernels", raising=False)
     with pytest.raises(NotBuiltError, match="make compare"):
-        kernels.extension()
+        extension.extension()
 
 
 def test_doctor(capsys: Capture) -> None:
@@ -377,7 +378,7 @@ def test_what_ends_a_run_has_an_exit_code(
     def raises(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("pyharness.cli.verbs.run.methods.solve", raises)
+    monkeypatch.setattr("pyharness.cli.verbs.run.solve", raises)
     assert main([*RUN, "--method", "taylor"]) == code
     assert capsys.readouterr().err == f"pyharness: {words}\n"
 

@@ -13,13 +13,14 @@ import pytest
 from pyharness import InputError, case_scene
 from pyharness.compare import comparison as room
 from pyharness.compare.agreement import accuracy, differences, distance, ulps
-from pyharness.compare.comparison import compare, listings_for
+from pyharness.compare.comparison import compare_programs, listings_for
 from pyharness.compare.picture import comparison_picture
 from pyharness.compare.report import comparison_report, verdict
-from pyharness.methods.registry import PROGRAM_REGISTRY, SCIPY_METHODS
+from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.methods.report import trajectory_report
 from pyharness.model.listing import corrected, original, subset
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import reference
 from pyharness.views.json import json_text
 from pyharness.views.pictures import saved
@@ -32,12 +33,12 @@ def _text(found: room.Comparison) -> str:
 
 @pytest.fixture(scope="module")
 def case_2() -> room.Comparison:
-    return compare(case_scene(2), listings_for())
+    return compare_programs(case_scene(2), listings_for())
 
 
 def test_all_is_as_expected_in_every_case() -> None:
     for case in range(1, 8):
-        found = compare(case_scene(case), listings_for())
+        found = compare_programs(case_scene(case), listings_for())
         assert found.unexpected == ()
         assert [each.ulps for each in found.programs] == [0.0] * 6
         for line in _text(found).splitlines():
@@ -54,7 +55,7 @@ def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> N
 
 
 def test_table_of_what_failed_and_of_large_quotients_fits() -> None:
-    found = compare(replace(case_scene(3), step_size=1e-5, steps=3), listings_for())
+    found = compare_programs(replace(case_scene(3), step_size=1e-5, steps=3), listings_for())
     why = "Radau gave up at t = 49.568 s after 250000 right-hand sides; take a shorter time or less"
     failed = replace(found.methods[-1], trajectory=None, accuracy=None, failure=why)
     text = _text(replace(found, methods=(*found.methods[:-1], failed)))
@@ -65,7 +66,7 @@ def test_table_of_what_failed_and_of_large_quotients_fits() -> None:
 
 def test_drift_only_without_torque(case_2: room.Comparison) -> None:
     assert all(each.accuracy.energy is not None for each in case_2.programs)
-    found = compare(case_scene(5), listings_for(["runge-kutta"]))
+    found = compare_programs(case_scene(5), listings_for(["runge-kutta"]))
     assert found.programs[0].accuracy.momentum is None
 
 
@@ -153,7 +154,7 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
         return run
 
     monkeypatch.setattr(type(program), "run", off_by_one_bit)
-    found = compare(case_scene(3), [corrected("runge-kutta")])
+    found = compare_programs(case_scene(3), [corrected("runge-kutta")])
     assert found.unexpected == ("runge-kutta corrected: Fortran and twin differ in omega",)
     assert found.programs[0].ulps == 1
     assert "UNEXPECTED" in _text(found)
@@ -163,7 +164,7 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
         return replace(run, omega=run.omega * 1.0001)
 
     monkeypatch.setattr(type(program), "run", wrong)
-    found = compare(case_scene(3), [corrected("runge-kutta")])
+    found = compare_programs(case_scene(3), [corrected("runge-kutta")])
     assert len(found.unexpected) == 1
     assert "misses the reference" in found.unexpected[0]
 
@@ -204,15 +205,15 @@ def test_picture_and_its_numbers(case_2: room.Comparison, suffix: str, tmp_path:
 
 def test_diverging_program_leaves_the_picture_whole(tmp_path: Path) -> None:
     """Case 6 reaches 1e111; no warning, no empty frame."""
-    found = compare(case_scene(6), listings_for())
+    found = compare_programs(case_scene(6), listings_for())
     assert len(saved(comparison_picture(found), str(tmp_path / "x.png"))) == 2
 
 
 def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its order is nobody's due, and its steps are those that were run."""
-    monkeypatch.setattr(room, "_seconds", lambda run: 1.0)
+    monkeypatch.setattr(room, "timed", lambda *_: [1.0])
     listings = [corrected("two-term", ["c1-for-c"]), original("runge-kutta")]
-    reading, punched = compare(case_scene(2), listings).programs
+    reading, punched = compare_programs(case_scene(2), listings).programs
     assert reading.listing.label == "corrected"
     assert reading.order is None
     assert reading.seconds_per_step == 1.0 / 100.0

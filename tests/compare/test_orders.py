@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from pyharness.compare import orders
-from pyharness.compare.comparison import compare
+from pyharness.compare.comparison import compare_programs
 from pyharness.compare.orders import Order, measured_order, order_of
 from pyharness.compare.report import comparison_report
-from pyharness.methods.registry import PROGRAM_REGISTRY, Program
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, corrected
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.theory.conditioning import ROUNDING
 from pyharness.truth.reference import reference
 from pyharness.verify.plants.planted_twins import plant_in_twin
@@ -241,7 +241,7 @@ def test_a_motion_whose_conditioning_is_unknown_is_not_judged(
 
 
 def test_compare_tells_what_it_does_not_judge() -> None:
-    found = compare(_steps(5, 1e-5, 100), [corrected("four-term")])
+    found = compare_programs(_steps(5, 1e-5, 100), [corrected("four-term")])
     assert found.unexpected == ()
     assert len(found.not_judged) == 1
     report = comparison_report(found)
@@ -252,6 +252,6 @@ def test_compare_tells_what_it_does_not_judge() -> None:
 
 
 def test_compare_names_rounding() -> None:
-    found = compare(case_scene(1), [corrected("two-term")])
+    found = compare_programs(case_scene(1), [corrected("two-term")])
     assert "orders mended rounding (due: 2)" in render(comparison_report(found), "table")
     assert found.not_judged == ()

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from pyharness import _build, _kernels
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.cells import all_cells, all_listings, cell_name, listing_name
+from pyharness.original.programs import PROGRAM_REGISTRY
 from tests.original.test_programs import NASTY
 
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
-from pyharness.methods import kernels
-from pyharness.methods.kernels import COMPLETE, GAVE_UP, OVERFLOW
+from pyharness.model.extension import COMPLETE, GAVE_UP, OVERFLOW
 from pyharness.model.listing import original
 from pyharness.model.trajectory import Stop
+from pyharness.original import compiled
 from tests import traps
 from tests.cross.builds import ROOT, Build, false_claims
 from tests.cross.comparison import compared
@@ -23,7 +23,7 @@ from tests.traps import DIVIDE, INVALID, TOO_LARGE, UntoldException, guarded
 
 
 def test_digest_sees_every_bit_and_every_counter() -> None:
-    run = kernels.run(case_scene(3), original("two-term"))
+    run = compiled.run(case_scene(3), original("two-term"))
     assert run.velocity is not None
     assert run.ier is not None
     changed = [
@@ -42,7 +42,7 @@ def test_digest_sees_every_bit_and_every_counter() -> None:
     ]
     words = [digest(each) for each in (run, *changed)]
     assert len(set(words)) == len(words)
-    assert digest(kernels.run(case_scene(3), original("two-term"))) == words[0]
+    assert digest(compiled.run(case_scene(3), original("two-term"))) == words[0]
     nan = np.full_like(run.velocity, np.nan)
     assert digest(replace(run, velocity=nan)) == digest(replace(run, velocity=-nan))
 

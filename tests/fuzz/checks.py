@@ -21,9 +21,9 @@ import numpy as np
 from pyharness import InputError, prepare, read_scene, solve
 from pyharness.cli.main import main
 from pyharness.compare.agreement import differences
-from pyharness.methods.kernels import ENDS
-from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.model.extension import ENDS
 from pyharness.model.listing import subset
+from pyharness.original.programs import PROGRAM_REGISTRY
 from tests.fuzz import strategies
 from tests.fuzz.command_lines import CommandLine, command_line, furnish
 

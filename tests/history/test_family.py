@@ -35,9 +35,9 @@ from pyharness.history.family.rounding import (
     rounding_findings,
     weighting_findings,
 )
-from pyharness.methods import kernels
 from pyharness.model.listing import corrected, original
 from pyharness.model.report import short
+from pyharness.original import compiled
 from pyharness.original.linear_solver import SINGULAR, leqt1f
 from pyharness.theory.tableau import Tableau, tableau
 from pyharness.truth.reference import reference
@@ -55,7 +55,7 @@ ROUNDING = 1.1e-12
 @pytest.mark.parametrize(("program", "terms"), [("two-term", 2), ("four-term", 4)])
 def test_mended_programs_are_members(program: str, terms: int, case: int) -> None:
     scene = case_scene(case)
-    wanted = kernels.run(scene, corrected(program))
+    wanted = compiled.run(scene, corrected(program))
     found = run(scene, Member("collocation", terms))
     scale = np.abs(wanted.omega).max()
     np.testing.assert_allclose(found.omega, wanted.omega, rtol=0, atol=ROUNDING * scale)
@@ -260,9 +260,9 @@ def test_singularity_test_fires_only_for_five_terms_at_small_steps() -> None:
 @pytest.mark.parametrize("case", range(1, 7))
 def test_points_out_of_place_do_not_show_in_four_terms(case: int) -> None:
     scene = case_scene(case)
-    punched, mended = (kernels.run(scene, f("four-term")).omega for f in (original, corrected))
+    punched, mended = (compiled.run(scene, f("four-term")).omega for f in (original, corrected))
     np.testing.assert_allclose(punched, mended, rtol=0, atol=ROUNDING * np.abs(mended).max())
-    punched, mended = (kernels.run(scene, f("two-term")).omega for f in (original, corrected))
+    punched, mended = (compiled.run(scene, f("two-term")).omega for f in (original, corrected))
     shows = len(punched) < len(mended) or np.abs(punched - mended).max() > 1e-4
     assert shows == (case > 2)  # in Case 2 f is a straight line, which two terms follow
 

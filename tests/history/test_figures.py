@@ -18,8 +18,8 @@ from pyharness.cli.output import write_folder
 from pyharness.history import figure_pictures as figure_plots
 from pyharness.history import figures
 from pyharness.history.figures import Curve, Finding
-from pyharness.methods import kernels
 from pyharness.model.listing import corrected, original
+from pyharness.original import compiled
 from pyharness.truth.reference import reference
 from pyharness.views import pictures
 from pyharness.views.pictures import saved
@@ -81,7 +81,7 @@ def test_numbers_are_those_of_the_trajectories(folder: Path) -> None:
         np.testing.assert_array_equal(rows, np.hstack([truth.time[:, None], truth.omega]))
         for program in plan.programs:
             listing = original(program) if plan.set == "punched" else corrected(program)
-            run = kernels.run(scene, listing)
+            run = compiled.run(scene, listing)
             rows = _rows(text, program)
             np.testing.assert_array_equal(rows, np.hstack([run.time[:, None], run.omega]))
         listings = {row["listing"] for row in csv.DictReader(text.splitlines())}
@@ -121,7 +121,7 @@ def test_lines_are_drawn_to_their_end_which_is_marked(monkeypatch: pytest.Monkey
     figure_plots.figure_picture(finding)
     stopped = [each for each in seen if "runge-kutta" in str(each[2].get("label"))]
     crosses = [each for each in seen if each[2].get("marker") == "X"]
-    run = kernels.run(case_scene(2), original("runge-kutta"))
+    run = compiled.run(case_scene(2), original("runge-kutta"))
     assert len(stopped) == len(crosses) == 3
     for row in range(3):
         x, y, style = stopped[row]
@@ -142,7 +142,7 @@ def test_lines_are_drawn_to_their_end_which_is_marked(monkeypatch: pytest.Monkey
 def test_curve_that_diverges_leaves_the_picture() -> None:
     """The two-term program of Case 6 as punched, to 1e111, beside curves that stay legible."""
     finding = _finding("figure-11")
-    wild = Curve(original("two-term"), kernels.run(finding.scene, original("two-term")))
+    wild = Curve(original("two-term"), compiled.run(finding.scene, original("two-term")))
     assert np.abs(wild.trajectory.omega).max() > 1e100
     beside = replace(finding, curves=(wild, *finding.curves))
     for row in range(3):

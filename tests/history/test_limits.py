@@ -10,8 +10,8 @@ import pytest
 from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history.limits import NOTHING, invisible, limit, tends_elsewhere
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.listing import original
+from pyharness.original.programs import PROGRAM_REGISTRY
 
 
 @pytest.mark.parametrize("case", [3, 4, 5])

@@ -15,11 +15,11 @@ from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history.fortran_format import fixed, parse, write
 from pyharness.history.printer import formats_of, page
-from pyharness.methods import kernels
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, original
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original import compiled
 
 Capture = pytest.CaptureFixture[str]
 # Only gfortran can be told that zero has no sign and that a tie goes away from it.
@@ -55,7 +55,7 @@ def test_page_of_the_two_term_program(capsys: Capture) -> None:
     assert {column: lines[3][column - 1 :].split()[0] for column in heads} == heads
     assert lines[3].split() == list(heads.values())
     assert len(lines) == 4 + 100
-    row = kernels.run(case_scene(5), original("two-term"))
+    row = compiled.run(case_scene(5), original("two-term"))
     u, v = row.omega[41], row.velocity[41]  # type: ignore[index]
     assert lines[45] == (
         f" {u[0]:10.4f}          {u[1]:10.4f}          {u[2]:10.4f}      42    0         "

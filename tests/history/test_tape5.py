@@ -9,8 +9,8 @@ import pytest
 from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history.tape5 import records
-from pyharness.methods import kernels
 from pyharness.model.listing import PROGRAMS, original
+from pyharness.original import compiled
 
 
 def _read_tape(content: bytes, tmp_path: Path) -> np.ndarray:
@@ -27,7 +27,7 @@ def test_tape_is_read_back_bit_for_bit(program: str, tmp_path: Path) -> None:
     out = tmp_path / "tape"
     arguments = ["run", "--case", "5", "--format", "tape5", "--program", program]
     assert main([*arguments, "--out", str(out)]) == 0
-    run = kernels.run(case_scene(5), original(program))
+    run = compiled.run(case_scene(5), original(program))
     assert run.velocity is not None
     wanted = np.hstack([run.recorded_time[:, None], run.omega, run.velocity])
     assert _read_tape(out.read_bytes(), tmp_path).tobytes() == wanted.tobytes()
@@ -36,7 +36,7 @@ def test_tape_is_read_back_bit_for_bit(program: str, tmp_path: Path) -> None:
 
 def test_tape_records_what_the_program_called_time(tmp_path: Path) -> None:
     """TIME of the collocation programs runs away from n h, and the tape has it."""
-    run = kernels.run(case_scene(2), original("two-term"))
+    run = compiled.run(case_scene(2), original("two-term"))
     time = _read_tape(records(run), tmp_path)[:, 0]
     assert time[9] == pytest.approx(0.01 * 55)
 
@@ -46,7 +46,7 @@ def test_tape_goes_through_a_pipe_and_not_to_a_terminal(
 ) -> None:
     arguments = ["run", "--case", "3", "--program", "runge-kutta", "--format", "tape5"]
     assert main(arguments) == 0
-    wanted = records(kernels.run(case_scene(3), original("runge-kutta")))
+    wanted = records(compiled.run(case_scene(3), original("runge-kutta")))
     assert capsysbinary.readouterr().out == wanted
 
     class Terminal(BytesIO):

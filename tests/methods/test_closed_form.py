@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.methods.kernels import extension
-from pyharness.methods.registry import METHODS, solve
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import TimedError
+from pyharness.model.extension import extension
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference

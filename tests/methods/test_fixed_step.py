@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, subset
-from pyharness.methods import kernels
-from pyharness.methods.gauss import FIXED_STEP
-from pyharness.methods.registry import METHODS, solve
+from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.trajectory import Array
+from pyharness.original import compiled
 from pyharness.truth.reference import reference
 
 _ORDER = {"improved-euler": 2, "taylor-3": 2, "rk4": 4}
@@ -101,7 +101,7 @@ def test_torque_goes_on_where_many_steps_pause(method: str) -> None:
 def test_rk4_is_the_mended_program(case: int) -> None:
     """Another order of operations: what differs is rounding, some 1e-16 a step."""
     scene = case_scene(case)
-    program = kernels.run(scene, subset("runge-kutta", "corrected"), may_stop=False)
+    program = compiled.run(scene, subset("runge-kutta", "corrected"), may_stop=False)
     found = solve(scene, scene.times(), "rk4", 1.0)
     scale = np.abs(program.omega).max()
     assert np.abs(found.omega - program.omega).max() <= 1e-14 * scale

@@ -14,8 +14,10 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
 from pyharness.methods.gauss import _driven
-from pyharness.methods.kernels import extension, normalized
-from pyharness.methods.registry import METHODS, solve
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
+from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 from tests.random_scenes import NASTY

@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 import scipy.integrate  # noqa: F401  (what Ctrl-C meets within its import may be lost)
 
-from pyharness.methods import kernels
-from pyharness.methods.kernels import extension, run
-from pyharness.methods.prepared import prepare, solve
+from pyharness.methods.prepared import prepare
+from pyharness.methods.solve import solve
+from pyharness.model import extension as room
+from pyharness.model.extension import extension
 from pyharness.model.listing import corrected
 from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.original.compiled import run
 
 # An idle machine needs some hundredths of a second; each call would take many seconds.
 PATIENCE = 1.5
@@ -53,7 +55,7 @@ def _program(name: str) -> Callable[[], object]:
 
 def _linear() -> object:
     matrix = np.eye(2500, order="F") + 0.001
-    return kernels.extension().solve_linear(matrix, matrix[:, :1])
+    return room.extension().solve_linear(matrix, matrix[:, :1])
 
 
 LONG: dict[str, Callable[[], object]] = {
@@ -118,8 +120,10 @@ class _Keyboard:
 @pytest.mark.parametrize("name", LONG)
 def test_kernel_ends_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     keyboard = _Keyboard()
-    for room in ("kernels", "gauss"):
-        monkeypatch.setattr(f"pyharness.methods.{room}.extension", lambda: keyboard)
+    for each in ("methods.taylor", "methods.fixed_step", "methods.closed_form", "methods.gauss"):
+        monkeypatch.setattr(f"pyharness.{each}.extension", lambda: keyboard)
+    monkeypatch.setattr("pyharness.original.compiled.extension", lambda: keyboard)
+    monkeypatch.setattr("pyharness.model.extension.extension", lambda: keyboard)
     if name in WITHOUT_A_DOOR:
         keyboard.start()
     try:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
-from pyharness.methods.kernels import extension, normalized
+from pyharness.methods.problem import normalized
+from pyharness.model.extension import extension
 from pyharness.model.same_motion import scaled
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference

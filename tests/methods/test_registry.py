@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, SCIPY_METHODS, finest, solve
+from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.methods.scipy_ivp import RightHandSide
+from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import TimedError
 from pyharness.model.same_motion import scaled
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import reference
 
 

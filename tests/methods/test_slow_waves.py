@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, prepare, solve
-from pyharness.methods.registry import METHODS, SCIPY_METHODS, finest
+from pyharness.methods.registry import METHODS, SCIPY_METHODS
+from pyharness.methods.solve import finest
 from pyharness.model.scene import Triple
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import reference

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, case_scene
-from pyharness.methods.kernels import extension, normalized
-from pyharness.methods.registry import solve
+from pyharness.methods.problem import normalized
+from pyharness.methods.solve import solve
 from pyharness.model.build import build
+from pyharness.model.extension import extension
 from pyharness.model.scene import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import Reference, reference

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.methods import kernels
+from pyharness.model import extension
 from pyharness.model.build import build
 
 ROOT = Path(__file__).parent.parent.parent
@@ -27,7 +27,7 @@ def _dependencies(path: str) -> str:
 @pytest.mark.external
 @pytest.mark.skipif("-fcheck" in (build().flags or ""), reason="run-time checks have messages")
 def test_extension_needs_no_fortran_library_at_run_time() -> None:
-    needed = _dependencies(kernels.extension().__file__ or "")
+    needed = _dependencies(extension.extension().__file__ or "")
     assert "lib" in needed
     for library in LIBRARIES:
         assert library not in needed

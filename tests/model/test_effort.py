@@ -12,14 +12,15 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.cli.main import main
-from pyharness.methods.gauss import FIXED_STEP
-from pyharness.methods.prepared import PREPARED, prepare, solve
-from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.methods.prepared import PREPARED, prepare
+from pyharness.methods.registry import FIXED_STEP
+from pyharness.methods.solve import solve
 from pyharness.model.effort import suggested
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.listing import corrected
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import reference
 
 WAVES: tuple[Wave, ...] = (((1.0, 0.0, 2.0), 5.0), ((0.0, 2.0, 2.0), 3.0))

@@ -25,11 +25,12 @@ from pyharness import (
     solve,
     subset,
 )
-from pyharness.methods import kernels
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY
+from pyharness.methods.registry import METHODS
 from pyharness.methods.report import trajectory_report
 from pyharness.model.records import scene_record
 from pyharness.model.scene_report import heading
+from pyharness.original import compiled
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.views.json import json_text
 from pyharness.views.render import render
 
@@ -294,7 +295,7 @@ def test_other_arguments_of_public_calls_are_checked(tmp_path: Path) -> None:
     for bad in (None, 3, "case 3", [PLAIN], Scene, object()):
         _refused("scene is ", solve, bad, 1.0)
         _refused("scene is ", prepare, bad)
-        _refused("scene is ", kernels.run, bad, listing)
+        _refused("scene is ", compiled.run, bad, listing)
         _refused("scene is ", program.run, bad, listing, "python")
     for bad in (None, 3, ["auto"], np.array(["auto"]), b"auto"):
         _refused("method is ", solve, PLAIN, 1.0, bad)
@@ -305,7 +306,7 @@ def test_other_arguments_of_public_calls_are_checked(tmp_path: Path) -> None:
         _refused("may_stop is ", program.run, PLAIN, listing, "python", 500.0, bad)
         _refused("velocity is ", program.run, PLAIN, listing, "fortran", 500.0, True, bad)
     for bad in (None, "500", [500.0], -1.0, float("nan"), TOO_LARGE):
-        _refused("lipschitz", kernels.run, PLAIN, listing, bad)
+        _refused("lipschitz", compiled.run, PLAIN, listing, bad)
         _refused("lipschitz", program.run, PLAIN, listing, "python", bad)
     for bad in (None, "dt-accumulates", 3, [3], np.array("x"), {"dt-accumulates": 1}):
         _refused("fix: ", subset, "two-term", fix=bad)
@@ -332,7 +333,7 @@ def test_a_name_that_steers_a_terminal_is_shown_escaped(tmp_path: Path) -> None:
     assert heading(scene)[0] == SHOWN
     assert SHOWN in repr(prepare(scene))
     listing = subset("two-term")
-    run = kernels.run(scene, listing)
+    run = compiled.run(scene, listing)
     record = render(trajectory_report(scene, "two-term", listing, "", run), "json")
     assert json.loads(record)["scene"]["name"] == SHOWN
     for length in range(55, 66):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pyharness.methods.kernels import extension
+from pyharness.model.extension import extension
 from pyharness.original.linear_solver import SINGULAR, leqt1f
 
 

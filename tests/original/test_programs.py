@@ -9,12 +9,12 @@ import pytest
 
 from pyharness.compare.agreement import differences, distance
 from pyharness.compare.orders import measured_order
-from pyharness.methods import kernels
-from pyharness.methods.registry import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.model.listing import PROGRAMS, corrected, names_of, original, subset
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
+from pyharness.original import compiled
 from pyharness.original.cells import all_cells, all_listings, cell_name
+from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.truth.reference import reference
 from tests.divergences import divergences
 
@@ -191,8 +191,8 @@ def test_every_defect_alone_changes_something() -> None:
             changed = False
             for case, limit in itertools.product((5, 7), (500.0, 60.0, 1.0)):
                 scene = case_scene(case)
-                one = kernels.run(scene, with_it, limit)
-                other = kernels.run(scene, corrected(program), limit)
+                one = compiled.run(scene, with_it, limit)
+                other = compiled.run(scene, corrected(program), limit)
                 changed |= bool(differences(one, other))
             assert changed, (program, name)
 
@@ -201,8 +201,8 @@ def test_four_term_hides_the_accumulating_step_where_no_torque_varies() -> None:
     """The right-hand sides along the first estimate are quadratic: any four points will do."""
     for case in range(1, 7):
         scene = case_scene(case)
-        punched = kernels.run(scene, original("four-term"))
-        mended = kernels.run(scene, corrected("four-term"))
+        punched = compiled.run(scene, original("four-term"))
+        mended = compiled.run(scene, corrected("four-term"))
         largest = np.abs(mended.omega).max()
         np.testing.assert_allclose(punched.omega, mended.omega, rtol=0.0, atol=1e-11 * largest)
 
@@ -221,28 +221,28 @@ def test_readings_not_adopted_lose_an_order(reading: str) -> None:
 def test_recorded_time_is_what_tape5_got() -> None:
     """TIME runs quadratically as punched, and linearly, by repeated addition, as mended."""
     scene = case_scene(3)
-    punched = kernels.run(scene, original("four-term"))
+    punched = compiled.run(scene, original("four-term"))
     n = np.arange(1, 101)
     np.testing.assert_allclose(punched.recorded_time, 0.01 * n * (n + 1) / 2, rtol=1e-13)
     np.testing.assert_array_equal(punched.time, n * 0.01)
-    mended = kernels.run(scene, corrected("four-term"))
+    mended = compiled.run(scene, corrected("four-term"))
     np.testing.assert_array_equal(mended.recorded_time, np.cumsum(np.full(100, 0.01)))
 
 
 def test_lipschitz_constant_and_no_stop() -> None:
     scene = case_scene(2)
     listing = original("runge-kutta")
-    assert kernels.run(scene, listing, lipschitz=1e9).stop is None
-    assert kernels.run(scene, listing, lipschitz=1.0).steps < 25
-    run = kernels.run(scene, listing, may_stop=False)
+    assert compiled.run(scene, listing, lipschitz=1e9).stop is None
+    assert compiled.run(scene, listing, lipschitz=1.0).steps < 25
+    run = compiled.run(scene, listing, may_stop=False)
     assert (run.ended, run.steps, run.stop) == ("complete", 100, None)
 
 
 def test_norms_name_their_variable() -> None:
     scene = case_scene(5)
     keep = ["lipschitz-tests-velocity"]
-    together = kernels.run(scene, subset("runge-kutta", "corrected", keep=keep), lipschitz=1e-3)
-    alone = kernels.run(scene, corrected("runge-kutta"), lipschitz=1e-3)
+    together = compiled.run(scene, subset("runge-kutta", "corrected", keep=keep), lipschitz=1e-3)
+    alone = compiled.run(scene, corrected("runge-kutta"), lipschitz=1e-3)
     assert together.stop is not None
     assert alone.stop is not None
     assert (together.stop.variable, alone.stop.variable) == ("UV", "U")
@@ -250,7 +250,7 @@ def test_norms_name_their_variable() -> None:
 
 def test_evaluations_count_right_hand_sides() -> None:
     counts = {
-        program: kernels.run(case_scene(3), corrected(program)).evaluations for program in PROGRAMS
+        program: compiled.run(case_scene(3), corrected(program)).evaluations for program in PROGRAMS
     }
     assert counts == {"two-term": 300, "four-term": 500, "runge-kutta": 400}
 
@@ -260,7 +260,7 @@ def test_velocity_that_no_one_asked_for_changes_no_bit_of_the_rest() -> None:
     """The skip of the plan: every cell again without the translational block."""
     for listing, case in all_cells():
         scene = case_scene(case)
-        whole, part = (kernels.run(scene, listing, velocity=wanted) for wanted in (True, False))
+        whole, part = (compiled.run(scene, listing, velocity=wanted) for wanted in (True, False))
         assert part.velocity is None
         assert (part.steps, part.ended, part.stop) == (whole.steps, whole.ended, whole.stop)
         np.testing.assert_array_equal(part.omega, whole.omega)
@@ -270,7 +270,7 @@ def test_velocity_that_no_one_asked_for_changes_no_bit_of_the_rest() -> None:
 
 def test_stop_test_that_reads_the_velocity_keeps_it() -> None:
     """As punched the velocity ends Case 2 at step 25, whether it is asked for or not."""
-    run = kernels.run(case_scene(2), original("runge-kutta"), velocity=False)
+    run = compiled.run(case_scene(2), original("runge-kutta"), velocity=False)
     assert run.stop is not None
     assert (run.stop.step, run.stop.variable) == (25, "V2")
 
@@ -280,9 +280,9 @@ def test_calls_release_the_gil_and_give_the_same_bits_from_many_threads() -> Non
 
     scene = case_scene(7)
     listing = original("four-term")
-    wanted = kernels.run(scene, listing)
+    wanted = compiled.run(scene, listing)
     with ThreadPoolExecutor(4) as pool:
-        runs = list(pool.map(lambda _: kernels.run(scene, listing), range(64)))
+        runs = list(pool.map(lambda _: compiled.run(scene, listing), range(64)))
     assert all(differences(run, wanted) == [] for run in runs)
 
 
@@ -297,13 +297,13 @@ def test_overflow_of_any_one_component_ends_the_run(program: str, axis: int) -> 
         step_size=1.0, steps=3,
     )  # fmt: skip
     for listing in (original(program), corrected(program)):
-        compiled, twin = (
+        fortran, twin = (
             PROGRAM_REGISTRY[program].run(scene, listing, language, may_stop=False)
             for language in IMPLEMENTATIONS
         )
-        assert differences(compiled, twin) == []
-        assert (compiled.ended, compiled.steps) == ("overflow", 0)
-        alone = kernels.run(scene, listing, may_stop=False, velocity=False)
+        assert differences(fortran, twin) == []
+        assert (fortran.ended, fortran.steps) == ("overflow", 0)
+        alone = compiled.run(scene, listing, may_stop=False, velocity=False)
         assert (alone.ended, alone.steps) == ("overflow", 0)
 
 
@@ -324,5 +324,5 @@ def test_sum_of_stages_may_overflow_where_no_stage_does(axis: int) -> None:
     constant[axis] = 1e308
     law = TorqueLaw((constant[0], constant[1], constant[2]))
     scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law, step_size=0.5, steps=1)
-    run = kernels.run(scene, corrected("runge-kutta"), may_stop=False, velocity=False)
+    run = compiled.run(scene, corrected("runge-kutta"), may_stop=False, velocity=False)
     assert (run.ended, run.steps) == ("overflow", 0)

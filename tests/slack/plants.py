@@ -13,9 +13,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pyharness.methods.kernels import extension
-from pyharness.methods.registry import solve
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -79,10 +79,6 @@ def last_off(found: Trajectory, size: float) -> Trajectory:
     return replace(found, omega=np.vstack([found.omega[:-1], off(found.omega[-1:], size)]))
 
 
-def end_off(found: tuple[Array, str], size: float) -> tuple[Array, str]:
-    return off(found[0], size), found[1]
-
-
 def bit_off(found: Any, size: float, name: str = "omega") -> Any:
     """Let the largest element of an array be larger by a part of itself, and nothing else."""
     if not isinstance(found, np.ndarray):
@@ -126,31 +122,8 @@ def ended(found: Any, size: float) -> Any:
     return replace(found, ended="overflow") if size else found
 
 
-class _Solver:
-    """A prepared solver whose results are off."""
-
-    def __init__(
-        self, solver: Any, size: float, change: Callable[[Any, float], Any], status: str = ""
-    ) -> None:
-        self._solver, self._size, self._change, self._status = solver, size, change, status
-
-    def __call__(self, *rest: Any) -> Array:
-        return np.asarray(self._change(self._solver(*rest).copy(), self._size))
-
-    def __getattr__(self, name: str) -> Any:
-        return self._status if name == "status" and self._status else getattr(self._solver, name)
-
-
-def solver_off(found: Any, size: float) -> Any:
-    return _Solver(found, size, off)
-
-
-def solver_bit_off(found: Any, size: float) -> Any:
-    return _Solver(found, size, bit_off)
-
-
 def gives_up(found: Any, size: float) -> Any:
-    return _Solver(found, 0.0, off, "gave up") if size else found
+    return replace(found, ended="gave up") if size else found
 
 
 def probe_off(found: Any, size: float) -> Any:
@@ -250,7 +223,7 @@ def roundings(more: float) -> Callable[[Scene, float], float]:
 
 def stop_test(size: float) -> AbstractContextManager[Any]:
     """Let the program be given another constant."""
-    target = "pyharness.methods.registry.Program.run"
+    target = "pyharness.original.programs.Program.run"
     right = pkgutil.resolve_name(target)
 
     def faulty(*rest: Any, **named: Any) -> Any:
@@ -316,10 +289,10 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Plant) ->
 
 
 def form_for_all(
-    size: float, scene: Scene, times: Sequence[float], name: str, tolerance: float
+    size: float, scene: Scene, times: Sequence[float], name: str, *rest: float
 ) -> Trajectory:
     """Solve by a closed form, or what stands for it where there is none."""
-    return solved(0.0, scene, times) if size else solve(scene, times, name, tolerance)
+    return solved(0.0, scene, times) if size else solve(scene, times, name, *rest)
 
 
 def other_library() -> AbstractContextManager[Any]:
@@ -347,7 +320,7 @@ def linear(change: Callable[[Any, float], Any]) -> Plant:
             return factors, change(x, size), ier
 
         return patch(
-            "pyharness.methods.kernels.extension", lambda: SimpleNamespace(solve_linear=faulty)
+            "pyharness.model.extension.extension", lambda: SimpleNamespace(solve_linear=faulty)
         )
 
     return planted

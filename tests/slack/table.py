@@ -19,7 +19,6 @@ from tests.slack.plants import (
     counted_off,
     crossing_off,
     cut,
-    end_off,
     ended,
     exact,
     form_for_all,
@@ -40,8 +39,6 @@ from tests.slack.plants import (
     shorter,
     singular,
     solved,
-    solver_bit_off,
-    solver_off,
     some_bits,
     stop_test,
     value_off,
@@ -49,14 +46,14 @@ from tests.slack.plants import (
     without,
 )
 
-_RUN = "pyharness.methods.registry.Program.run"
-_COMPILED = "pyharness.methods.kernels.run"
-_CASES = "pyharness.verify.methods"
+_RUN = "pyharness.original.programs.Program.run"
+_COMPILED = "pyharness.original.compiled.run"
 _DRAWN = "pyharness.verify.random_methods"
-_RECORDED = "pyharness.verify.golden.solve"
+_SOLVE = "pyharness.compare.candidates.solve"
+_ANSWERED = "pyharness.compare.candidates._answered"
+_END = "pyharness.compare.candidates.Candidate.end"
 _NEAR_SEPARATRIX = "pyharness.stress.trials.separatrix.run_method"
 _HELD = "pyharness.stress.hold.run_method"
-_TORQUE = "pyharness.stress.trials.torque"
 _TURNED = "pyharness.stress.trials.invariance"
 _REGIONS = "pyharness.stress.trials.regions"
 _STEPS = "pyharness.stress.trials.step_size"
@@ -91,27 +88,27 @@ VERIFY = (
     # .298 of the digits from 1e-3 to the finest that each claims: 1e-15, 1e-14, 7e-13, 2.1e-12,
     # 2.2e-16, and 1e-12.
     *(
-        near(f"random/0/solve-{name}", on(f"{_DRAWN}.solve", off), due)
+        near(f"random/0/solve-{name}", on(_SOLVE, off), due)
         for name, due in (
             ("auto", 2.65e-7), ("taylor", 2.65e-7), ("gauss-7", 5.26e-7), ("dop853", 1.87e-6),
             ("rk45", 2.59e-6), ("radau", 1.87e-6), ("lsoda", 2.59e-6), ("reference", 1.69e-7),
         )
     ),
     *(
-        near(f"random/0/prepare-{name}", on(f"{_DRAWN}.prepare", solver_off), due)
+        near(f"random/0/prepare-{name}", on(_ANSWERED, off), due)
         for name, due in (("auto", 2.65e-7), ("taylor", 2.65e-7), ("quick", 2.07e-6))
     ),
     # Where a difference grows less than tenfold the tolerance is kept, and beyond that by all but
     # the series, which may exceed it as many times; where it grows a thousandfold all may.
-    near("random/56/solve-taylor", on(f"{_DRAWN}.solve", off), 5.1e-6),
-    near("random/592/solve-taylor", on(f"{_DRAWN}.solve", off), 14.2 * 3.31e-6),
-    near("random/592/solve-gauss-6", on(f"{_DRAWN}.solve", off), 5.32e-6),
-    near("random/641/solve-gauss-8", on(f"{_DRAWN}.solve", off), 14.9e3 * 1.53e-6),
+    near("random/56/solve-taylor", on(_SOLVE, off), 5.1e-6),
+    near("random/592/solve-taylor", on(_SOLVE, off), 14.2 * 3.31e-6),
+    near("random/592/solve-gauss-6", on(_SOLVE, off), 5.32e-6),
+    near("random/641/solve-gauss-8", on(_SOLVE, off), 14.9e3 * 1.53e-6),
     # Rounding has 2e-15 for each factor, here 15.1.
-    near("random/337/solve-gauss-8", on(f"{_DRAWN}.solve", off), 9.7e-14 + 15.1 * 2e-15),
-    exact("random/0/solve-taylor", on(f"{_DRAWN}.solve", _TIME), ULP),
-    exact("random/0/solve-taylor", on(f"{_DRAWN}.solve", ended)),
-    exact("random/0/solve-taylor", refuses(f"{_DRAWN}.solve")),
+    near("random/337/solve-gauss-8", on(_SOLVE, off), 9.7e-14 + 15.1 * 2e-15),
+    exact("random/0/solve-taylor", on(_SOLVE, _TIME), ULP),
+    exact("random/0/solve-taylor", on(_SOLVE, ended)),
+    exact("random/0/solve-taylor", refuses(_SOLVE)),
     exact("cells/two-term/case-3/corrected", refuses("pyharness.verify.programs.case_scene"),
           failing="cells/refused"),
     # The last step of Case 7 ends at (.25, .91, 1.08): 4 roundings of either end of it, and h times
@@ -130,25 +127,25 @@ VERIFY = (
     # A tolerance, relative to the largest omega.
     *(
         near(f"methods/{name}/case-{_with_form(name)}/1.0e-06",
-             instead(f"{_CASES}.solve", solved), 1e-6)
+             instead(_SOLVE, solved), 1e-6)
         for name in _JUDGED
     ),
     # Of a steady spin nothing is left but 8 roundings of the start and 8 of the result, and half a
     # unit in the last place of the truth itself.
-    near("methods/taylor/case-1/1.0e-15", on(f"{_CASES}.solve", off), 1e-15 + 17.0 * U),
-    exact("methods/taylor/case-5/1.0e-06", refuses(f"{_CASES}.solve")),
-    exact("methods/closed-form/case-5/1.0e-06", instead(f"{_CASES}.solve", form_for_all)),
-    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", _TIME), ULP),
-    exact("methods/taylor/case-5/1.0e-06", on(f"{_CASES}.solve", ended)),
+    near("methods/taylor/case-1/1.0e-15", on(_SOLVE, off), 1e-15 + 17.0 * U),
+    exact("methods/taylor/case-5/1.0e-06", refuses(_SOLVE)),
+    exact("methods/closed-form/case-5/1.0e-06", instead(_SOLVE, form_for_all)),
+    exact("methods/taylor/case-5/1.0e-06", on(_SOLVE, _TIME), ULP),
+    exact("methods/taylor/case-5/1.0e-06", on(_SOLVE, ended)),
     *(
         near(f"prepared/{name}/case-{_with_form(name)}/{end}/1.0e-06",
-             on(f"{_CASES}.prepare", solver_off), 1e-6)
+             on(_ANSWERED, off), 1e-6)
         for name in ("auto", "taylor", "quick", "closed-form")
         for end in (3, -1)
     ),
-    exact("prepared/quick/case-5/1/1.0e-06", on(f"{_CASES}.prepare", gives_up)),
+    exact("prepared/quick/case-5/1/1.0e-06", on(_ANSWERED, gives_up)),
     *(
-        exact(f"prepared/{name}/case-5/bits", on(f"{_CASES}.prepare", solver_bit_off), ULP)
+        exact(f"prepared/{name}/case-5/bits", on(_ANSWERED, bit_off), ULP)
         for name in (*_TEXTBOOKS, *_GAUSS)
     ),
     # A fifth of an order.
@@ -158,7 +155,7 @@ VERIFY = (
         for what in ("", "/velocity")
     ),
     *(
-        near(f"orders/{name}/case-5", graded(f"{_CASES}.solve", of_order(due)), 0.2)
+        near(f"orders/{name}/case-5", graded(_SOLVE, of_order(due)), 0.2)
         for name, due in _TEXTBOOKS.items()
     ),
     # An error is that of rounding up to 8 of every step, and what the truth is wrong by: 7e-13 if
@@ -168,27 +165,27 @@ VERIFY = (
     # A method against print: half a unit of its last digit or what its source admits (5e-15 here),
     # the finest tolerance, and two roundings of each number of the problem, which move the omega
     # that they move the least by 4e-15.
-    near("external/detest-b5/20/taylor", on("pyharness.verify.external.solve", off), 1.0e-14),
-    near("external/detest-b5/20/gauss-8", on("pyharness.verify.external.solve", off), 1.9e-14),
-    near("external/detest-b5/20/quick", on("pyharness.verify.external.prepare", solver_off), 1e-9),
+    near("external/detest-b5/20/taylor", on(_SOLVE, off), 1.0e-14),
+    near("external/detest-b5/20/gauss-8", on(_SOLVE, off), 1.9e-14),
+    near("external/detest-b5/20/quick", on(_ANSWERED, off), 1e-9),
     # The finest that LSODA claims to meet over 20 s.
-    near("external/detest-b5/20/lsoda", on("pyharness.verify.external.solve", off), 1.6e-11),
-    near("external/nasa-brick/30/taylor", on("pyharness.verify.external.solve", off), 2e-8 / 34.3),
+    near("external/detest-b5/20/lsoda", on(_SOLVE, off), 1.6e-11),
+    near("external/nasa-brick/30/taylor", on(_SOLVE, off), 2e-8 / 34.3),
     # A program's halved steps leave half a unit in the last place of each of 16 384.
     near("external/detest-b5/20/runge-kutta", on(_RUN, off), 2.0e-12),
     # Half a unit of three digits, 3.9e-4 of which there are, and the halved steps' own error.
     Slack("external/hairer-rigid-body/20/runge-kutta", on(_RUN, off), 4e-4, 1e-4),
-    exact("external/detest-b5/20/auto", refuses("pyharness.verify.external.solve")),
+    exact("external/detest-b5/20/auto", refuses(_SOLVE)),
     exact("external/detest-b5/20/two-term", on(_RUN, singular)),
     # Both the record and the result may be wrong by 1e-9; where every bit counts, none.
-    near("golden/taylor/case-5", on(_RECORDED, off), 2e-9),
-    exact("golden/taylor/case-5", on(_RECORDED, _TIME), ULP),
+    near("golden/taylor/case-5", on(_SOLVE, off), 2e-9),
+    exact("golden/taylor/case-5", on(_SOLVE, _TIME), ULP),
     exact("golden/taylor/case-5", on("pyharness.verify.golden.read_record", without)),
     exact("golden/taylor", on("pyharness.verify.golden.recorded", without),
           failing="golden/taylor/case-5-method-taylor-tolerance-1e-09"),
     # Sine and cosine of another library may differ by what rounding may do to a wave.
-    near("golden/rk4/case-7", beside(other_library, on(_RECORDED, off)), 3.4e-15),
-    exact("golden/rk4/case-5", on(_RECORDED, bit_off), ULP),
+    near("golden/rk4/case-7", beside(other_library, on(_SOLVE, off)), 3.4e-15),
+    exact("golden/rk4/case-5", on(_SOLVE, bit_off), ULP),
     exact("golden/two-term/case-5/corrected", on(_RUN, bit_off), ULP),
 )  # fmt: skip
 
@@ -240,20 +237,20 @@ STRESS = (
           lambda found, size: replace(found, ended="complete") if size else found)),
     # The flow of the driven body amplifies 4 times.
     *(
-        near(f"torque/{name}/tiny-1e-12/1e-06", on(f"{_TORQUE}._end", end_off), 4e-6)
+        near(f"torque/{name}/tiny-1e-12/1e-06", on(_END, off), 4e-6)
         for name in ("taylor", "auto", "prepared-auto", "quick", "gauss-4", "dop853")
     ),
-    exact("torque/taylor/tiny-1e-12/1e-06", refuses(f"{_TORQUE}.solve")),
-    exact("torque/prepared-auto/tiny-1e-12/1e-06", on(f"{_TORQUE}.prepare", gives_up)),
+    exact("torque/taylor/tiny-1e-12/1e-06", refuses(_SOLVE)),
+    exact("torque/prepared-auto/tiny-1e-12/1e-06", on(_ANSWERED, gives_up)),
     exact("torque/taylor/tiny-1e-12/1e-06",
-          on(f"{_TORQUE}._end", lambda found, size: (found[0], "overflow" if size else found[1]))),
+          on(_END, ended)),
     # The sphere's angle has two words, and the sum 16 roundings of its terms.
-    near("torque/closed-form/no-digits-1e16/1e-14", on(f"{_TORQUE}._end", end_off),
+    near("torque/closed-form/no-digits-1e16/1e-14", on(_END, off),
          1e-14 + 16.0 * U),
     # 1e4 radians in binary64, of n evaluations 4 sqrt(n).
-    near("torque/taylor/axial-1e4/1e-15", on(f"{_TORQUE}._end", end_off), 4.8e-10),
+    near("torque/taylor/axial-1e4/1e-15", on(_END, off), 4.8e-10),
     # What a wave of 1e16 rad/s moves can't be seen: tolerance, amplified twice.
-    near("torque/quick/averaged-1e16/1e-06", on(f"{_TORQUE}._end", end_off), 2.03e-6),
+    near("torque/quick/averaged-1e16/1e-06", on(_END, off), 2.03e-6),
     # 4 sqrt(n) of one rounding of a step, and n times what it leaves out.
     *(
         near(f"length/{name}/tumbling/{what}/1000", watched(lambda size, time: size), due)
@@ -278,7 +275,7 @@ STRESS = (
         for what, due in (("energy", 6.3e-15), ("momentum", 3.5e-15), ("phase", 6.7e-15))
     ),
     exact("length/taylor/tumbling/prepared",
-          beside(shorter, on("pyharness.stress.trials.length.prepare", solver_bit_off)), ULP),
+          beside(shorter, on(_ANSWERED, bit_off)), ULP),
     exact("invariance/taylor/signs-12/free/1e-06", on(_FREE, bit_off, call=2), ULP),
     exact("invariance/runge-kutta/cyclic/free/corrected", on(_RUN, bit_off, call=2), ULP),
     exact("invariance/taylor/signs-12/free/1e-06", refuses(_FREE)),

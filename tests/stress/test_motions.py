@@ -14,7 +14,7 @@ import pytest
 import pyharness.methods.prepared as room
 from pyharness import InputError, Scene, TorqueLaw, prepare, solve
 from pyharness.compare.checks import Check
-from pyharness.methods import kernels
+from pyharness.model import extension
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 from pyharness.stress.run import TRIALS, trial, worst
@@ -236,7 +236,7 @@ def test_a_kernel_that_writes_where_all_do_is_found(
     shared: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All threads call one solver, whose buffer was its own."""
-    entry, buffer = kernels.extension().solve_packed, np.zeros(3)
+    entry, buffer = extension.extension().solve_packed, np.zeros(3)
 
     def kernel(*arguments: Any) -> Any:
         omega, *rest = entry(*arguments)

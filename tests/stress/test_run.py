@@ -14,15 +14,17 @@ import numpy as np
 import pytest
 
 from pyharness.cli.main import main
+from pyharness.compare.candidates import End
 from pyharness.compare.checks import Check
-from pyharness.methods import registry as methods
-from pyharness.methods.registry import METHODS
+from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import read_scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress import hold as truth
-from pyharness.stress.hold import Run, in_steps
+from pyharness.stress.hold import in_steps
 from pyharness.stress.run import Outcome, stress, worst
 from pyharness.theory import promises
 
@@ -39,9 +41,9 @@ def test_bounds_hold(name: str) -> None:
         assert check.replay == f"python -m pyharness stress --only {check.id}"
     # Every method is tried, and the programs are described, never judged.
     subjects = {check.id.split("/")[1] for check in checks}
-    assert subjects == {*promises.METHODS, *methods.PROGRAM_REGISTRY}
+    assert subjects == {*promises.METHODS, *PROGRAM_REGISTRY}
     for check in checks:
-        if check.id.split("/")[1] in methods.PROGRAM_REGISTRY:
+        if check.id.split("/")[1] in PROGRAM_REGISTRY:
             assert check.limit is None
     bounded = {check.id.split("/")[1] for check in checks if check.limit is not None}
     assert bounded == set(promises.METHODS)
@@ -70,10 +72,10 @@ def _failed(*only: str) -> list[str]:
 def _shifted(share: float) -> Callable[..., Trajectory]:
     """Return a solver whose time is wrong by a part: it conserves all that there is."""
 
-    def solve(scene: Scene, times: Sequence[float], name: str, tolerance: float) -> Trajectory:
-        return methods.solve(scene, [t * (1.0 + share) for t in times], name, tolerance)
+    def shifted(scene: Scene, times: Sequence[float], *rest: Any) -> Trajectory:
+        return solve(scene, [t * (1.0 + share) for t in times], *rest)
 
-    return solve
+    return shifted
 
 
 @pytest.mark.parametrize(
@@ -88,7 +90,7 @@ def _shifted(share: float) -> Callable[..., Trajectory]:
 )
 def test_a_phase_error_of_1e9_is_caught(monkeypatch: pytest.MonkeyPatch, only: str) -> None:
     assert not _failed(only)
-    monkeypatch.setattr(truth, "solve", _shifted(1e-9))
+    monkeypatch.setattr("pyharness.compare.candidates.solve", _shifted(1e-9))
     assert _failed(only) == [f"{only}/1e-14/error"]
 
 
@@ -96,7 +98,7 @@ def test_a_phase_error_of_1e9_is_caught(monkeypatch: pytest.MonkeyPatch, only: s
 def test_a_shift_of_time_is_caught_though_it_conserves_all(
     monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    monkeypatch.setattr(truth, "solve", _shifted(1e-5))
+    monkeypatch.setattr("pyharness.compare.candidates.solve", _shifted(1e-5))
     only = f"separatrix/{name}/flip-1e-01"
     fine = min(float(o.check.id.split("/")[3]) for o in stress([only]) if "steps" not in o.check.id)
     failed = _failed(only)
@@ -105,10 +107,10 @@ def test_a_shift_of_time_is_caught_though_it_conserves_all(
     assert all(id.endswith("/error") for id in failed)
 
 
-def _changed(change: Callable[[Run], Run]) -> Callable[..., Run]:
+def _changed(change: Callable[[End], End]) -> Callable[..., End]:
     right = truth.run_method
 
-    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> Run:
+    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
         return change(right(name, scene, time, tolerance))
 
     return run
@@ -131,7 +133,7 @@ def test_energy_that_drifts_is_caught_where_no_digit_is_left(
 def test_a_method_of_lower_order_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     right = truth.run_method
 
-    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> Run:
+    def run(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
         return right("improved-euler", scene, time, tolerance)
 
     monkeypatch.setattr(truth, "run_method", run)
@@ -142,7 +144,7 @@ def test_a_method_of_lower_order_is_caught(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_overflow_reported_as_complete_is_caught(
     monkeypatch: pytest.MonkeyPatch, number: float
 ) -> None:
-    wrong = _changed(lambda run: Run(np.full(3, number), "complete", run.steps))
+    wrong = _changed(lambda run: End(np.full(3, number), "complete", run.steps))
     monkeypatch.setattr(truth, "run_method", wrong)
     for name in ("closed-form", "taylor", "rk45", "rk4"):
         assert f"scales/{name}/1e150/" in _failed(f"scales/{name}/1e150")[0]
@@ -155,12 +157,12 @@ def test_an_overflow_reported_as_complete_is_caught(
 def test_products_that_underflow_are_caught(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """Without other units omega stays as it was, which no status tells."""
     assert not _failed(f"scales/{name}/1e-200")
-    monkeypatch.setattr(methods, "factor_near_one", lambda *_: 1.0)
+    monkeypatch.setattr("pyharness.methods.solve.factor_near_one", lambda *_: 1.0)
     assert _failed(f"scales/{name}/1e-200")
 
 
 def test_leaving_the_axis_undisturbed_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    def off(run: Run) -> Run:
+    def off(run: End) -> End:
         return replace(run, omega=run.omega + np.array([0.0, 0.0, 1e-30]))
 
     assert not _failed("separatrix/rk4/none", "separatrix/quick/none")
@@ -177,7 +179,8 @@ def test_a_refusal_is_described() -> None:
 
 def test_sums_of_fixed_steps_bound_the_order() -> None:
     """Against y' = y**2, whose derivatives are the largest: y(0) = 1, one step."""
-    for name, order in promises.FIXED.items():
+    for name in FIXED_STEP:
+        order = METHODS[name].order
         for z in (0.01, 0.1):
             exact = 1.0 / (1.0 - z)
             own = sum(c * z**k for k, c in enumerate(promises._series(name)))
@@ -253,7 +256,7 @@ def test_table_is_narrow_and_json_tells_all(
 def test_a_failure_is_told_in_every_form(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(truth, "solve", _shifted(1e-9))
+    monkeypatch.setattr("pyharness.compare.candidates.solve", _shifted(1e-9))
     only = "separatrix/closed-form/flip-1e-02"
     code, text = _run(capsys, "--only", only)
     assert code == 1

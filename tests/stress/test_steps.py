@@ -13,14 +13,13 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.compare.checks import Check
-from pyharness.methods import kernels
-from pyharness.methods import registry as methods
 from pyharness.model.listing import Listing, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original import collocation
 from pyharness.original.linear_solver import leqt1f
+from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.stress.disturbances import complex_step, moving_step
 from pyharness.stress.divergence import divergence
 from pyharness.stress.region_picture import regions_picture
@@ -34,7 +33,7 @@ from pyharness.theory.amplification import (
 )
 from pyharness.theory.collocation_matrices import singular_below, solved
 from pyharness.theory.regions import regions
-from pyharness.theory.schemes import FIXED_STEP, TERMS, Numbers, Series, local_error, spacing
+from pyharness.theory.schemes import SCHEMES, TERMS, Numbers, Series, local_error, spacing
 from pyharness.theory.step_errors import Forecaster, path
 from pyharness.verify.plants.planted_twins import plant_in_twin
 from pyharness.views.pictures import saved
@@ -94,7 +93,8 @@ def _compiled(monkeypatch: pytest.MonkeyPatch, old: str, new: str, ulps: int = 0
         x, ier = solve(a.tolist(), b.T.tolist())  # type: ignore[operator]
         return np.array(factors), np.array(x).T * (1.0 + ulps * 2.0**-52), ier
 
-    monkeypatch.setattr(kernels, "extension", lambda: SimpleNamespace(solve_linear=solve_linear))
+    room = SimpleNamespace(solve_linear=solve_linear)
+    monkeypatch.setattr("pyharness.model.extension.extension", lambda: room)
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_a_wrong_coefficient_is_caught(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     planted = plant_in_twin(program, file, old, new, tmp_path)
-    monkeypatch.setitem(methods.PROGRAM_REGISTRY, program, planted)
+    monkeypatch.setitem(PROGRAM_REGISTRY, program, planted)
     names = [f"regions/{program}/corrected/{each}" for each in broken]
     assert sorted(_failed(*names)) == sorted(names)
 
@@ -299,12 +299,12 @@ def test_forecast_is_what_comes_of_it() -> None:
         assert found.value == pytest.approx(forecast.at(count).truncation, rel=0.05)
 
 
-@pytest.mark.parametrize("name", FIXED_STEP)
+@pytest.mark.parametrize("name", SCHEMES)
 def test_schemes_have_their_orders(name: str) -> None:
     """What a step misses begins one power above the order, and not later."""
     omega = np.array([[0.3, 1.0, -0.7]])
-    missed = np.abs(local_error(FIXED_STEP[name].scheme, case_scene(5), omega)).max(axis=(1, 2))
-    order = FIXED_STEP[name].order
+    missed = np.abs(local_error(SCHEMES[name].scheme, case_scene(5), omega)).max(axis=(1, 2))
+    order = SCHEMES[name].order
     assert missed[: order + 1].max() < 1e-12
     assert missed[order + 1] > 1e-7
 
@@ -313,7 +313,7 @@ def test_series_and_numbers_agree() -> None:
     scene, omega = case_scene(6), np.array([[0.0, 1.0, 1.0]])
     h = 1e-3
     powers = h ** np.arange(TERMS)[:, None, None]
-    for each in FIXED_STEP.values():
+    for each in SCHEMES.values():
         series = local_error(each.scheme, scene, omega) + Series(scene).solution(omega)
         stepped = each.scheme(Numbers(scene, h), omega)
         np.testing.assert_allclose((series * powers).sum(axis=0), stepped, rtol=1e-14)
@@ -333,12 +333,12 @@ def test_a_wrong_weight_is_caught_by_small_steps(
     planted = plant_in_twin(
         "runge-kutta", "runge_kutta.py", "(dt / 6.0)", "(dt / 6.0000001)", tmp_path
     )
-    monkeypatch.setitem(methods.PROGRAM_REGISTRY, "runge-kutta", planted)
+    monkeypatch.setitem(PROGRAM_REGISTRY, "runge-kutta", planted)
     broken = "step-size/runge-kutta/case-5/corrected/1e-03"
     assert _failed(broken) == [broken]
 
 
-class _Coarse(methods.Program):
+class _Coarse(Program):
     """A program whose results are rounded to fewer digits, as if at every step."""
 
     def run(
@@ -357,9 +357,9 @@ class _Coarse(methods.Program):
 
 
 def test_too_much_rounding_moves_the_crossing(monkeypatch: pytest.MonkeyPatch) -> None:
-    known = methods.PROGRAM_REGISTRY["runge-kutta"]
+    known = PROGRAM_REGISTRY["runge-kutta"]
     coarse = _Coarse(known.name, known.order, known.source)
-    monkeypatch.setitem(methods.PROGRAM_REGISTRY, "runge-kutta", coarse)
+    monkeypatch.setitem(PROGRAM_REGISTRY, "runge-kutta", coarse)
     broken = "step-size/runge-kutta/case-5/corrected/crossing"
     assert _failed(broken) == [broken]
 
@@ -369,7 +369,7 @@ def test_divergence_is_not_that_of_another_scheme() -> None:
     scene = case_scene(4)
 
     def runner(each: Scene) -> Trajectory:
-        return methods.PROGRAM_REGISTRY["runge-kutta"].run(
+        return PROGRAM_REGISTRY["runge-kutta"].run(
             each, corrected("runge-kutta"), may_stop=False, velocity=False
         )
 

@@ -23,15 +23,17 @@ from pyharness.cli.main import main
 from pyharness.compare.checks import Check, bounded, selected
 from pyharness.compare.orders import Order, State
 from pyharness.compare.random_scenes import _far_scale, draw, weekly_seed
-from pyharness.methods import kernels
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, Program
+from pyharness.methods import problem, taylor
+from pyharness.methods.registry import METHODS
 from pyharness.model import facts as facts_room
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original import compiled
 from pyharness.original.cells import all_cells, cell_name
+from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.verify import programs as verify_programs
 from pyharness.verify.golden import mathematics, read_record, recorded, update
 from pyharness.verify.kinds import KINDS, verify
@@ -378,14 +380,14 @@ def test_plant_that_nothing_catches_is_a_failure(capsys: pytest.CaptureFixture[s
 
 def test_method_that_fails_in_an_ordinary_scene_is_no_lack_of_a_truth() -> None:
     """The truth is no method's: what a method makes endless is its own failure, and none of it."""
-    known = kernels.taylor
+    known = taylor.taylor
 
     def wrong(scene: Scene, times: Sequence[float], *rest: float) -> Trajectory:
         found = known(scene, times, *rest)
         return replace(found, omega=found.omega * 1e9) if scene.name == "plain" else found
 
     chosen = Selection(seed="fixed", only=["random"], draws=40)
-    with patch.object(kernels, "taylor", wrong):
+    with patch.object(taylor, "taylor", wrong):
         failed = [check.id for check in verify(chosen) if not check.passed]
     assert {id.rpartition("/")[2] for id in failed} >= {"solve-taylor"}
     assert not any(id.endswith("/no-truth") for id in failed)
@@ -405,11 +407,11 @@ def test_programs_that_solve_no_linear_equations_are_told() -> None:
 
 
 def test_plants_leave_nothing_behind() -> None:
-    before = [dict(METHODS), dict(PROGRAM_REGISTRY), kernels.run, kernels.normalized]
+    before = [dict(METHODS), dict(PROGRAM_REGISTRY), compiled.run, problem.normalized]
     for plant in PLANTS:
         with plant.planted():
             pass
-    assert [dict(METHODS), dict(PROGRAM_REGISTRY), kernels.run, kernels.normalized] == before
+    assert [dict(METHODS), dict(PROGRAM_REGISTRY), compiled.run, problem.normalized] == before
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ import pytest
 
 from pyharness.compare.agreement import differences
 from pyharness.compare.orders import measured_order
-from pyharness.methods import kernels
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene_file import case_scene
+from pyharness.original import compiled
 from pyharness.truth.reference import reference
 from pyharness.verify.plants.planted_twins import plant_in_twin
 
@@ -79,7 +79,7 @@ def test_fault_in_a_twin_is_caught(name: str, tmp_path: Path) -> None:
     planted = plant_in_twin(program, file, old, new, tmp_path)
     scene = case_scene(5)
     listing = corrected(program)
-    assert differences(kernels.run(scene, listing), planted.run(scene, listing)), "bits"
+    assert differences(compiled.run(scene, listing), planted.run(scene, listing)), "bits"
     truth = reference(scene, scene.times())
     misses = measured_order(scene, planted, listing, truth).state == "misses"
     assert misses == shows_in_truth, "truth"
@@ -91,7 +91,7 @@ def test_twin_without_a_fault_is_not_caught(tmp_path: Path) -> None:
         planted = plant_in_twin(program, "equations.py", "m[2] + c", "m[2] + c", tmp_path)
         scene = case_scene(5)
         listing = corrected(program)
-        assert differences(kernels.run(scene, listing), planted.run(scene, listing)) == []
+        assert differences(compiled.run(scene, listing), planted.run(scene, listing)) == []
         truth = reference(scene, scene.times())
         assert measured_order(scene, planted, listing, truth).state == "as due"
 
@@ -146,7 +146,7 @@ def _compiled(folder: Path, file: str, old: str, new: str) -> ctypes.CDLL:
 
 
 def _twin_rows(listing: Listing) -> np.ndarray:
-    from pyharness.methods.registry import PROGRAM_REGISTRY
+    from pyharness.original.programs import PROGRAM_REGISTRY
 
     run = PROGRAM_REGISTRY[listing.program].run(case_scene(3), listing, "python", may_stop=False)
     assert run.velocity is not None

@@ -3,7 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.compare.comparison import compare, listings_for
+from pyharness.compare.comparison import compare_programs, listings_for
 from pyharness.compare.report import comparison_report
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     )
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
-    found = compare(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
+    found = compare_programs(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
     shared.show(comparison_report(found), options)
     return 1 if found.unexpected else 0
 

@@ -4,12 +4,14 @@ import argparse
 import sys
 
 from pyharness.cli import options as shared
-from pyharness.methods import registry as methods
+from pyharness.methods.registry import METHODS
 from pyharness.methods.report import trajectory_report
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
 
 # What only a program wrote: its printer page, and its tape.
 PROGRAM_FORMATS = ("printer", "tape5")
@@ -38,8 +40,7 @@ def run(options: argparse.Namespace) -> int:
     scene = shared.chosen_scene(options)
     if (options.program is None) == (options.method is None):
         raise InputError(
-            f"run: give either --program ({', '.join(PROGRAMS)}) "
-            f"or --method ({', '.join(methods.METHODS)})"
+            f"run: give either --program ({', '.join(PROGRAMS)}) or --method ({', '.join(METHODS)})"
         )
     if options.format in PROGRAM_FORMATS:
         _check_program_format(options, scene, options.format)
@@ -88,11 +89,11 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     if options.no_stop:
         shared.refuse(options, "--no-stop", ("lipschitz",))
     implementation = options.implementation or "fortran"
-    if implementation not in methods.IMPLEMENTATIONS:
-        raise unknown("implementation", implementation, methods.IMPLEMENTATIONS, "--implementation")
+    if implementation not in IMPLEMENTATIONS:
+        raise unknown("implementation", implementation, IMPLEMENTATIONS, "--implementation")
     lipschitz = shared.positive(options.lipschitz, "--lipschitz", shared.default_lipschitz())
     shared.check_outputs(options)
-    program = methods.PROGRAM_REGISTRY[name]
+    program = PROGRAM_REGISTRY[name]
     trajectory = program.run(
         scene,
         listing,
@@ -109,14 +110,14 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     listing_options = ("implementation", "listing", "fix", "keep", "reading", "lipschitz")
     shared.refuse(options, "--method", (*listing_options, "no_stop"))
     name = options.method
-    if name not in methods.METHODS:
-        raise unknown("method", name, methods.METHODS, "--method")
-    default = max(1e-9, methods.METHODS[name].finest)
+    if name not in METHODS:
+        raise unknown("method", name, METHODS, "--method")
+    default = max(1e-9, METHODS[name].finest)
     tolerance = shared.positive(options.tolerance, "--tolerance", default)
     times = scene.times()
     if options.times is not None:
         times = shared.numbers(options.times, "--times")
     shared.check_outputs(options)
-    trajectory = methods.solve(scene, times, name, tolerance, shared.chosen_effort(options))
-    title = f"method {name}: {methods.METHODS[name].title}, tolerance {tolerance:g}"
+    trajectory = solve(scene, times, name, tolerance, shared.chosen_effort(options))
+    title = f"method {name}: {METHODS[name].title}, tolerance {tolerance:g}"
     return name, title, trajectory

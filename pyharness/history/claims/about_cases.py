@@ -17,7 +17,7 @@ from pyharness.history.claims.laboratory import (
     ranges,
 )
 from pyharness.history.claims.verdicts import FALSE, NOT_REPRODUCED, REPRODUCED, Outcome, graded
-from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.original.programs import PROGRAM_REGISTRY
 
 
 def constant_solution(lab: Laboratory, given: dict[str, Any]) -> Outcome:

@@ -13,9 +13,9 @@ from pyharness.history.claims.laboratory import (
     required_constant,
 )
 from pyharness.history.claims.verdicts import FALSE, NOT_REPRODUCED, REPRODUCED, Outcome, graded
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.facts import facts
 from pyharness.model.scene import Scene
+from pyharness.original.programs import PROGRAM_REGISTRY
 
 
 def superior(lab: Laboratory, given: dict[str, Any]) -> Outcome:

@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from pyharness.methods.registry import PROGRAM_REGISTRY
 from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.collocation import interval
 from pyharness.original.equations import Vector, omega_rate
+from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 COLLOCATION = ("two-term", "four-term")

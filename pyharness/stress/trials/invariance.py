@@ -4,7 +4,6 @@ Where the operations of a method are those of the turned problem in another orde
 other signs or other exponents, not a bit may differ; where they are not, the bound holds.
 """
 
-import math
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,9 +11,10 @@ from functools import cache
 
 import numpy as np
 
+from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.same_motion import scaled
@@ -26,7 +26,6 @@ from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory import promises
 from pyharness.theory.conditioning import Conditioning, conditioning
 
-_FIXED_STEP = ("improved-euler", "taylor-3", "rk4")
 _GAUSS = ("gauss-2", "gauss-4", "gauss-8")
 _ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
 _PREPARED = ("quick", "auto")
@@ -107,7 +106,7 @@ def _signs(first: float, second: float, third: float) -> Symmetry:
         lambda omega: omega * [first, second, third],
         # Rounding to nearest knows no sign. Radau and LSODA difference their Jacobian in a
         # direction of their own.
-        (*OURS, *_PREPARED, "dop853", "rk45", *_FIXED_STEP, *PROGRAMS),
+        (*OURS, *_PREPARED, "dop853", "rk45", *FIXED_STEP, *PROGRAMS),
     )
 
 
@@ -119,7 +118,7 @@ def _faster(factor: float, bitwise: tuple[str, ...]) -> Symmetry:
 
 # Exponents alone change, and ours compare only what has the same unit. SciPy's first step is
 # not so, and the implicit row scaling of LEQT1F compares powers of the step.
-_POWERS_OF_TWO = (*OURS, *_PREPARED, *_FIXED_STEP, "runge-kutta")
+_POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
     # Each axis does what the next does: products of the next two, in this order. The series of
     # Taylor and the sums of the others add over the axes, or multiply them, in a fixed order.
@@ -127,7 +126,7 @@ SYMMETRIES = {
         lambda scene: turned(scene, _onward, body=True),
         1.0,
         lambda omega: np.asarray(np.roll(omega, 1)),
-        ("closed-form", *_GAUSS, *_FIXED_STEP, "runge-kutta"),
+        ("closed-form", *_GAUSS, *FIXED_STEP, "runge-kutta"),
     ),
     "signs-12": _signs(-1.0, -1.0, 1.0),
     "signs-23": _signs(1.0, -1.0, -1.0),
@@ -140,7 +139,7 @@ SYMMETRIES = {
 def run(only: Sequence[str]) -> Iterator[Outcome]:
     """Turn each scene in each way, by each method and program."""
     for circumstance, (scene, _) in SCENES.items():
-        for name in (*_ADAPTIVE, *_FIXED_STEP):
+        for name in (*_ADAPTIVE, *FIXED_STEP):
             if not may_hold(f"invariance/{name}", only):
                 continue
             if name == "closed-form" and circumstance != "free":
@@ -157,7 +156,7 @@ def run(only: Sequence[str]) -> Iterator[Outcome]:
 
 def tolerances(name: str, circumstance: str) -> list[float]:
     """Return the tolerances at which a method is tried in a scene."""
-    if name in _FIXED_STEP:
+    if name in FIXED_STEP:
         return [1.0]
     finest = promises.finest(name, *SCENES[circumstance]) if name in METHODS else _MIDDLING
     if name == "closed-form":
@@ -167,10 +166,7 @@ def tolerances(name: str, circumstance: str) -> list[float]:
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
     """Return omega at `time`; NaN where a prepared kernel did not get there."""
-    if name in _PREPARED:
-        return prepare(scene, name, tolerance)(np.array(scene.omega), time).copy()
-    rows = solve(scene, [time], name, tolerance).omega
-    return rows[-1] if len(rows) else np.full(3, math.nan)
+    return (called if name in _PREPARED else solved)(name, tolerance).end(scene, time).omega
 
 
 def _checks(name: str, circumstance: str, tolerance: float, only: Sequence[str]) -> Iterator[Check]:
@@ -185,7 +181,7 @@ def _checks(name: str, circumstance: str, tolerance: float, only: Sequence[str])
             yield turned_check(id, scene, time, name, tolerance, symmetry)
     if id := asked("back"):
         yield _back(id, circumstance, name, tolerance)
-    if name not in _FIXED_STEP and (id := asked("split")):
+    if name not in FIXED_STEP and (id := asked("split")):
         yield _split(id, circumstance, name, tolerance)
 
 
@@ -202,7 +198,7 @@ def turned_check(
         return bounded(id, float(np.count_nonzero(plain != other)), 0.0, replay(id), "bits")
     flow = _flow(scene, time)
     difference = float(np.abs(plain - other).max()) / flow.largest
-    if name in _FIXED_STEP:
+    if name in FIXED_STEP:
         return described(id, difference, replay(id))
     # Either may be wrong by what the method is allowed.
     return bounded(id, difference, 2.0 * flow.limit(tolerance), replay(id))
@@ -214,7 +210,7 @@ def _back(id: str, circumstance: str, name: str, tolerance: float) -> Check:
     again = end(shifted(scene, there, time), -time, name, tolerance)
     flow, back = _flow(scene, time), _flow_between(circumstance, time, -time)
     difference = float(np.abs(again - scene.omega).max()) / flow.largest
-    if name in _FIXED_STEP:
+    if name in FIXED_STEP:
         return described(id, difference, replay(id), "not reversible")
     # The error of the way there is an error of the start of the way back.
     limit = flow.limit(tolerance) * back.amplification + back.limit(tolerance)
@@ -263,10 +259,7 @@ def _program(listing: Listing, circumstance: str, only: Sequence[str]) -> Iterat
         if not selected(id, only):
             continue
         plain, other = (
-            PROGRAM_REGISTRY[listing.program]
-            .run(each, listing, may_stop=False, velocity=False)
-            .omega
-            for each in (scene, symmetry.turn(scene))
+            unstopped(listing).rows(each).omega for each in (scene, symmetry.turn(scene))
         )
         n = min(len(plain), len(other))
         other = np.array([symmetry.back(row) for row in other[:n]]).reshape(-1, 3)

@@ -7,11 +7,12 @@ from functools import cache
 
 import numpy as np
 
+from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.compare.checks import bounded, described, may_hold
-from pyharness.methods.kernels import COMPLETE, extension, normalized
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError
+from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -74,7 +75,7 @@ class Contender:
 
 
 def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
-    found = solve(scene, times, "taylor", METHODS["taylor"].finest)
+    found = solved("taylor", METHODS["taylor"].finest).rows(scene, times)
     return found.omega, found.steps * np.array(times) / times[-1]
 
 
@@ -235,11 +236,11 @@ def _prepared(name: str, motion: str) -> Outcome:
     time = 1e4 * 2.0 * math.pi / orbit_of(motion).largest
     if name == "taylor":
         rows = _taylor(scene, [time])[0]
-        found = prepare(scene, name, METHODS[name].finest)(np.array(scene.omega), time)
+        found = called(name, METHODS[name].finest).end(scene, time).omega
     else:
         rows = CONTENDERS[name].run(scene, [time])[0]
         stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
-        found = prepare(stepped, name)(np.array(scene.omega), time)
+        found = called(name, 1.0).end(stepped, time).omega
     id = f"length/{name}/{motion}/prepared"
     return Outcome(bounded(id, float(np.count_nonzero(rows[-1] != found)), 0.0, replay(id)), scene)
 
@@ -247,7 +248,7 @@ def _prepared(name: str, motion: str) -> Outcome:
 def _closed_form(motion: str) -> Iterator[Outcome]:
     scene, body = MOTIONS[motion], orbit_of(motion)
     times = [r * 2.0 * math.pi / body.largest for r in REVOLUTIONS]
-    rows = solve(scene, times, "closed-form", METHODS["closed-form"].finest).omega
+    rows = solved("closed-form", METHODS["closed-form"].finest).rows(scene, times).omega
     found = [brouwer.errors(scene, body, t, row) for t, row in zip(times, rows, strict=True)]
     for what in LAWS:
         gain = body.turn if what == "phase" else body.gains[what]
@@ -260,8 +261,8 @@ def _closed_form(motion: str) -> Iterator[Outcome]:
 def _scipy(name: str, motion: str) -> Iterator[Outcome]:
     scene, body = MOTIONS[motion], orbit_of(motion)
     time = 1e2 * 2.0 * math.pi / body.largest
-    found = solve(scene, [time], name, promises.finest(name, scene, time))
-    yield from _described(name, motion, "100", scene, body, time, found.omega[-1])
+    found = solved(name, promises.finest(name, scene, time)).end(scene, time)
+    yield from _described(name, motion, "100", scene, body, time, found.omega)
 
 
 def _program(listing: Listing, motion: str) -> Iterator[Outcome]:
@@ -269,7 +270,7 @@ def _program(listing: Listing, motion: str) -> Iterator[Outcome]:
     body = orbit_of(motion)
     step = 2.0 * math.pi / body.largest / 100.0
     scene = replace(MOTIONS[motion], step_size=step, steps=1_000_000)
-    found = PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=False, velocity=False)
+    found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):
         where = f"{listing.label}/{count // 100}"
         if len(found.omega) < count:

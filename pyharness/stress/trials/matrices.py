@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
-from pyharness.methods import kernels
 from pyharness.model.listing import Listing, corrected, original
 from pyharness.model.scene_file import case_scene
+from pyharness.original import compiled
 from pyharness.original.linear_solver import SINGULAR
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory.collocation_matrices import (
@@ -92,7 +92,7 @@ def _threshold(id: str, program: str) -> Check:
 def _counted(id: str, listing: Listing, step: float) -> Outcome:
     """Count the steps of a run that print 129; as punched the points move out of danger."""
     scene = replace(case_scene(5), step_size=step, steps=300)
-    ier = kernels.run(scene, listing, velocity=False).ier
+    ier = compiled.run(scene, listing, velocity=False).ier
     assert ier is not None
     count = int((ier == SINGULAR).sum())
     singular = singular_below(listing.program) / step

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from pyharness.model.scene import Scene, Triple
-from pyharness.stress.hold import ALL, describe_programs, hold_methods, in_steps, truth_of
+from pyharness.stress.hold import ALL, describe_programs, hold, in_steps, truth_of
 from pyharness.stress.run import Outcome, Trial
 from pyharness.theory.conditioning import Conditioning
 
@@ -39,10 +40,10 @@ def _run(only: Sequence[str]) -> Iterator[Outcome]:
         if time == _LONG:
             # The closed form alone asks for no bound on what the flow makes of errors on the way.
             unknown = Conditioning(math.inf, 2.0, 2.0, 2.0, max(map(abs, _OMEGA)))
-            truth = truth_of(scene, time, unknown)
-            yield from hold_methods("near-symmetry", name, scene, time, only, _CLOSED, truth)
+            truth = partial(truth_of, flow=unknown)
+            yield from hold("near-symmetry", name, scene, time, only, _CLOSED, truth)
             continue
-        yield from hold_methods("near-symmetry", name, scene, time, only, ALL)
+        yield from hold("near-symmetry", name, scene, time, only, ALL)
         yield from describe_programs("near-symmetry", name, scene, only)
 
 

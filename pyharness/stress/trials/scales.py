@@ -3,25 +3,26 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from pyharness.compare.candidates import End, not_finite
 from pyharness.compare.checks import Check, may_hold
+from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.stress.hold import (
     ALL,
-    Run,
     describe_programs,
-    hold_methods,
+    hold,
     in_steps,
     run_method,
     truth_of,
 )
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory.conditioning import conditioning
-from pyharness.theory.promises import FIXED, SCIPY
 
 _TIME = 15.0  # s
 _FREE = Scene("scales", (0.5, 1.0, -0.7), moments=(40.0, 30.0, 20.0))
@@ -53,11 +54,11 @@ def _bit_for_bit(only: Sequence[str]) -> Iterator[Outcome]:
     ):
         time = scene.step_size * scene.steps
         for name in ALL:
-            if name in SCIPY or not may_hold(f"scales/{name}", only):
+            if name in SCIPY_METHODS or not may_hold(f"scales/{name}", only):
                 continue
             if name == "closed-form" and kind != "same":
                 continue
-            setting = None if name in FIXED else 1e-6
+            setting = None if name in FIXED_STEP else 1e-6
             plain = _tried(name, scene, time, setting)
             for power in powers:
                 id = f"scales/{name}/{kind}-2^{power}"
@@ -82,17 +83,17 @@ def _beyond(only: Sequence[str]) -> Iterator[Outcome]:
         id = f"scales/{name}/beyond"
         if not may_hold(id, only):
             continue
-        run = _tried(name, scene, 1e300, None if name in FIXED else 1e-6)
+        run = _tried(name, scene, 1e300, None if name in FIXED_STEP else 1e-6)
         silent = run.ended == "complete"
         note = "a silent wrong number" if silent else run.ended
         yield Outcome(Check(id, not silent, float(silent), 0.0, replay(id), note), scene)
 
 
-def _tried(name: str, scene: Scene, time: float, tolerance: float | None) -> Run:
+def _tried(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
     try:
         return run_method(name, scene, time, tolerance)
     except InputError as refusal:
-        return Run(np.full(3, math.nan), f"refused: {refusal}", 0.0)
+        return not_finite(f"refused: {refusal}")
 
 
 def _run(only: Sequence[str]) -> Iterator[Outcome]:
@@ -100,8 +101,8 @@ def _run(only: Sequence[str]) -> Iterator[Outcome]:
     flow = conditioning(_FREE, _TIME)
     for name, scene, time in circumstances():
         size = max(map(abs, scene.omega)) / max(map(abs, _FREE.omega))
-        truth = truth_of(scene, time, replace(flow, largest=flow.largest * size))
-        yield from hold_methods("scales", name, scene, time, only, ALL, truth)
+        truth = partial(truth_of, flow=replace(flow, largest=flow.largest * size))
+        yield from hold("scales", name, scene, time, only, ALL, truth)
         yield from describe_programs("scales", name, scene, only)
     yield from _bit_for_bit(only)
     yield from _beyond(only)

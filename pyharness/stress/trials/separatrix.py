@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pyharness.compare.checks import Check, may_hold
+from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene
-from pyharness.stress.hold import ALL, describe_programs, hold_methods, in_steps, run_method
+from pyharness.stress.hold import ALL, describe_programs, hold, in_steps, run_method
 from pyharness.stress.run import Outcome, Trial, replay
 
 # A = C = 1/2 hold in binary64: a disturbance that is the same about axes 1 and 3 lies on the
@@ -51,8 +52,7 @@ def _undisturbed(only: Sequence[str]) -> Iterator[Outcome]:
         id = f"separatrix/{name}/none"
         if not may_hold(id, only):
             continue
-        fixed = name in ("improved-euler", "taylor-3", "rk4")
-        run = run_method(name, scene, _STAYS, None if fixed else 1e-6)
+        run = run_method(name, scene, _STAYS, None if name in FIXED_STEP else 1e-6)
         wrong = float(np.abs(run.omega - scene.omega).max())
         # What is exactly zero keeps zero; the spin may be rounded where units are changed.
         limit = 2.0**-52 if name == "quick" else 0.0
@@ -64,7 +64,7 @@ def _undisturbed(only: Sequence[str]) -> Iterator[Outcome]:
 
 def _run(only: Sequence[str]) -> Iterator[Outcome]:
     for name, scene, time in circumstances():
-        yield from hold_methods("separatrix", name, scene, time, only, ALL)
+        yield from hold("separatrix", name, scene, time, only, ALL)
         if not name.startswith("early"):
             yield from describe_programs("separatrix", name, scene, only)
     yield from _undisturbed(only)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
-from pyharness.stress.hold import ALL, describe_programs, hold_methods, in_steps
+from pyharness.stress.hold import ALL, describe_programs, hold, in_steps
 from pyharness.stress.run import Outcome, Trial
 
 _OMEGA = (0.3, 1.0, -0.6)
@@ -55,7 +55,7 @@ def _rate(scene: Scene) -> float:
 
 def _run(only: Sequence[str]) -> Iterator[Outcome]:
     for name, scene, time in circumstances():
-        yield from hold_methods("shapes", name, scene, time, only, ALL)
+        yield from hold("shapes", name, scene, time, only, ALL)
         yield from describe_programs("shapes", name, scene, only)
 
 

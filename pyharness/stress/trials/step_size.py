@@ -7,10 +7,10 @@ from functools import cache, partial
 
 import numpy as np
 
+from pyharness.compare.candidates import unstopped
 from pyharness.compare.checks import Check, bounded, described, may_hold, selected
-from pyharness.methods.gauss import FIXED_STEP as MODERN
-from pyharness.methods.gauss import fixed_step
-from pyharness.methods.registry import PROGRAM_REGISTRY
+from pyharness.methods.fixed_step import fixed_step
+from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
@@ -20,7 +20,7 @@ from pyharness.stress.divergence import divergence, smallest_divergent
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory.amplification import amplification
 from pyharness.theory.collocation_matrices import PARTS, singular_below
-from pyharness.theory.schemes import FIXED_STEP
+from pyharness.theory.schemes import SCHEMES
 from pyharness.theory.step_errors import Forecaster, Path, path
 from pyharness.truth.reference import reference
 
@@ -40,7 +40,7 @@ _COMPENSATED = "gauss"
 
 def run(only: Sequence[str]) -> Iterator[Outcome]:
     """Run every method in every case with every step."""
-    for name in FIXED_STEP:
+    for name in SCHEMES:
         if not may_hold(f"{NAME}/{name}", only):
             continue
         for case in CASES:
@@ -66,7 +66,7 @@ def _steps(
     crosses = f"{prefix}/crossing"
     wants_crossing = (
         not punched
-        and FIXED_STEP[name].order in _CROSSING_ORDERS
+        and SCHEMES[name].order in _CROSSING_ORDERS
         and not name.startswith(_COMPENSATED)
         and selected(crosses, only)
     )
@@ -112,7 +112,7 @@ def _crossing(id: str, name: str, case: int, errors: dict[int, float]) -> Check:
         found /= 10.0**0.25
     foretold = forecaster.crossing(smallest)
     # Half a decade from one step to the next; rounding may be a tenth or ten times as large.
-    limit = 0.25 + 1.0 / (FIXED_STEP[name].order + 0.5)
+    limit = 0.25 + 1.0 / (SCHEMES[name].order + 0.5)
     best = min(counts, key=errors.__getitem__)
     note = (
         f"truncation down to {found:.1e} s, foretold {foretold:.1e} s; "
@@ -126,7 +126,7 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
     largest = _path(case).flow.largest
     note = ""
     if listing is not None:
-        run = PROGRAM_REGISTRY[name].run(scene, listing, may_stop=False, velocity=False)
+        run = unstopped(listing).rows(scene)
         if run.ended != "complete":
             return math.inf, f"{run.ended} after {run.steps} steps"
         omega = run.omega[-1]
@@ -139,10 +139,11 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 
 def _end(scene: Scene, name: str) -> Array:
     """Return what a modern method with a fixed step gives at the end; NaN after an overflow."""
-    if name in MODERN:
+    if name in FIXED_STEP:
         rows = fixed_step(name)(scene, [TIME], 1.0).omega
         return rows[-1] if len(rows) else np.full(3, math.nan)
-    from pyharness.methods.kernels import COMPLETE, extension, normalized
+    from pyharness.methods.problem import normalized
+    from pyharness.model.extension import COMPLETE, extension
 
     stages = int(name.partition("-")[2])
     rows, _, _, status, _ = extension().gauss_solution(
@@ -161,7 +162,7 @@ def _divergence(
     scene = case_scene(case)
     if listing is None:
         runner = partial(_rows, name)
-        scheme = corrected("runge-kutta" if FIXED_STEP[name].order == 4 else "two-term")
+        scheme = corrected("runge-kutta" if SCHEMES[name].order == 4 else "two-term")
     else:
         runner = partial(_program, listing)
         scheme = listing
@@ -193,7 +194,7 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 
 
 def _program(listing: Listing, scene: Scene) -> Trajectory:
-    return PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=False, velocity=False)
+    return unstopped(listing).rows(scene)
 
 
 @cache

@@ -13,14 +13,16 @@ from functools import cache, partial
 
 import numpy as np
 
+from pyharness.compare.candidates import listed, solved
 from pyharness.compare.checks import bounded, may_hold
-from pyharness.methods.kernels import extension
 from pyharness.methods.prepared import PREPARED, Solver, prepare
-from pyharness.methods.registry import IMPLEMENTATIONS, METHODS, PROGRAM_REGISTRY, solve
+from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
+from pyharness.original.programs import IMPLEMENTATIONS
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory import promises
 
@@ -131,7 +133,7 @@ def jobs() -> list[Job]:
 
 def _rows(scene: Scene, name: str) -> bytes:
     tolerance = max(_TOLERANCE, promises.finest(name, scene, _TIMES[-1]))
-    found = solve(scene, _TIMES, name, tolerance)
+    found = solved(name, tolerance).rows(scene, _TIMES)
     return found.omega.tobytes() + f"{found.steps} {found.evaluations} {found.ended}".encode()
 
 
@@ -152,14 +154,14 @@ def _shared(scene: Scene, name: str) -> Solver:
 
 
 def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:
-    found = PROGRAM_REGISTRY[listing.program].run(scene, listing, implementation)
+    found = listed(listing, implementation).rows(scene)
     velocity = b"" if found.velocity is None else found.velocity.tobytes()
     return found.recorded_time.tobytes() + found.omega.tobytes() + velocity + found.ended.encode()
 
 
 def _refusal(scene: Scene) -> bytes:
     """Ask for a tolerance that no method claims to meet."""
-    return solve(scene, _TIMES, "taylor", 1e-30).omega.tobytes()
+    return solved("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
 
 
 def _linear(seed: int) -> bytes:

@@ -3,21 +3,19 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from pyharness.compare.checks import Check, bounded, described, may_hold, selected
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import PROGRAM_REGISTRY, solve
-from pyharness.model.errors import InputError
+from pyharness.compare.candidates import called, solved, unstopped
+from pyharness.compare.checks import Check, bounded, described, selected
+from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene, TorqueLaw, Triple
-from pyharness.model.trajectory import Array
-from pyharness.stress.hold import Truth, describe_programs, truth_of
+from pyharness.stress.hold import Truth, attempt, describe_programs, hold, truth_of
 from pyharness.stress.run import Outcome, Trial, replay
 from pyharness.theory import promises
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.theory.promises import may_refuse
 from pyharness.truth.axial_top import axial_top
 from pyharness.truth.reference import reference
 
@@ -32,7 +30,6 @@ _ALL = (
 # What follows a wave for a million radians in seconds.
 _LONG = ("taylor", "auto", *_PREPARED)
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
-_FIXED_STEP = ("improved-euler", "taylor-3", "rk4")
 
 _BODY = (40.0, 30.0, 20.0)
 _START = (0.3, 1.0, 2.0)
@@ -168,81 +165,56 @@ CIRCUMSTANCES = {
 def run(only: Sequence[str]) -> Iterator[Outcome]:
     """Try every circumstance by what can take it."""
     for name, each in CIRCUMSTANCES.items():
-        yield from hold(name, each, only)
+        yield from hold(
+            "torque", name, each.scene, each.time, only, each.methods, each.truth, tolerances, held
+        )
         if each.programs and each.truth is axial:
             yield from _describe_axial(name, each, only)
         elif each.programs:
             yield from describe_programs("torque", name, each.scene, only)
 
 
-def hold(circumstance: str, each: Circumstance, only: Sequence[str]) -> Iterator[Outcome]:
-    """Hold each method against the truth: tolerance and rounding, amplified by the flow."""
-    names = [name for name in each.methods if may_hold(f"torque/{name}/{circumstance}", only)]
-    if not names:
-        return
-    truth = each.truth(each.scene, each.time)
-    for name in names:
-        for tolerance in tolerances(name, each.scene, each.time):
-            id = f"torque/{name}/{circumstance}/{tolerance:.0e}"
-            if selected(id, only):
-                yield Outcome(held(id, each.scene, truth, name, tolerance), each.scene)
-
-
-def tolerances(name: str, scene: Scene, time: float) -> list[float]:
+def tolerances(name: str, scene: Scene, truth: Truth) -> list[float]:
     """Return the tolerances at which a method is tried: its finest, and one in the middle."""
     known = _PREPARED.get(name, name)
-    finest = _MIDDLING if name == "quick" else promises.finest(known, scene, time)
+    finest = _MIDDLING if name == "quick" else promises.finest(known, scene, truth.time)
     return [_MIDDLING] if name in _ONLY_MIDDLING else sorted({finest, max(finest, _MIDDLING)})
 
 
-def held(id: str, scene: Scene, truth: Truth, name: str, tolerance: float) -> Check:
-    """Hold one method against the truth; it may refuse no more than `may_refuse` tells."""
-    try:
-        found, ended = _end(scene, truth.time, name, tolerance)
-    except InputError as refusal:
-        may = may_refuse(name, scene, truth.time)
-        return Check(id, may, None, None, replay(id), f"refused: {refusal}")
-    if ended in ("refused", "gave up"):
-        return Check(id, may_refuse(name, scene, truth.time), None, None, replay(id), ended)
-    error = math.inf
-    if ended == "complete":
-        error = float(np.abs(found - truth.omega).max()) / truth.flow.largest
+def held(
+    id: str, scene: Scene, truth: Truth, name: str, tolerance: float | None
+) -> Iterator[Check]:
+    """Hold one method against the truth: tolerance and rounding, amplified by the flow."""
+    assert tolerance is not None
+    kind = called if name in _PREPARED else solved
+    candidate = kind(_PREPARED.get(name, name), tolerance)
+    end = attempt(id, name, scene, truth.time, partial(candidate.end, scene, truth.time))
+    if isinstance(end, Check):
+        yield end
+        return
+    error, note = math.inf, end.ended
+    if end.ended == "complete":
+        error, note = float(np.abs(end.omega - truth.omega).max()) / truth.flow.largest, ""
     limit = truth.flow.limit(tolerance) + truth.error / truth.flow.largest
-    return bounded(id, error, limit, replay(id), "" if ended == "complete" else ended)
-
-
-def _end(scene: Scene, time: float, name: str, tolerance: float) -> tuple[Array, str]:
-    if name in _PREPARED:
-        solver = prepare(scene, _PREPARED[name], tolerance)
-        return solver(np.array(scene.omega), time), solver.status
-    found = solve(scene, [time], name, tolerance)
-    return found.omega[-1] if len(found.omega) else np.full(3, math.nan), found.ended
+    yield bounded(id, error, limit, replay(id), note)
 
 
 def _describe_axial(name: str, each: Circumstance, only: Sequence[str]) -> Iterator[Outcome]:
     """Say what steps a hundred radians of a wave apart make of it."""
     scene = each.scene
-    runs: list[tuple[str, Callable[[], Array]]] = [
-        (
-            f"torque/{program}/{name}/{listing.label}",
-            lambda p=program, x=listing: (  # type: ignore[misc]
-                PROGRAM_REGISTRY[p].run(scene, x, may_stop=False, velocity=False).omega
-            ),
-        )
+    runs = [
+        (f"torque/{program}/{name}/{listing.label}", unstopped(listing))
         for program in PROGRAMS
         for listing in (original(program), corrected(program))
     ]
-    runs += [
-        (f"torque/{m}/{name}/own-steps", lambda m=m: solve(scene, scene.times(), m, 1.0).omega)  # type: ignore[misc]
-        for m in _FIXED_STEP
-    ]
-    wanted = [(id, call) for id, call in runs if selected(id, only)]
+    runs += [(f"torque/{m}/{name}/own-steps", solved(m, 1.0)) for m in FIXED_STEP]
+    wanted = [(id, candidate) for id, candidate in runs if selected(id, only)]
     if not wanted:
         return
     truth = np.array([[float(w) for w in row] for row in axial_top(scene, scene.times())])
     scale = float(np.abs(truth).max())
-    for id, call in wanted:
-        omega = call()
+    for id, candidate in wanted:
+        omega = candidate.rows(scene).omega
         n = min(len(omega), len(truth))
         error = float(np.abs(omega[:n] - truth[:n]).max(initial=0.0)) / scale
         note = "" if n == len(truth) else f"ended after {n} steps"

@@ -9,10 +9,10 @@ from pathlib import Path
 from types import ModuleType
 
 from pyharness import original
-from pyharness.methods.registry import PROGRAM_REGISTRY, Program
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY, Program
 
 _COUNT = itertools.count()
 

@@ -17,11 +17,14 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pyharness.methods import kernels
-from pyharness.methods.registry import METHODS, PROGRAM_REGISTRY, Program
+from pyharness.methods import problem, taylor
+from pyharness.methods.registry import METHODS
+from pyharness.model import extension
 from pyharness.model.listing import Listing, entries
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original import compiled
+from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth import reference as truth
 from pyharness.verify.external_file import Problem, problems
 from pyharness.verify.plants.planted_twins import plant_in_twin
@@ -56,17 +59,17 @@ def _twin(program: str, file: str, old: str, new: str, both: bool) -> Iterator[N
 
 def _compiled(change: Callable[[Trajectory], Trajectory]) -> AbstractContextManager[Any]:
     """Change what the compiled programs return."""
-    run = kernels.run
+    run = compiled.run
 
     def faulty(scene: Scene, *rest: Any) -> Trajectory:
         return change(run(scene, *rest))
 
-    return patch.object(kernels, "run", faulty)
+    return patch.object(compiled, "run", faulty)
 
 
 def _compiled_scene(change: Callable[[Scene], Scene]) -> AbstractContextManager[Any]:
     """Change what the compiled programs are given; their labels stay."""
-    run = kernels.run
+    run = compiled.run
 
     def faulty(scene: Scene, *rest: Any) -> Trajectory:
         found, labels = run(change(scene), *rest), run(scene, *rest)
@@ -74,7 +77,7 @@ def _compiled_scene(change: Callable[[Scene], Scene]) -> AbstractContextManager[
             return found
         return replace(found, time=labels.time, recorded_time=labels.recorded_time)
 
-    return patch.object(kernels, "run", faulty)
+    return patch.object(compiled, "run", faulty)
 
 
 def _both(change: Callable[[Program, Scene, tuple[Any, ...]], Trajectory]) -> Any:
@@ -151,7 +154,7 @@ def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextMan
     """Change what the kernel of a prepared solver returns, given what was packed for it."""
     import pyharness.methods.prepared as room
 
-    entry = kernels.extension().solve_packed
+    entry = extension.extension().solve_packed
 
     def faulty(packed: Array, *rest: Any) -> _Answer:
         return change(packed, entry(packed, *rest))
@@ -177,7 +180,7 @@ def _refusing_solver(code: int) -> AbstractContextManager[Any]:
 
     def change(packed: Array, answer: _Answer) -> _Answer:
         omega, _, steps = answer
-        return (omega * np.nan, kernels.REFUSED, steps) if packed[0] == code else answer
+        return (omega * np.nan, extension.REFUSED, steps) if packed[0] == code else answer
 
     return _prepared(change)
 
@@ -240,13 +243,13 @@ def _wrong_card() -> AbstractContextManager[Any]:
 
 
 def _sign_in_kernels() -> AbstractContextManager[Any]:
-    normalized = kernels.normalized
+    normalized = problem.normalized
 
     def faulty(scene: Scene) -> tuple[Array, ...]:
         coefficients, *rest = normalized(scene)
         return (coefficients * [1.0, 1.0, -1.0], *rest)
 
-    return patch.object(kernels, "normalized", faulty)
+    return patch.object(taylor, "normalized", faulty)
 
 
 def _sign_in_reference() -> AbstractContextManager[Any]:
@@ -264,13 +267,13 @@ def _digit() -> AbstractContextManager[Any]:
 
     def altered() -> list[Problem]:
         found = []
-        for problem in problems():
-            value = problem.values[0]
+        for known in problems():
+            value = known.values[0]
             figure = next(each for each in value.omega if each is not None)
             wrong = replace(figure, value=figure.value + Decimal(20.0 * figure.accuracy))
             omega = tuple(wrong if each is figure else each for each in value.omega)
-            values = (replace(value, omega=omega), *problem.values[1:])
-            found.append(replace(problem, values=values))
+            values = (replace(value, omega=omega), *known.values[1:])
+            found.append(replace(known, values=values))
         return found
 
     return patch("pyharness.verify.kinds.problems", altered)

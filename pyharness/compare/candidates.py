@@ -1,0 +1,178 @@
+"""Candidates: whatever can be run on a scene, and judged or timed."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pyharness.methods.prepared import Solver, prepare
+from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.methods.solve import solve
+from pyharness.model.extension import COMPLETE, STOPPED, extension
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import STOP_VARIABLES, Array, Trajectory
+from pyharness.original.compiled import program_arguments
+from pyharness.original.programs import PROGRAM_REGISTRY
+
+NOWHERE = (math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """What a candidate made of a scene at one time.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (3,)
+        rad/s; NaN where it did not get there.
+    ended : str
+        ``complete``, or why it is not.
+    steps : int
+        As the candidate counts them.
+    evaluations : int or None
+        Right-hand sides, where they are counted.
+    """
+
+    omega: Array
+    ended: str = "complete"
+    steps: int = 0
+    evaluations: int | None = None
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the kernel of a prepared solver would not, or gave up."""
+        return self.ended in ("refused", "gave up")
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A call that goes from omega(0) to omega(T) and does nothing else; and how to read it."""
+
+    run: Callable[[], Any]
+    read: Callable[[Any], End]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A method with its tolerance, a prepared solver, or a program with its listing.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    ready : callable
+        From a scene and a time (s) to a `Ready`; InputError where it can't take them.
+    rows : callable
+        From a scene to its trajectory at the scene's own times; of methods also at other ones,
+        given as second argument.
+    """
+
+    name: str
+    ready: Callable[[Scene, float], Ready]
+    rows: Callable[..., Trajectory]
+
+    def end(self, scene: Scene, time: float) -> End:
+        """Run it to one time (s); InputError where it refuses the scene."""
+        ready = self.ready(scene, time)
+        return ready.read(ready.run())
+
+
+def solved(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
+    """Return a method of the registry, as `solve` runs it."""
+
+    def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
+        return solve(scene, scene.times() if times is None else times, name, tolerance, effort)
+
+    def ready(scene: Scene, time: float) -> Ready:
+        return Ready(partial(solve, scene, [time], name, tolerance, effort), _last)
+
+    return Candidate(name, ready, rows)
+
+
+def called(name: str, tolerance: float, primed: bool = False) -> Candidate:
+    """Return a prepared solver; `primed` by a call from another start, of which nothing may stay.
+
+    A method with a fixed step, and Gauss collocation, go in the scene's steps.
+    """
+
+    def ready(scene: Scene, time: float) -> Ready:
+        solver, start = prepare(scene, name, tolerance), np.array(scene.omega)
+        if primed:
+            solver(start[::-1].copy(), 0.5 * time)
+        return Ready(partial(solver, start, time), partial(_answered, solver))
+
+    def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
+        times = scene.times() if times is None else times
+        return prepare(scene, name, tolerance).trajectory(scene.omega, times)
+
+    return Candidate(name, ready, rows)
+
+
+def listed(
+    listing: Listing,
+    implementation: str = "fortran",
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    velocity: bool = True,
+    effort: float = 1.0,
+) -> Candidate:
+    """Return a program with its listing; what it takes is told at `Program.run`."""
+    options = lipschitz, may_stop, velocity
+
+    def ready(scene: Scene, time: float) -> Ready:
+        given = program_arguments(scene, listing, *options)
+        return Ready(partial(extension().run_program, *given), _printed)
+
+    def rows(scene: Scene) -> Trajectory:
+        run = PROGRAM_REGISTRY[listing.program].run
+        return run(scene, listing, implementation, *options, effort)
+
+    return Candidate(f"{listing.program}-{listing.label}", ready, rows)
+
+
+def unstopped(listing: Listing) -> Candidate:
+    """Return a compiled program whose stop test ends nothing, for its omega alone."""
+    return listed(listing, may_stop=False, velocity=False)
+
+
+def plain(values: Iterable[float]) -> Array:
+    """Return omega in an array of its own: a buffer is used again by the next call."""
+    return np.array([float(x) for x in values])
+
+
+def not_finite(why: str = "overflow") -> End:
+    """Return the end of a call that got nowhere."""
+    return End(np.array(NOWHERE), why)
+
+
+def _last(found: Trajectory) -> End:
+    omega = found.omega[-1] if len(found.omega) else np.array(NOWHERE)
+    return End(omega, found.ended, found.steps, found.evaluations)
+
+
+def _answered(solver: Solver, omega: Array) -> End:
+    return End(plain(omega), solver.status, solver.steps, _evaluations(solver))
+
+
+def _evaluations(solver: Solver) -> int | None:
+    """Return right-hand sides; a Taylor series evaluates none, it expands one."""
+    method = solver.plan.method
+    if method == "taylor":
+        return None
+    if method.startswith("gauss-"):
+        return solver.steps
+    return solver.steps * METHODS[method].evaluations if method in FIXED_STEP else 0
+
+
+def _printed(result: Any) -> End:
+    """Read what the compiled program gives: the last of its rows."""
+    rows, _, n_rows, status, evaluations, variable, _ = result
+    if status == STOPPED:
+        return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")
+    if status != COMPLETE:
+        return not_finite()
+    return End(plain(rows[2:5, n_rows - 1]), "complete", n_rows, evaluations)

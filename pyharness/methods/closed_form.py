@@ -1,0 +1,57 @@
+"""Known solutions: a sphere, or any body without torque by elliptic functions."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.methods.problem import normalized, trajectory_of
+from pyharness.model.effort import advice, waves
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.extension import GAVE_UP, REFUSED, extension
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+
+def known_solution(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Solve a scene that has a closed form; the tolerance plays no part.
+
+    Raises
+    ------
+    InputError
+        Where the scene has none: torque on a body that is no sphere, or coefficients all of
+        one sign; and where the phase is so large that it has no digit left, or the times and
+        waves are too many.
+    """
+    work = np.array([effort, 0.0])
+    if not any(scene.euler_coefficients):
+        rows, n_rows, status = extension().sphere_solution(
+            *normalized(scene)[1:], scene.omega, times, effort=work
+        )
+        if status == GAVE_UP:
+            raise InputError(
+                f"closed-form: {waves(scene)} waves at {len(times)} times would take too long; "
+                + advice("take fewer times", effort, work[1])
+            )
+    elif not scene.torque.is_zero:
+        raise InputError(
+            "closed-form: the scene has torque, and its body is no sphere; "
+            "allowed: a sphere, or no torque"
+        )
+    else:
+        rows, n_rows, status = extension().torque_free_solution(
+            scene.euler_coefficients, scene.omega, times
+        )
+    if status == REFUSED:
+        raise InputError(
+            "closed-form: no bounded motion, or a disturbance too faint to square; allowed: "
+            "coefficients A, B, C not all of one sign, none of them zero between equal signs"
+        )
+    if status == GAVE_UP:
+        raise TimedError(
+            "closed-form: at t = {time} s the phase is beyond 1e15 radians and has no digit left; "
+            "take a shorter time",
+            times[n_rows],
+        )
+    return trajectory_of(times, rows, n_rows, status, len(times), 0)

@@ -1,0 +1,40 @@
+"""The methods of III.2 in steps of the scene's size."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.methods.problem import normalized, trajectory_of
+from pyharness.model.effort import Solver, advice
+from pyharness.model.errors import TimedError
+from pyharness.model.extension import GAVE_UP, extension
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+_NUMBERS = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
+
+
+def fixed_step(name: str) -> Solver:
+    """Return the solver of a method of III.2: steps of the scene's size, no error control.
+
+    Before each time the last step is shortened to hit it.
+    """
+    number = _NUMBERS[name]
+
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        work = np.array([effort, 0.0])
+        rows, n_rows, status, steps, evaluations = extension().fixed_step_solution(
+            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, number,
+            scene.step_size, effort=work,
+        )  # fmt: skip
+        if status == GAVE_UP:
+            raise TimedError(
+                f"{name}: {abs(times[-1]) / scene.step_size:.3g} steps of {{time}} s are too many; "
+                + advice("take a larger step or a shorter time", effort, work[1]),
+                scene.step_size,
+            )
+        return trajectory_of(times, rows, n_rows, status, steps, evaluations)
+
+    return solve

@@ -1,0 +1,189 @@
+"""`solve`: the door to every method that gives rows; times, units and sides of 0 are its own."""
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pyharness.methods.plan import plan
+from pyharness.methods.registry import METHODS, SCIPY_METHODS, Method
+from pyharness.methods.scipy_ivp import finest_tolerance
+from pyharness.model.effort import checked_effort
+from pyharness.model.errors import InputError, TimedError, unknown
+from pyharness.model.same_motion import factor_near_one, is_ordinary, scaled, unscaled
+from pyharness.model.scene import Scene, checked_scene, most_steps
+from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import Number, Numbers, number, several, tolerance_of
+
+
+def solve(
+    scene: Scene,
+    times: Number | Numbers,
+    method: str = "auto",
+    tolerance: Number = 1e-12,
+    effort: float = 1.0,
+) -> Trajectory:
+    """Solve a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to solve; its step size plays a part only for the fixed-step methods.
+    times : float or iterable of float, shape (n,)
+        Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
+        twice, from 0 backward and from 0 forward.
+    method : str
+        A name in `pyharness.methods.registry.METHODS`.
+    tolerance : float
+        Largest error of any component at `times`, relative to the largest from 0 to the last of
+        them.
+    effort : float
+        Factor on the work after which the method gives up: 1 is some ten seconds.
+
+    Returns
+    -------
+    Trajectory
+        One row per time, in the order of `times`; fewer where the solution overflows: those between
+        0 and the overflow, on either side. Steps and evaluations are of both sides together.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, one that can't take the scene, times out of order, a tolerance
+        that the method can't meet, or one that takes more work than `effort` allows.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, solve
+    >>> solve(case_scene(1), [1.0, 2.0]).omega
+    array([[3.5, 3.5, 3.5],
+           [6. , 6. , 6. ]])
+    """
+    checked_scene(scene)
+    if not isinstance(method, str) or method not in METHODS:
+        raise unknown("method", method, METHODS)
+    chosen = METHODS[method]
+    tolerance = tolerance_of(tolerance, chosen.finest)
+    if chosen.is_fixed_step and tolerance != 1.0:
+        raise InputError(
+            f"tolerance is {tolerance:g}; {method} takes none: it goes in the scene's steps, "
+            "whatever their error; give no tolerance, or 1"
+        )
+    if not chosen.finest <= tolerance <= 1.0:
+        raise InputError(
+            f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
+        )
+    effort = checked_effort(effort)
+    values, turned = _ascending(times)
+    below = [t for t in values if t < 0.0]
+    rest = values[len(below) :]
+    # On either side away from 0.
+    marches = [
+        _march(chosen, scene, each, tolerance, effort) for each in (below[::-1], rest) if each
+    ]
+    if below:
+        marches[0] = _reversed(marches[0])
+    found = marches[0] if len(marches) == 1 else _joined(*marches)
+    return _reversed(found) if turned else found
+
+
+def finest(method: str, scene: Scene, time: float) -> float:
+    """Return the smallest tolerance that a method of the registry can meet in a scene.
+
+    The one that it claims; more for `solve_ivp`, whose steps can't be told to err less than by
+    some 2e-14, where many add up or the motion multiplies them.
+
+    Raises
+    ------
+    InputError
+        Where `solve_ivp` would need too many steps even to see that.
+    """
+    claimed = METHODS[method].finest
+    if method not in SCIPY_METHODS or time == 0.0:
+        return claimed
+    factor = factor_near_one(scene, time)
+    met = finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
+    return max(claimed, met)
+
+
+def by_plan(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Solve as the plan for rows says."""
+    chosen = plan(scene, "auto", tolerance, rows=True)
+    method = METHODS[chosen.method]
+    try:
+        # A closed form is as good as rounding lets it be, whatever is asked.
+        return method.solve(scene, times, max(tolerance, method.finest), effort)
+    except InputError as refusal:
+        if chosen.fallback is None:
+            raise
+        try:
+            return METHODS[chosen.fallback].solve(scene, times, tolerance, effort)
+        except InputError:
+            raise refusal from None
+
+
+def _march(
+    chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
+) -> Trajectory:
+    """Solve at times away from 0, in units in which the method can form its products."""
+    if not chosen.is_fixed_step and not is_ordinary(scene):
+        # The step plays no part; in other units it might be no number.
+        scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
+    factor = 1.0 if chosen.any_scale else factor_near_one(scene, times[-1])
+    if factor == 1.0:
+        return chosen.solve(scene, times, tolerance, effort)
+    faster = [t / factor for t in times]
+    try:
+        found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
+    except TimedError as refusal:
+        raise refusal.slower(factor) from None
+    return unscaled(found, times, factor)
+
+
+def _reversed(found: Trajectory) -> Trajectory:
+    return replace(
+        found,
+        time=found.time[::-1],
+        recorded_time=found.recorded_time[::-1],
+        omega=found.omega[::-1],
+    )
+
+
+def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
+    """Return the rows of two marches from 0; what overflows is missing at the ends."""
+    return replace(
+        after,
+        time=np.concatenate([before.time, after.time]),
+        recorded_time=np.concatenate([before.recorded_time, after.recorded_time]),
+        omega=np.concatenate([before.omega, after.omega]),
+        steps=before.steps + after.steps,
+        evaluations=before.evaluations + after.evaluations,
+        ended=after.ended if before.ended == "complete" else before.ended,
+    )
+
+
+def _ascending(times: object) -> tuple[list[float], bool]:
+    """Return the times in ascending order, and whether that turned them round."""
+    if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
+        times = (times,)
+    if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
+        times = times.tolist()
+    entries = several("times", times, "allowed: a number, or numbers in order")
+    most = most_steps()
+    values = [number("times", each) for each in itertools.islice(entries, most + 1)]
+    if not values:
+        raise InputError("times: none given; give at least one")
+    if len(values) > most:
+        raise InputError(f"times: more than {most}, what fits in this machine's memory")
+    if not all(map(math.isfinite, values)):
+        raise InputError("times: one is not finite; allowed: finite numbers")
+    turned = values[0] > values[-1]
+    if turned:
+        values.reverse()
+    if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
+        raise InputError("times: not strictly monotonic; each must differ from the one before")
+    return values, turned

@@ -1,0 +1,55 @@
+"""Taylor series by recurrence, order and step size adapted."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.methods.problem import normalized, trajectory_of
+from pyharness.model.effort import advice
+from pyharness.model.errors import TimedError
+from pyharness.model.extension import GAVE_UP, extension
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+
+def taylor(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Solve a scene by Taylor series.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to integrate.
+    times : sequence of float, shape (n,)
+        Strictly monotonic away from 0, on one side of it (s); not checked.
+    tolerance : float
+        Largest error of any component at `times`, relative to the largest from 0 to the last of
+        them.
+    effort : float
+        Factor on the work after which it gives up.
+
+    Returns
+    -------
+    Trajectory
+        Fewer rows than times where the solution overflows; a series counts as one evaluation.
+
+    Raises
+    ------
+    InputError
+        Where the method gave up: the time is long for so fast a motion.
+    NotBuiltError
+        Where the extension is not built.
+    """
+    work = np.array([effort, 0.0])
+    rows, n_rows, status, steps = extension().taylor_rows(
+        *normalized(scene), scene.omega, times, tolerance, effort=work
+    )
+    if status == GAVE_UP:
+        count = "1 step" if steps == 1 else f"{steps} steps"
+        raise TimedError(
+            f"taylor gave up before t = {{time}} s after {count}; "
+            + advice("take a shorter time or a larger tolerance", effort, work[1]),
+            times[n_rows],
+        )
+    return trajectory_of(times, rows, n_rows, status, steps, steps)

@@ -1,0 +1,35 @@
+"""The compiled extension, and the words that it and Python share."""
+
+from types import ModuleType
+
+import numpy as np
+
+from pyharness.model.errors import NotBuiltError
+from pyharness.model.scene import Wave
+from pyharness.model.trajectory import Array
+
+# The status codes of fortran/statuses.f90, and what a user reads.
+COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP, INTERRUPTED = range(6)
+ENDS = ("complete", "stopped", "overflow", "refused", "gave up", "interrupted")
+
+
+def extension() -> ModuleType:
+    """Return the compiled extension; NotBuiltError where there is none."""
+    try:
+        from pyharness import _kernels
+    except ImportError as error:
+        raise NotBuiltError(
+            "the Fortran extension is not built; run 'make compare' in the checkout, or "
+            "'pip install .' with a Fortran compiler (meanwhile: --implementation python)"
+        ) from error
+    module: ModuleType = _kernels
+    return module
+
+
+def columns(waves: tuple[Wave, ...]) -> Array:
+    """Return amplitudes and frequencies as the kernels take them, shape (4, n)."""
+    columns = np.empty((4, len(waves)), order="F")
+    for index, (amplitude, frequency) in enumerate(waves):
+        columns[:3, index] = amplitude
+        columns[3, index] = frequency
+    return columns

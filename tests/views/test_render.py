@@ -1,0 +1,93 @@
+"""Reports: every form gives the same values, each in its own way."""
+
+import csv
+import json
+from xml.etree import ElementTree as xml
+
+import numpy as np
+import pytest
+
+from pyharness.model.report import (
+    Column,
+    Field,
+    Line,
+    Report,
+    Table,
+    digits,
+    exact,
+    short,
+    words,
+)
+from pyharness.views.render import render
+
+NAME = "a-name-with-hyphens"
+COLUMNS = [
+    *words("name"),
+    Column("error", short, unit="rad/s", name="error_w"),
+    Column("ms", digits(".1f", 1e3), unit="s", full=digits(".3f")),
+]
+TABLE = Table(COLUMNS, [["first", 1.23e-3, 0.0123], ["second", None, None]])
+REPORT = Report(
+    "verify",
+    text=[[], [f"{'word ' * 18}{NAME} end", TABLE], [Line("x" * 120)], [Field("why  ", "y " * 60)]],
+    record=lambda: {"values": [1.5, float("nan")]},
+    data=TABLE,
+    cases=[("cells", "cells/a", "", "again a"), ("cells", "cells/b", "2, limit 1", "again b")],
+)
+
+
+def test_text_has_sections_paragraphs_and_tables() -> None:
+    lines = render(REPORT, "table").splitlines()
+    assert lines == [
+        "word " * 17 + "word",
+        f"  {NAME} end",
+        "name     error    ms",
+        "first   1.2e-3  12.3",
+        "second       -     -",
+        "",
+        "x" * 120,
+        "",
+        "why  " + "y " * 47 + "y",
+        "     " + "y " * 11 + "y",
+    ]
+
+
+def test_numbers_are_given_in_full() -> None:
+    head, *rows = csv.reader(render(REPORT, "csv").splitlines())
+    assert head == ["name", "error_w", "ms"]
+    assert rows == [["first", "0.00123", "0.012"], ["second", "", "-"]]
+    markdown = "| name | error_w | ms |\n| --- | --- | --- |\n| first | 0.00123 | 0.012 |\n"
+    assert render(REPORT, "markdown").startswith(markdown)
+    array = Table(words("a b"), np.array([[0.1, 1e22], [5e-324, -0.0]]))
+    found = render(REPORT._replace(data=array), "csv").splitlines()
+    assert found == ["a,b", "0.1,1e+22", "5e-324,-0.0"]
+    assert [exact(x) for x in (None, True, 3, "x")] == ["", "true", "3", "x"]
+
+
+def test_page_is_written_as_for_people() -> None:
+    page = [["title", TABLE], [Line("- " + "note " * 30)]]
+    found = render(REPORT._replace(page=page), "markdown").split("\n\n")
+    assert found[0] == "title"
+    assert found[1].splitlines()[2] == "| first | 1.2e-3 | 12.3 |"
+    assert found[2] == "- " + "note " * 30 + "\n"
+
+
+@pytest.mark.parametrize(("fit", "lines_of_it", "letters"), [("wrap", 3, 29), ("cut", 1, 30)])
+def test_last_column_fits(fit: str, lines_of_it: int, letters: int) -> None:
+    columns = [*words("name"), Column("what", left=True, fit=fit)]
+    table = Table(columns, [["n" * 40, "w " * 60], ["short", "v"]])
+    lines = render(REPORT._replace(text=[[table]]), "table").splitlines()
+    assert max(map(len, lines)) <= 100
+    assert len(lines) == 1 + lines_of_it + 1
+    assert lines[-1].split() == ["short", "v"]
+    assert lines[1].count("w") == letters
+
+
+def test_record_and_cases() -> None:
+    assert json.loads(render(REPORT, "json")) == {"schema": 1, "values": [1.5, None]}
+    suite = xml.fromstring(render(REPORT, "junit").encode())
+    assert suite.attrib["name"] == "verify"
+    assert (suite.attrib["tests"], suite.attrib["failures"]) == ("2", "1")
+    (failure,) = suite.iter("failure")
+    assert failure.text == "2, limit 1\nagain b"
+    assert [each.attrib["classname"] for each in suite.iter("testcase")] == ["verify.cells"] * 2

@@ -32,6 +32,7 @@ class Parser(argparse.ArgumentParser):
             # Given a width, argparse need not ask the terminal, which costs it an import.
             formatter_class=lambda prog: argparse.HelpFormatter(prog, width=100),
         )
+        self.formats: Sequence[str] = ()
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError in place of printing the usage."""
@@ -50,6 +51,7 @@ class Parser(argparse.ArgumentParser):
             # What argparse makes of `--name=--`.
             if isinstance(value, list):
                 raise InputError(f"--{name.replace('_', '-')}: '--' is no value; give one")
+        check_format(getattr(options, "format", None), self.formats)
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
@@ -100,21 +102,17 @@ def add_output_options(
     parser: Parser, formats: Sequence[str] = FORMATS, plot: str = "draw a picture"
 ) -> None:
     """Declare where results go, and in what form; `plot` is empty where nothing is drawn."""
-    parser.add_argument("--format", metavar="F", type=one_of(formats), help=", ".join(formats))
+    parser.formats = formats
+    parser.add_argument("--format", metavar="F", help=", ".join(formats))
     if plot:
         parser.add_argument("--plot", metavar="FILE", help=f"{plot}, with its numbers as CSV")
     parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
 
 
-def one_of(formats: Sequence[str]) -> Callable[[str], str]:
-    """Return what reads a format, and refuses others."""
-
-    def read(form: str) -> str:
-        if form not in formats:
-            raise unknown("format", form, formats, "--format")
-        return form
-
-    return read
+def check_format(form: str | None, allowed: Sequence[str]) -> None:
+    """Refuse a form that is given and not allowed."""
+    if form is not None and form not in allowed:
+        raise unknown("format", form, allowed, "--format")
 
 
 def chosen_scene(options: argparse.Namespace) -> Scene:

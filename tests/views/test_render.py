@@ -12,6 +12,7 @@ from pyharness.model.report import (
     Field,
     Line,
     Report,
+    Section,
     Table,
     digits,
     exact,
@@ -65,7 +66,7 @@ def test_numbers_are_given_in_full() -> None:
 
 
 def test_page_is_written_as_for_people() -> None:
-    page = [["title", TABLE], [Line("- " + "note " * 30)]]
+    page: list[Section] = [["title", TABLE], [Line("- " + "note " * 30)]]
     found = render(REPORT._replace(page=page), "markdown").split("\n\n")
     assert found[0] == "title"
     assert found[1].splitlines()[2] == "| first | 1.2e-3 | 12.3 |"

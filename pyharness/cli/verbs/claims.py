@@ -20,7 +20,7 @@ def run(options: argparse.Namespace) -> int:
     """Judge and show."""
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain",))
-        shared.one_of(("table", "json"))(options.format or "table")
+        shared.check_format(options.format, ("table", "json"))
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)
     if options.assignments:

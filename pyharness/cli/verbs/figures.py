@@ -10,13 +10,8 @@ from pyharness.model.errors import InputError
 def declare(parser: shared.Parser) -> None:
     """Declare the options."""
     parser.add_argument("--out", metavar="DIR", help="folder for SVG, PNG and CSV; made if missing")
-    parser.add_argument(
-        "--format",
-        metavar="F",
-        type=shared.one_of(("table", "json")),
-        default="table",
-        help="table (default) or json: of what was drawn",
-    )
+    parser.formats = ("table", "json")
+    parser.add_argument("--format", metavar="F", help="table (default) or json: of what was drawn")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,5 +38,5 @@ def run(options: argparse.Namespace) -> int:
     shared.progress("")
     write_folder(options.out, content, "--out")
     # The folder takes the files; what was drawn is told here.
-    shared.emit(render(figures_report(drawn), options.format), None)
+    shared.emit(render(figures_report(drawn), options.format or "table"), None)
     return 0

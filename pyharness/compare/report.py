@@ -113,32 +113,40 @@ def _data(comparison: Comparison) -> Table:
         "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"
     )
-    rows: list[list[Any]] = []
+    rows: list[dict[str, Any]] = []
     for each in comparison.programs:
-        run, order = each.trajectory, each.order
-        rows.append(
-            [
-                each.listing.program, each.listing.label,
-                " ".join(sorted(each.listing.defects | each.listing.readings)), run.steps,
-                run.ended, *((run.stop.variable, run.stop.quotient) if run.stop else (None, None)),
-                *_accuracy(each.accuracy), each.ulps,
-                *((order.value, order.state) if order else (None, None)), run.evaluations,
-                each.seconds_per_step * run.steps,
-            ]
-        )  # fmt: skip
+        run = each.trajectory
+        row = {
+            "method": each.listing.program,
+            "listing": each.listing.label,
+            "active": " ".join(sorted(each.listing.defects | each.listing.readings)),
+            "ulps": each.ulps,
+            "steps": run.steps,
+            "seconds": each.seconds_per_step * run.steps,
+            **_found(run, each.accuracy),
+        }
+        if run.stop:
+            row |= {"stop_variable": run.stop.variable, "stop_quotient": run.stop.quotient}
+        if each.order:
+            row |= {"order": each.order.value, "order_state": each.order.state}
+        rows.append(row)
     for method in comparison.methods:
-        tried, good = method.trajectory, method.accuracy
-        if tried is None or good is None:
-            found: list[Any] = [method.failure, *[None] * 13]
-        else:
-            found = [tried.ended, None, None, *_accuracy(good), None, None, None]
-            found += [tried.evaluations, method.seconds]
-        rows.append([method.method, None, None, None, *found])
-    return numbers(names, rows)
+        row = {"method": method.method, "ended": method.failure}
+        if method.trajectory is not None and method.accuracy is not None:
+            row |= {"seconds": method.seconds, **_found(method.trajectory, method.accuracy)}
+        rows.append(row)
+    return numbers(names, [list(map(row.get, names.split())) for row in rows])
 
 
-def _accuracy(good: Accuracy) -> tuple[float | None, ...]:
-    return (*good.omega, good.velocity, good.energy, good.momentum)
+def _found(run: Trajectory, good: Accuracy) -> dict[str, Any]:
+    return {
+        **dict(zip(("error_w1", "error_w2", "error_w3"), good.omega, strict=True)),
+        "error_v": good.velocity,
+        "energy_drift": good.energy,
+        "momentum_drift": good.momentum,
+        "ended": run.ended,
+        "evaluations": run.evaluations,
+    }
 
 
 def _stop(stop: Stop, limit: float) -> str:

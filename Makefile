@@ -12,8 +12,6 @@ ARGS ?=
 
 BIN := .venv/bin
 FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
-# What the tests and the linters need beyond what the project itself does.
-TEST_PACKAGES := $(shell sed -n '/^test = \[/,/^\]/s/^ *"\(.*\)",/\1/p' pyproject.toml)
 
 .PHONY: compare test mutate cross-check wheel lint format clean FORCE
 
@@ -38,6 +36,8 @@ lint: .venv/ready-to-test
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/python -m mypy
+	@MESONPY_EDITABLE_SKIP=$(wildcard $(CURDIR)/build/cp*) PYTHONPATH=$(CURDIR) \
+	  $(BIN)/lint-imports --no-cache --no-logo >build/imports.log || { cat build/imports.log; exit 1; }
 	@test -z "$$($(BIN)/fprettify --diff $(FORTRAN))" || { echo "fprettify: make format"; exit 1; }
 	@$(BIN)/fortitude --quiet check fortran
 
@@ -56,7 +56,7 @@ clean:
 	@touch $@
 
 .venv/ready-to-test: .venv/ready
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check $(patsubst %,'%',$(TEST_PACKAGES))
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test
 	@touch $@
 
 .venv/tools: FORCE

@@ -1,78 +1,15 @@
-"""FORMAT: the edit descriptors that the decks use, and the records they write."""
+"""FORMAT, by a library; FORTRAN 77 and the paper of 1982 have two words of their own."""
 
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
-_DESCRIPTOR = re.compile(
-    r"(?P<count>\d*)(?:(?P<kind>[XH/])|F(?P<f>\d+)\.(?P<decimals>\d+)|I(?P<i>\d+))"
-)
-
-
-@dataclass(frozen=True)
-class Edit:
-    """One edit descriptor.
-
-    Attributes
-    ----------
-    kind : str
-        `F`, `I`, `X`, `H` or `/`.
-    width, decimals : int
-        Of the field; both 0 where they mean nothing.
-    text : str
-        What `H` writes.
-    """
-
-    kind: str
-    width: int = 0
-    decimals: int = 0
-    text: str = ""
-
-    @property
-    def takes_a_value(self) -> bool:
-        """Whether it edits an item of the list."""
-        return self.kind in "FI"
-
-
-@cache
-def parse(text: str) -> tuple[Edit, ...]:
-    """Return the descriptors of a FORMAT, parentheses included in `text`.
-
-    Raises
-    ------
-    ValueError
-        For what is no descriptor of the five kinds, or has no parentheses around it.
-    """
-    if not (text.startswith("(") and text.endswith(")")):
-        raise ValueError(f"FORMAT {text!r}: no parentheses around it")
-    edits: list[Edit] = []
-    place, end = 1, len(text) - 1
-    while place < end:
-        if text[place] in ", ":
-            place += 1
-            continue
-        found = _DESCRIPTOR.match(text, place, end)
-        if found is None:
-            raise ValueError(f"FORMAT {text!r}: no descriptor known here at character {place + 1}")
-        place = found.end()
-        count = int(found["count"] or 1)
-        if found["kind"] == "H":
-            literal = text[place : place + count]
-            if place + count > end:
-                raise ValueError(f"FORMAT {text!r}: {count}H reaches beyond the end")
-            edits.append(Edit("H", count, text=literal))
-            place += count
-        elif found["kind"] == "X":
-            edits.append(Edit("X", count))
-        elif found["kind"] == "/":
-            edits += [Edit("/")] * count
-        elif found["f"]:
-            edits += [Edit("F", int(found["f"]), int(found["decimals"]))] * count
-        else:
-            edits += [Edit("I", int(found["i"]))] * count
-    return tuple(edits)
+# Zero has no minus sign (FORTRAN 77, 13.5.9).
+_MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
+# What is not finite does not fit: the machine printed R or I there, and asterisks say no less.
+_TOO_WIDE = 1e300
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
@@ -89,64 +26,13 @@ def write(text: str, values: Sequence[float]) -> list[str]:
     -------
     list of str
         The records, the character for the carriage control included.
-
-    Notes
-    -----
-    Where the list is longer than the FORMAT, a new record begins at its start. Where it is
-    shorter, what stands before the next descriptor that needs a value is still obeyed, a `/` too:
-    so a FORMAT for four values that writes six ends with an empty record.
     """
-    edits = parse(text)
-    if values and not any(each.takes_a_value for each in edits):
-        raise ValueError(f"FORMAT {text!r} has no place for a value")
-    records = [""]
-    rest: Iterator[float] = iter(values)
-    left = len(values)
-    while True:
-        for edit in edits:
-            if edit.kind == "/":
-                records.append("")
-            elif edit.takes_a_value:
-                if not left:
-                    return records
-                left -= 1
-                records[-1] += _field(edit, next(rest))
-            else:
-                records[-1] += edit.text or " " * edit.width
-        if not left:
-            return records
-        records.append("")
+    printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
+    return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
 
 
-def _field(edit: Edit, value: float) -> str:
-    text = whole(value) if edit.kind == "I" else fixed(value, edit.width, edit.decimals)
-    return text.rjust(edit.width) if len(text) <= edit.width else "*" * edit.width
+@cache
+def _writer(text: str) -> Any:
+    from fortranformat import FortranRecordWriter
 
-
-def whole(value: float) -> str:
-    """Return a whole number as `I` edits it."""
-    if value != int(value):
-        raise ValueError(f"{value!r} is not whole; I edits whole numbers")
-    return str(int(value))
-
-
-def fixed(value: float, width: int, decimals: int) -> str:
-    """Return a number as `F` edits it, too long where it does not fit.
-
-    The value that binary64 holds is rounded, exactly; a tie goes away from zero, as adding half
-    a unit makes it. Zero has no minus sign (FORTRAN 77, 13.5.9). The zero before the point, which
-    the language leaves to the processor, is written where there is room. What is not finite does
-    not fit: the machine of 1982 printed R or I there, and asterisks say no less.
-    """
-    if not math.isfinite(value):
-        return "*" * (width + 1)
-    from decimal import ROUND_HALF_UP, Context, Decimal
-
-    # binary64 has at most 309 digits before the point.
-    context = Context(prec=320 + decimals, rounding=ROUND_HALF_UP)
-    rounded = Decimal(float(value)).quantize(Decimal(1).scaleb(-decimals), context=context)
-    sign = "-" if rounded < 0 else ""
-    digits = f"{abs(rounded):f}" + ("" if decimals else ".")
-    if len(sign + digits) > width and decimals and digits.startswith("0."):
-        digits = digits[1:]
-    return sign + digits
+    return FortranRecordWriter(text)

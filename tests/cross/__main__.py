@@ -27,6 +27,11 @@ MODERN = [
         for name in ("closed_form", "fixed_step", "gauss", "quick", "prepared", "taylor")
     ),
 ]
+# The rooms that call kernels: what other rooms do with the results is the same in every build.
+CALLING = tuple(
+    f"tests/{room}"
+    for room in ("compare", "fuzz", "methods", "model", "original", "stress", "theory", "truth")
+)
 # Recursion: the entries release the lock, so that two threads may well be in one of them.
 CHECKED = (
     "-fcheck=all,no-recursion", "-finit-real=snan", "-finit-integer=-2147483647",
@@ -54,7 +59,7 @@ class Job:
     faulty : bool
         Whether it is to be caught at its faults, and nothing else.
     tests : tuple of str or None
-        The tests to run; all where empty.
+        The tests to run.
     """
 
     build: Build
@@ -76,7 +81,7 @@ def main() -> int:
         # The longest first.
         ordered = sorted(
             (job for job in jobs if job.build.name in chosen),
-            key=lambda job: job.tests != (),
+            key=lambda job: job.tests != CALLING,
         )
         twin = pool.submit(_twin)
         checks = [
@@ -97,7 +102,7 @@ def _jobs() -> tuple[list[Job], list[str]]:
     jobs = [
         Job(Build("gfortran-O0", gfortran, "gcc", "0"), tests=modern),
         Job(Build("gfortran-O2", gfortran, "gcc", "2"), tests=modern),
-        Job(Build("debug", gfortran, "gcc", "0", CHECKED, checked=True), tests=()),
+        Job(Build("debug", gfortran, "gcc", "0", CHECKED, checked=True), tests=CALLING),
         Job(Build("faulty", gfortran, "gcc", "0", CHECKED, checked=True, plants=faults), True),
     ]
     skipped = []

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -13,7 +14,7 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.cli.main import main
-from pyharness.history.fortran_format import fixed, parse, write
+from pyharness.history.fortran_format import write
 from pyharness.history.printer import formats_of, page
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, original
@@ -141,26 +142,19 @@ def test_overflow_ends_the_page_and_its_last_rows_are_asterisks(capsys: Capture)
     ],
 )
 def test_rounding(value: float, width: int, decimals: int, wanted: str) -> None:
-    assert fixed(value, width, decimals) == wanted
+    assert write(f"(F{width}.{decimals})", [value]) == [wanted.rjust(width)]
 
 
 def test_format_is_read_as_fortran_reads_it() -> None:
     assert write("(1X,3HA,B,1X,2F4.1)", [1, 2]) == [" A,B  1.0 2.0"]
     assert write("(I2,/,I3)", [1, 2, 3]) == [" 1", "  2", " 3", ""]
     assert write("(4HTIME)", []) == ["TIME"]
-    for wrong in ("1X", "(2MU1)", "(5HU1)", "(F10)", "(EX)", "(IX)", "(13"):
-        with pytest.raises(ValueError, match="FORMAT"):
-            parse(wrong)
-    with pytest.raises(ValueError, match="no place"):
-        write("(3X)", [1.0])
-    with pytest.raises(ValueError, match="not whole"):
-        write("(I3)", [1.5])
 
 
 def test_the_character_taken_off_is_always_a_blank() -> None:
     for entry in facts("printer")["program"]:
         for name in ("header", "heads", "rows"):
-            assert parse(entry[name])[0].kind == "X"
+            assert re.match(r"\(\d+X,", entry[name])
             assert all(record[:1] in ("", " ") for record in write(entry[name], []))
 
 

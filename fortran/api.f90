@@ -73,14 +73,15 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   ! Taylor series: omega at times that lead away from 0 on one side.
   !f2py threadsafe
   use levels, only: taylor_solve
+  use problem, only: problem_t
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
   real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
   real(8), intent(in) :: m_rate(3)              ! 1/s3
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
+  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)         ! s
@@ -92,7 +93,8 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
   integer(8), intent(out) :: steps
 
-  call taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+  call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines + n_cosines, sines, &
+                              cosines), &
                     omega0, tolerance, effort(1), n_times, times, rows, n_rows, status, steps, &
                     effort(2))
 end subroutine taylor_rows
@@ -127,14 +129,15 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
                            n_times, times, effort, rows, n_rows, status)
   ! Closed form of a sphere under the torque law of a scene.
   !f2py threadsafe
+  use problem, only: problem_t
   use sphere, only: sphere_rows
   implicit none
   real(8), intent(in) :: m_constant(3)        ! all torque over moment
   real(8), intent(in) :: m_rate(3)
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)    ! amplitude (3), frequency in rad/s
+  real(8), intent(in), target :: sines(4, n_sines)  ! amplitude (3), frequency in rad/s
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)
@@ -144,8 +147,9 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status
 
-  call sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, effort(1), &
-                   n_times, times, rows, n_rows, status, effort(2))
+  call sphere_rows(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines + n_cosines, &
+                             sines, cosines), &
+                   omega0, effort(1), n_times, times, rows, n_rows, status, effort(2))
 end subroutine sphere_solution
 
 subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
@@ -154,14 +158,15 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   ! Gauss collocation in equal steps between the times.
   !f2py threadsafe
   use gauss_collocation, only: gauss_rows
+  use problem, only: problem_t
   implicit none
   real(8), intent(in) :: coefficients(3)
   real(8), intent(in) :: m_constant(3)
   real(8), intent(in) :: m_rate(3)
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)
+  real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)     ! leading away from 0
@@ -175,8 +180,9 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   integer(4), intent(out) :: status
   integer(8), intent(out) :: evaluations
 
-  call gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
-                  n_times, times, stages, step, effort, rows, reached, n_rows, status, &
+  call gauss_rows(problem_t(coefficients, m_constant, m_rate, n_sines + n_cosines, sines, &
+                            cosines), &
+                  omega0, n_times, times, stages, step, effort, rows, reached, n_rows, status, &
                   evaluations)
 end subroutine gauss_solution
 
@@ -186,18 +192,19 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   ! Improved Euler, three-term Taylor, Runge-Kutta: whole steps, the last before a time shorter.
   !f2py threadsafe
   use fixed_step, only: fixed_step_rows
+  use problem, only: problem_t
   implicit none
   real(8), intent(in) :: coefficients(3)
   real(8), intent(in) :: m_constant(3)
   real(8), intent(in) :: m_rate(3)
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)
+  real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)
-  integer(4), intent(in) :: method          ! 1 improved Euler, 2 three-term Taylor, 3 Runge-Kutta
+  integer(4), intent(in) :: method          ! of the module methods
   real(8), intent(in) :: step               ! above 0
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
@@ -207,7 +214,8 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   integer(8), intent(out) :: steps
   integer(8), intent(out) :: evaluations
 
-  call fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+  call fixed_step_rows(problem_t(coefficients, m_constant, m_rate, n_sines + n_cosines, sines, &
+                                 cosines), &
                        omega0, n_times, times, method, step, effort(1), rows, n_rows, status, &
                        steps, evaluations, effort(2))
 end subroutine fixed_step_solution

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.codes import Statuses
 from pyharness.effort import advice
 from pyharness.errors import InputError, NotBuiltError, TimedError
 from pyharness.listing import PROGRAMS, Listing, checked_listing
@@ -13,9 +14,9 @@ from pyharness.scene import Scene, Wave, checked_scene
 from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.values import number, truth
 
-# The status codes of fortran/statuses.f90, and what a user reads.
-COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP, INTERRUPTED = range(6)
-ENDS = ("complete", "stopped", "overflow", "refused", "gave up", "interrupted")
+COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP, INTERRUPTED = Statuses
+# What a user reads.
+ENDS = tuple(each.name.lower().replace("_", " ") for each in Statuses)
 
 
 def extension() -> ModuleType:

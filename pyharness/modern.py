@@ -7,13 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.codes import Methods
 from pyharness.effort import Solver, advice, waves
 from pyharness.errors import InputError, TimedError
 from pyharness.kernels import COMPLETE, GAVE_UP, REFUSED, extension, normalized
 from pyharness.scene import Scene
 from pyharness.trajectory import Array, Trajectory
 
-FIXED_STEP = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
+FIXED_STEP = {
+    "improved-euler": Methods.IMPROVED_EULER,
+    "taylor-3": Methods.TAYLOR_3,
+    "rk4": Methods.RK4,
+}
 
 # Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
 # as much as half of one.

@@ -19,6 +19,7 @@ import numpy as np
 
 from pyharness import kernels
 from pyharness import reference as truth
+from pyharness.codes import Places
 from pyharness.external_file import Problem, problems
 from pyharness.listing import Listing, entries
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
@@ -173,11 +174,11 @@ def _stale_solver() -> AbstractContextManager[Any]:
 
 
 def _refusing_solver(code: int) -> AbstractContextManager[Any]:
-    """Let a prepared solver refuse everything; `code` names its method in `prepared.f90`."""
+    """Let a prepared solver refuse everything; `code` is one of `Methods`."""
 
     def change(packed: Array, answer: _Answer) -> _Answer:
         omega, _, steps = answer
-        return (omega * np.nan, kernels.REFUSED, steps) if packed[0] == code else answer
+        return (omega * np.nan, kernels.REFUSED, steps) if packed[Places.METHOD] == code else answer
 
     return _prepared(change)
 
@@ -212,7 +213,7 @@ def _wrong_steps() -> AbstractContextManager[Any]:
 
     def change(packed: Array, answer: _Answer) -> _Answer:
         omega, *rest = answer
-        return (omega * 1.01, *rest) if packed[0] in steps else answer  # type: ignore[return-value]
+        return (omega * 1.01, *rest) if packed[Places.METHOD] in steps else answer  # type: ignore[return-value]
 
     return _prepared(change)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from pyharness.codes import Methods, Places
 from pyharness.effort import checked_effort
 from pyharness.errors import InputError, unknown
 from pyharness.kernels import ENDS, extension, normalized
@@ -25,20 +26,17 @@ else:
     except ImportError:  # not built, as `extension` says when a solver is made
         BoundKernel = object
 
-# Places in the packed array: see fortran/modern/prepared.f90.
-_EFFORT_AT, _WAVES_AT = 14, 15
 _CODES = {
-    "closed-form": 1,
-    "sphere": 2,
-    "taylor": 3,
-    "improved-euler": 4,
-    "taylor-3": 5,
-    "rk4": 6,
-    "quick": 7,
-    EITHER: 8,
-    **{f"gauss-{stages}": 10 + stages for stages in range(1, 9)},
+    "closed-form": Methods.CLOSED_FORM,
+    "sphere": Methods.SPHERE,
+    "taylor": Methods.TAYLOR,
+    "improved-euler": Methods.IMPROVED_EULER,
+    "taylor-3": Methods.TAYLOR_3,
+    "rk4": Methods.RK4,
+    "quick": Methods.QUICK,
+    EITHER: Methods.QUICK_OR_TAYLOR,
+    **{f"gauss-{stages}": Methods.GAUSS + stages for stages in range(1, 9)},
 }
-_FREE_OR_SERIES = 9
 PREPARED = (
     "auto",
     "closed-form",
@@ -278,18 +276,26 @@ def _code(chosen: Plan, asked: str) -> int:
         if chosen.closed_form == "sphere":
             return _CODES["sphere"]
         # A disturbance too faint to square: then the series, if that is not against the order.
-        return _FREE_OR_SERIES if asked == "auto" else _CODES["closed-form"]
+        return Methods.CLOSED_FORM_OR_TAYLOR if asked == "auto" else _CODES["closed-form"]
     return _CODES[chosen.method]
 
 
 def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
-    # Four places more than the waves need: the kernel names where the cosines would begin.
-    packed = np.zeros(_WAVES_AT + sines.size + cosines.size + 4)
-    packed[0] = code
-    packed[1:5] = tolerance, scene.step_size, sines.shape[1], cosines.shape[1]
-    packed[5:14] = np.concatenate([coefficients, constant, rate])
-    packed[_EFFORT_AT] = effort
-    packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
-    packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
+    waves = np.concatenate([sines, cosines], axis=1).T.ravel()
+    packed = np.zeros(Places.WAVES + waves.size)
+    parts = {
+        Places.METHOD: code,
+        Places.TOLERANCE: tolerance,
+        Places.STEP: scene.step_size,
+        Places.N_SINES: sines.shape[1],
+        Places.N_COSINES: cosines.shape[1],
+        Places.COEFFICIENTS: coefficients,
+        Places.CONSTANT: constant,
+        Places.RATE: rate,
+        Places.EFFORT: effort,
+        Places.WAVES: waves,
+    }
+    for place, values in parts.items():
+        packed[place : place + np.size(values)] = values
     return packed

@@ -4,12 +4,13 @@ import ctypes
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pyharness import kernels
+from pyharness import codes, kernels
 from pyharness.agreement import differences
 from pyharness.listing import PROGRAMS, Listing, corrected, original
 from pyharness.orders import measured_order
@@ -20,7 +21,6 @@ from pyharness.scene_file import case_scene
 FORTRAN = Path(__file__).parent.parent / "fortran"
 SOURCES = (
     "kinds",
-    "statuses",
     "interruption",
     "../tests/never_interrupted",
     "original/listing",
@@ -125,7 +125,9 @@ def test_fault_in_the_fortran_is_caught(name: str, tmp_path: Path) -> None:
 
 
 def _compiled(folder: Path, file: str, old: str, new: str) -> ctypes.CDLL:
-    paths = []
+    paths = ["codes.f90"]
+    maker = [sys.executable, str(FORTRAN / "make_codes.py"), codes.__file__, *paths]
+    subprocess.run(maker, cwd=folder, check=True)
     for source in SOURCES:
         text = (FORTRAN / f"{source}.f90").read_text()
         if source == "api":

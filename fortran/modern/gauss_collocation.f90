@@ -7,6 +7,7 @@ module gauss_collocation
   use kinds, only: dp
   use gauss_tables, only: MOST_STAGES, NODES, WEIGHTS, WEIGHTS_LOW, MATRIX, &
                           MATRIX_LOW, ONWARD
+  use problem, only: problem_t
   use torque_law, only: torque_at
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use two_words, only: two_product, two_sum
@@ -24,17 +25,10 @@ module gauss_collocation
 
 contains
 
-  subroutine gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                        cosines, omega0, n_times, times, stages, step, effort, rows, reached, &
+  subroutine gauss_rows(problem, omega0, n_times, times, stages, step, effort, rows, reached, &
                         n_rows, status, evaluations)
     !! Angular velocity at each of `times`, which lead away from 0.
-    real(dp), intent(in) :: coefficients(3)        !! A, B, C
-    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
-    real(dp), intent(in) :: m_rate(3)              !! 1/s3
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)         !! s
@@ -76,21 +70,21 @@ contains
     status = COMPLETE
     evaluations = 0
     most = int(min(COUNTABLE, effort*MOST_EVALUATIONS), int64)
-    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + real(n_sines, dp) + real(n_cosines, dp)))
+    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + real(problem%waves, dp)))
     next_look = stride
     y = omega0
     carry = 0.0_dp
     f = 0.0_dp
     reached = [0.0_dp, y]
-    varies = n_sines + n_cosines > 0 .or. any(abs(m_rate) > 0.0_dp)
+    varies = problem%waves > 0 .or. any(abs(problem%rate) > 0.0_dp)
     do k = 1, MOST_STAGES
-      m(k, :) = m_constant
+      m(k, :) = problem%constant
     end do
     begin = 0.0_dp
     do i = 1, n_times
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
       ! Two iterations a step at the least; a wave costs as much as one.
-      cost = n_steps*real(stages, dp)*(2.0_dp + real(n_sines, dp) + real(n_cosines, dp))
+      cost = n_steps*real(stages, dp)*(2.0_dp + real(problem%waves, dp))
       if (.not. cost <= real(most - evaluations, dp)) then
         status = GAVE_UP
         return
@@ -109,12 +103,11 @@ contains
             call two_sum(begin, walked, time, time_low)
             time_low = time_low + (walked_low + done*h_low)
             call two_sum(time, NODES(k, stages)*h, node, node_low)
-            call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, node, &
-                           node_low + time_low, at_node)
+            call torque_at(problem, node, node_low + time_low, at_node)
             m(k, :) = at_node
           end do
         end if
-        call advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
+        call advance(problem%coefficients, m, h, stages, most, y, carry, f, status, evaluations)
         if (status /= COMPLETE) return
         done = done + 1.0_dp
         reached = [begin + done*h, y]
@@ -153,11 +146,7 @@ contains
     real(dp) :: change
     real(dp) :: change_before
     real(dp) :: scale
-    real(dp) :: increment
-    real(dp) :: total
-    real(dp) :: part
-    real(dp) :: back
-    real(dp) :: rest
+    real(dp) :: increment, total, part, back, rest
     integer :: axis
     integer :: iteration
     integer :: k

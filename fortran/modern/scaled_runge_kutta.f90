@@ -1,10 +1,11 @@
 module scaled_runge_kutta
   !! Classical Runge-Kutta (eq. 31) for few digits: unknowns scaled so that a slope is one fused
   !! multiply-add, waves of the torque integrated exactly, equal steps of three lengths at once.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use problem, only: problem_t
   use scaled_motion, only: average, integral, MOST_WAVES, motion_t, reach_of, scaled, &
                            steps_for_waves, turned, versine
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
@@ -42,17 +43,11 @@ module scaled_runge_kutta
 
 contains
 
-  subroutine quick_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         omega, tolerance, effort, t_end, contest, result, status, steps) &
+  subroutine quick_solve(problem_at, omega, tolerance, effort, t_end, contest, result, status, &
+                         steps) &
     bind(c, name="quick_solve_level")
     !! Angular velocity at `t_end`.
-    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
-    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
-    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
-    integer(c_int), intent(in), value :: n_sines
-    real(c_double), intent(in) :: sines(4, n_sines)     !! amplitude (3), 1/s2; frequency, rad/s
-    integer(c_int), intent(in), value :: n_cosines
-    real(c_double), intent(in) :: cosines(4, n_cosines) !! the same
+    type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! relative
     real(c_double), intent(in) :: effort                !! factor on the steps allowed
@@ -61,6 +56,7 @@ contains
     real(c_double), intent(out) :: result(3)            !! rad/s
     integer(c_int), intent(out) :: status               !! any but STOPPED
     integer(c_int), intent(out) :: steps                !! of the last try
+    type(problem_t), pointer :: problem
     type(motion_t) :: motion
     logical :: varies
     real(dp) :: start(3)
@@ -90,9 +86,9 @@ contains
     status = REFUSED
     steps = 0
     result = omega
-    if (n_sines + n_cosines > MOST_WAVES) return
-    call scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                t_end, motion, status)
+    call c_f_pointer(problem_at, problem)
+    if (problem%waves > MOST_WAVES) return
+    call scaled(problem, t_end, motion, status)
     if (status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale
     rate_0 = max(abs(start(1)), abs(start(2)), abs(start(3)))

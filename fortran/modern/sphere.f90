@@ -2,6 +2,7 @@ module sphere
   !! Closed form of the sphere under the torque law of a scene: the integral of the torque.
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use two_words, only: sine_cosine, two_product, two_sum
   implicit none(type, external)
@@ -16,16 +17,10 @@ module sphere
 
 contains
 
-  subroutine sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, effort, &
-                         n_times, times, rows, n_rows, status, needed)
+  subroutine sphere_rows(problem, omega0, effort, n_times, times, rows, n_rows, status, needed)
     !! Angular velocity of a sphere, or of any body with A = B = C = 0: omega0 and the integral
     !! of the torque over the moment.
-    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
-    real(dp), intent(in) :: m_rate(3)              !! 1/s3
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    type(problem_t), intent(in) :: problem         !! whose coefficients are not looked at
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
     real(dp), intent(in) :: effort                 !! factor on the terms allowed
     integer, intent(in) :: n_times
@@ -46,12 +41,12 @@ contains
 
     n_rows = 0
     status = GAVE_UP
-    needed = n_times*(1.0_dp + real(n_sines, dp) + real(n_cosines, dp))/MOST_TERMS
+    needed = n_times*(1.0_dp + real(problem%waves, dp))/MOST_TERMS
     if (needed > effort) return
     status = COMPLETE
     unseen = 0.0_dp
     do i = 1, n_times
-      unseen = unseen + (1.0_dp + real(n_sines, dp) + real(n_cosines, dp))
+      unseen = unseen + (1.0_dp + real(problem%waves, dp))
       if (unseen > BETWEEN_LOOKS) then
         unseen = 0.0_dp
         if (interrupt_raised() /= 0) then
@@ -62,15 +57,15 @@ contains
       t = times(i)
       total = omega0
       rest = 0.0_dp
-      call add(total, rest, m_constant, t)
-      call add(total, rest, m_rate, 0.5_dp*t*t)
-      do k = 1, n_sines
-        call half_angle(sines(4, k), t, sine, cosine, quotient)
-        call add_wave(total, rest, sines(1:3, k), t, sine*quotient)
+      call add(total, rest, problem%constant, t)
+      call add(total, rest, problem%rate, 0.5_dp*t*t)
+      do k = 1, size(problem%sines, 2)
+        call half_angle(problem%sines(4, k), t, sine, cosine, quotient)
+        call add_wave(total, rest, problem%sines(1:3, k), t, sine*quotient)
       end do
-      do k = 1, n_cosines
-        call half_angle(cosines(4, k), t, sine, cosine, quotient)
-        call add_wave(total, rest, cosines(1:3, k), t, cosine*quotient)
+      do k = 1, size(problem%cosines, 2)
+        call half_angle(problem%cosines(4, k), t, sine, cosine, quotient)
+        call add_wave(total, rest, problem%cosines(1:3, k), t, cosine*quotient)
       end do
       total = total + rest
       if (.not. all(abs(total) <= huge(t))) then
@@ -104,10 +99,7 @@ contains
     real(dp), intent(inout) :: rest(3)
     real(dp), intent(in) :: amplitude(3)
     real(dp), intent(in) :: factor
-    real(dp) :: term
-    real(dp) :: term_low
-    real(dp) :: sum_high
-    real(dp) :: sum_low
+    real(dp) :: term, term_low, sum_high, sum_low
     integer :: axis
 
     do axis = 1, 3
@@ -126,8 +118,7 @@ contains
     real(dp), intent(out) :: sine
     real(dp), intent(out) :: cosine
     real(dp), intent(out) :: quotient
-    real(dp) :: angle
-    real(dp) :: angle_low
+    real(dp) :: angle, angle_low
 
     call two_product(frequency, 0.5_dp*t, angle, angle_low)
     call sine_cosine(angle, angle_low, sine, cosine)

@@ -1,11 +1,12 @@
 module taylor
   !! Taylor series by recurrence, order and step adapted; unroll.py writes out the marked loops.
   !! Terms are held with the power of the step in them, so a step ends with a plain sum.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use euler_equations, only: INVERSE, MOST_ORDER, torque_t, torque_terms
+  use euler_equations, only: INVERSE, MOST_ORDER, torque_terms
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_plan, only: plan
   implicit none(type, external)
@@ -47,18 +48,11 @@ module taylor
 
 contains
 
-  subroutine taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                          omega, tolerance, effort, n_times, times, rows, n_rows, status, &
-                          steps, needed) &
+  subroutine taylor_solve(problem_at, omega, tolerance, effort, n_times, times, rows, n_rows, &
+                          status, steps, needed) &
     bind(c, name="taylor_solve_level")
     !! Solution at `times`, which lead away from 0 on one side.
-    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
-    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
-    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
-    integer(c_int), intent(in), value :: n_sines
-    real(c_double), intent(in), target :: sines(4, n_sines)     !! amplitude (3), frequency in rad/s
-    integer(c_int), intent(in), value :: n_cosines
-    real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
+    type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
     real(c_double), intent(in) :: effort                !! factor on the steps allowed
@@ -69,6 +63,7 @@ contains
     integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted
     integer(c_int64_t), intent(out) :: steps            !! of the last march
     real(c_double), intent(out) :: needed               !! effort, as far as known; where it gave up
+    type(problem_t), pointer :: problem
     real(dp) :: growth  ! of a small difference on the way
     real(dp) :: known   ! the same, as far as it was reckoned with
     real(dp) :: cost    ! of a step, in steps without waves
@@ -76,14 +71,14 @@ contains
     real(dp) :: spent   ! steps of the marches before
     real(dp) :: ahead   ! steps that this march would need
 
+    call c_f_pointer(problem_at, problem)
     known = PLANNED
-    cost = 1.0_dp + A_WAVE*(real(n_sines, dp) + real(n_cosines, dp))
+    cost = 1.0_dp + A_WAVE*real(problem%waves, dp)
     most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
     spent = 0.0_dp
     needed = 0.0_dp
     do
-      call march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, &
-                 tolerance*(PLANNED/known), most - spent, &
+      call march(problem, omega, tolerance*(PLANNED/known), most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, c_int64_t), n_times, times, rows, n_rows, &
                  status, steps, growth, ahead)
       if (status == GAVE_UP) then
@@ -99,17 +94,10 @@ contains
     end do
   end subroutine taylor_solve
 
-  subroutine march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                   omega, tolerance, most_steps, stride, n_times, times, rows, n_rows, status, &
-                   steps, growth, ahead)
+  subroutine march(problem, omega, tolerance, most_steps, stride, n_times, times, rows, n_rows, &
+                   status, steps, growth, ahead)
     !! Once from 0 to the last of the times.
-    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
-    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
-    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
-    integer(c_int), intent(in), value :: n_sines
-    real(c_double), intent(in), target :: sines(4, n_sines)     !! amplitude (3), frequency in rad/s
-    integer(c_int), intent(in), value :: n_cosines
-    real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
+    type(problem_t), intent(in) :: problem
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
     real(dp), intent(in) :: most_steps
@@ -123,7 +111,6 @@ contains
     real(dp), intent(out) :: growth !! of a small difference; looked at where the torque varies
     real(dp), intent(out) :: ahead  !! steps to the end, as far as known; where it gave up
     type(series_t) :: s
-    type(torque_t) :: torque
     real(dp) :: w(3)          ! omega at the step's beginning, rad/s
     real(dp) :: w_low(3)      ! what its rounding left out
     real(dp) :: change(3)     ! of omega in the step
@@ -173,19 +160,13 @@ contains
       n_rows = 1
       return
     end if
-    torque%constant = m_constant
-    torque%rate = m_rate
-    torque%n_sines = n_sines
-    torque%n_cosines = n_cosines
-    torque%sines => sines
-    torque%cosines => cosines
-    varies = n_sines + n_cosines > 0 .or. any(m_rate /= 0.0_dp)
+    varies = problem%waves > 0 .or. any(problem%rate /= 0.0_dp)
     least_difference = merge(1.0_dp, huge(size), varies)
-    roots(1) = sqrt(abs(coefficients(2)*coefficients(3)))
-    roots(2) = sqrt(abs(coefficients(1)*coefficients(3)))
-    roots(3) = sqrt(abs(coefficients(1)*coefficients(2)))
+    roots(1) = sqrt(abs(problem%coefficients(2)*problem%coefficients(3)))
+    roots(2) = sqrt(abs(problem%coefficients(1)*problem%coefficients(3)))
+    roots(3) = sqrt(abs(problem%coefficients(1)*problem%coefficients(2)))
     scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
-    call plan(coefficients, torque, varies, scale, tolerance, rest, best, most, share, h)
+    call plan(problem, varies, scale, tolerance, rest, best, most, share, h)
     best_share = 65536/best
     s%left(4, :) = 0.0_dp
     s%right(4, :) = 0.0_dp
@@ -207,16 +188,16 @@ contains
       s%left(:, 0) = [w(2), w(1), w(1), 0.0_dp]
       s%right(:, 0) = [w(3), w(3), w(2), 0.0_dp]
       if (varies) then
-        s%k1(1) = coefficients(1)*h
-        s%k2(1) = coefficients(2)*h
-        s%k3(1) = coefficients(3)*h
-        call torque_terms(torque, t, t_low, h, most, s%m)
+        s%k1(1) = problem%coefficients(1)*h
+        s%k2(1) = problem%coefficients(2)*h
+        s%k3(1) = problem%coefficients(3)*h
+        call torque_terms(problem, t, t_low, h, most, s%m)
         call expand_varying(s, least, most, SLACK*allowed)
       else
-        s%k1 = (coefficients(1)*h)*INVERSE
-        s%k2 = (coefficients(2)*h)*INVERSE
-        s%k3 = (coefficients(3)*h)*INVERSE
-        s%m(:, 1) = h*m_constant
+        s%k1 = (problem%coefficients(1)*h)*INVERSE
+        s%k2 = (problem%coefficients(2)*h)*INVERSE
+        s%k3 = (problem%coefficients(3)*h)*INVERSE
+        s%m(:, 1) = h*problem%constant
         call expand_constant(s, least, most, SLACK*allowed)
       end if
       if (steps == 0) then
@@ -236,7 +217,7 @@ contains
             return
           end if
           h = h*0.0625_dp
-          if (n_sines + n_cosines > MANY_WAVES) then
+          if (problem%waves > MANY_WAVES) then
             if (interrupt_raised() /= 0) then
               status = INTERRUPTED
               return
@@ -277,7 +258,7 @@ contains
       back = total - w
       w_low = (w - (total - back)) + (change - back)
       if (varies) then
-        call carry(coefficients, (0.25_dp*h)*(w + total), difference)
+        call carry(problem%coefficients, (0.25_dp*h)*(w + total), difference)
         size = max(abs(difference(1)), abs(difference(2)), abs(difference(3)))
       else
         ! Its own change is a small difference too, and known; over what grows with the torque.
@@ -444,9 +425,7 @@ contains
     real(dp), intent(inout) :: t     !! s
     real(dp), intent(inout) :: t_low !! s
     real(dp), intent(in) :: h        !! s
-    real(dp) :: step
-    real(dp) :: total
-    real(dp) :: back
+    real(dp) :: step, total, back
 
     step = h + t_low
     total = t + step
@@ -474,9 +453,7 @@ contains
     integer, intent(in) :: most      !! order
     real(dp), intent(in) :: allowed  !! rad/s
     ! unroll: m 28
-    real(dp) :: x
-    real(dp) :: y
-    real(dp) :: z
+    real(dp) :: x, y, z
     integer :: i
     integer :: k
 

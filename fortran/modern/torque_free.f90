@@ -95,18 +95,11 @@ contains
     real(dp) :: a(3)         ! coefficients along the axes of the orbit
     real(dp) :: w(3)         ! angular velocity along them
     real(dp) :: s(3)         ! |a|
-    real(dp) :: y(3)         ! squares of w
-    real(dp) :: y_low(3)
-    real(dp) :: left         ! parts of sums, with their low words
-    real(dp) :: left_low
-    real(dp) :: right
-    real(dp) :: right_low
-    real(dp) :: gap          ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
-    real(dp) :: gap_low
-    real(dp) :: modulus      ! square of the larger start of the mean
-    real(dp) :: modulus_low
-    real(dp) :: comodulus    ! square of the smaller one
-    real(dp) :: comodulus_low
+    real(dp) :: y(3), y_low(3) ! squares of w
+    real(dp) :: left, left_low, right, right_low ! parts of sums
+    real(dp) :: gap, gap_low ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
+    real(dp) :: modulus, modulus_low     ! square of the larger start of the mean
+    real(dp) :: comodulus, comodulus_low ! square of the smaller one
     real(dp) :: largest
     integer :: i
     integer :: j
@@ -156,9 +149,7 @@ contains
     left_low = gap_low + (left_low - right_low)
     call two_sum(left, left_low, gap, gap_low)
     if (gap < 0.0_dp) then
-      i = orbit%axes(1)
-      orbit%axes(1) = orbit%axes(3)
-      orbit%axes(3) = i
+      orbit%axes = [orbit%axes(3), orbit%axes(2), orbit%axes(1)]
       a = [a(3), a(2), a(1)]
       w = [w(3), w(2), w(1)]
       s = [s(3), s(2), s(1)]
@@ -212,17 +203,9 @@ contains
     real(dp), intent(in) :: b0
     real(dp), intent(in) :: b0_low
     type(orbit_t), intent(inout) :: orbit
-    real(dp) :: a
-    real(dp) :: a_low
-    real(dp) :: b
-    real(dp) :: b_low
-    real(dp) :: half_difference
-    real(dp) :: total
-    real(dp) :: mean
-    real(dp) :: product
-    real(dp) :: product_low
-    real(dp) :: square
-    real(dp) :: square_low
+    real(dp) :: a, a_low, b, b_low
+    real(dp) :: half_difference, total, mean
+    real(dp) :: product, product_low, square, square_low
     integer :: n
 
     a = a0
@@ -261,12 +244,9 @@ contains
     real(dp), intent(out) :: omega(3)
     integer, intent(out) :: status
     real(dp) :: t              ! in the orbit's unit
-    real(dp) :: phase
-    real(dp) :: phase_low
-    real(dp) :: sine
-    real(dp) :: cosine
-    real(dp) :: s2             ! sine**2
-    real(dp) :: c2             ! cosine**2
+    real(dp) :: phase, phase_low
+    real(dp) :: sine, cosine
+    real(dp) :: s2, c2         ! their squares
     real(dp) :: dn             ! of this level
     real(dp) :: dn_below       ! of the next one
     real(dp) :: inverse

@@ -18,8 +18,7 @@ contains
     real(dp), intent(in) :: angle_low
     real(dp), intent(out) :: sine
     real(dp), intent(out) :: cosine
-    real(dp) :: s
-    real(dp) :: c
+    real(dp) :: s, c
 
     s = sin(angle)
     c = cos(angle)
@@ -38,8 +37,7 @@ contains
     real(dp), intent(in) :: x_low
     real(dp), intent(out) :: root
     real(dp), intent(out) :: root_low
-    real(dp) :: square
-    real(dp) :: square_low
+    real(dp) :: square, square_low
 
     root = sqrt(x)
     call two_product(root, root, square, square_low)
@@ -64,8 +62,7 @@ contains
     real(dp), intent(in) :: y
     real(dp), intent(out) :: total
     real(dp), intent(out) :: rest
-    real(dp) :: s
-    real(dp) :: part
+    real(dp) :: s, part
 
     s = x + y
     part = s - x
@@ -79,11 +76,7 @@ contains
     real(dp), intent(in) :: y
     real(dp), intent(out) :: product
     real(dp), intent(out) :: rest
-    real(dp) :: xh
-    real(dp) :: xl
-    real(dp) :: yh
-    real(dp) :: yl
-    real(dp) :: p
+    real(dp) :: xh, xl, yh, yl, p
 
     xh = transfer(iand(transfer(x, UPPER_BITS), UPPER_BITS), x)
     yh = transfer(iand(transfer(y, UPPER_BITS), UPPER_BITS), y)

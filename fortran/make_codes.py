@@ -1,0 +1,32 @@
+"""Write the numbers that Python and the kernels share as Fortran modules, one for each class."""
+
+import runpy
+import sys
+from collections.abc import Iterator
+from enum import IntEnum
+from pathlib import Path
+
+
+def modules(source: str) -> str:
+    """Return the text of the modules for the classes of pyharness/codes.py."""
+    classes = [each for each in runpy.run_path(source).values() if _is_ours(each)]
+    return "\n".join(line for each in classes for line in _module(each)) + "\n"
+
+
+def _is_ours(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, IntEnum) and bool(found.__members__)
+
+
+def _module(codes: type[IntEnum]) -> Iterator[str]:
+    name = codes.__name__.lower()
+    yield f"module {name}"
+    yield "  !! Written by fortran/make_codes.py; pyharness/codes.py says what is what."
+    yield "  implicit none(type, external)"
+    yield "  private"
+    for each in codes:
+        yield f"  integer, parameter, public :: {each.name} = {each.value}"
+    yield f"end module {name}"
+
+
+if __name__ == "__main__":
+    Path(sys.argv[2]).write_text(modules(sys.argv[1]))

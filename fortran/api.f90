@@ -93,7 +93,7 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
   integer(8), intent(out) :: steps
 
-  call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines + n_cosines, sines, &
+  call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                               cosines), &
                     omega0, tolerance, effort(1), n_times, times, rows, n_rows, status, steps, &
                     effort(2))
@@ -147,7 +147,7 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status
 
-  call sphere_rows(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines + n_cosines, &
+  call sphere_rows(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines, n_cosines, &
                              sines, cosines), &
                    omega0, effort(1), n_times, times, rows, n_rows, status, effort(2))
 end subroutine sphere_solution
@@ -180,7 +180,7 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   integer(4), intent(out) :: status
   integer(8), intent(out) :: evaluations
 
-  call gauss_rows(problem_t(coefficients, m_constant, m_rate, n_sines + n_cosines, sines, &
+  call gauss_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                             cosines), &
                   omega0, n_times, times, stages, step, effort, rows, reached, n_rows, status, &
                   evaluations)
@@ -214,7 +214,7 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   integer(8), intent(out) :: steps
   integer(8), intent(out) :: evaluations
 
-  call fixed_step_rows(problem_t(coefficients, m_constant, m_rate, n_sines + n_cosines, sines, &
+  call fixed_step_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                                  cosines), &
                        omega0, n_times, times, method, step, effort(1), rows, n_rows, status, &
                        steps, evaluations, effort(2))

@@ -36,7 +36,7 @@ contains
 
     shared = 0
     waves = 0
-    do n = 1, min(size(problem%sines, 2), size(problem%cosines, 2))
+    do n = 1, min(problem%n_sines, problem%n_cosines)
       if (problem%sines(4, n) /= problem%cosines(4, n)) exit
       call sine_cosine(problem%sines(4, n), t, t_low, sine, cosine)
       do k = 1, 3
@@ -46,7 +46,7 @@ contains
       call add_wave(problem%sines(4, n)*h, even, odd, most, waves, m)
       shared = n
     end do
-    do n = shared + 1, size(problem%sines, 2)
+    do n = shared + 1, problem%n_sines
       call sine_cosine(problem%sines(4, n), t, t_low, sine, cosine)
       do k = 1, 3
         even(k) = (h*sine)*problem%sines(k, n)
@@ -54,7 +54,7 @@ contains
       end do
       call add_wave(problem%sines(4, n)*h, even, odd, most, waves, m)
     end do
-    do n = shared + 1, size(problem%cosines, 2)
+    do n = shared + 1, problem%n_cosines
       call sine_cosine(problem%cosines(4, n), t, t_low, sine, cosine)
       do k = 1, 3
         even(k) = (h*cosine)*problem%cosines(k, n)

@@ -53,7 +53,7 @@ contains
     n_rows = 0
     status = GAVE_UP
     ! A torque that varies costs as much as the step, a wave twice that.
-    cost = 1.0_dp + 2.0_dp*real(problem%waves, dp) &
+    cost = 1.0_dp + 2.0_dp*real(problem%n_sines + problem%n_cosines, dp) &
            + merge(1.0_dp, 0.0_dp, any(abs(problem%rate) > 0.0_dp))
     steps = 0
     evaluations = 0
@@ -134,7 +134,7 @@ contains
     logical :: varies
     integer(int64) :: n
 
-    varies = problem%waves > 0 .or. any(abs(problem%rate) > 0.0_dp)
+    varies = problem%n_sines + problem%n_cosines > 0 .or. any(abs(problem%rate) > 0.0_dp)
     if (method == RK4 .and. .not. varies) then
       call runge_kutta_constant(problem, h, last - first, y)
       return

@@ -48,6 +48,7 @@ contains
     real(dp) :: begin
     real(dp) :: h
     real(dp) :: h_low                ! what the rounding of the step left out, s
+    real(dp) :: waves
     real(dp) :: n_steps
     real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
@@ -70,13 +71,14 @@ contains
     status = COMPLETE
     evaluations = 0
     most = int(min(COUNTABLE, effort*MOST_EVALUATIONS), int64)
-    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + real(problem%waves, dp)))
+    waves = real(problem%n_sines + problem%n_cosines, dp)
+    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + waves))
     next_look = stride
     y = omega0
     carry = 0.0_dp
     f = 0.0_dp
     reached = [0.0_dp, y]
-    varies = problem%waves > 0 .or. any(abs(problem%rate) > 0.0_dp)
+    varies = waves > 0.0_dp .or. any(abs(problem%rate) > 0.0_dp)
     do k = 1, MOST_STAGES
       m(k, :) = problem%constant
     end do
@@ -84,7 +86,7 @@ contains
     do i = 1, n_times
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
       ! Two iterations a step at the least; a wave costs as much as one.
-      cost = n_steps*real(stages, dp)*(2.0_dp + real(problem%waves, dp))
+      cost = n_steps*real(stages, dp)*(2.0_dp + waves)
       if (.not. cost <= real(most - evaluations, dp)) then
         status = GAVE_UP
         return

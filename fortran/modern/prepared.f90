@@ -13,7 +13,7 @@ module prepared
   use problem, only: problem_t
   use sphere, only: sphere_rows
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED
-  use torque_free, only: torque_free_end
+  use torque_free, only: torque_free_rows
   implicit none(type, external)
   private
 
@@ -65,6 +65,7 @@ contains
     real(dp) :: share      ! of its amplitude that a wave comes to
     real(dp) :: time       ! in the new units
     integer :: power       ! omega is 2**power times what it is in the new units
+    integer :: code
     integer :: i
 
     reach = largest
@@ -85,7 +86,10 @@ contains
     time = scale(t_end, power)
     copy = packed
     ! Where the step plays no part it may be no number in the new unit.
-    if (in_steps(int(packed(METHOD)))) copy(STEP) = scale(packed(STEP), power)
+    code = int(packed(METHOD))
+    if (code > GAUSS .or. (code >= IMPROVED_EULER .and. code <= RK4)) then
+      copy(STEP) = scale(packed(STEP), power)
+    end if
     do i = 0, 2
       copy(CONSTANT + i) = scale(scale(packed(CONSTANT + i), -power), -power)
       copy(RATE + i) = scale(scale(scale(packed(RATE + i), -power), -power), -power)
@@ -125,7 +129,6 @@ contains
     integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
     type(problem_t) :: problem
     real(dp) :: times(1)
-    real(dp) :: rows(3, 1)
     real(dp) :: reached(4)
     real(dp) :: tolerance_left
     integer :: code
@@ -135,21 +138,22 @@ contains
     real(dp) :: needed
 
     code = int(packed(METHOD))
-    call unpack(packed, n_packed, problem)
     times(1) = t_end
     count = 0
     select case (code)
     case (CLOSED_FORM, CLOSED_FORM_OR_TAYLOR)
-      call torque_free_end(problem%coefficients, omega0, t_end, omega, ended)
+      call torque_free_rows(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, 1, times, omega, &
+                            n_rows, ended)
       if (ended == REFUSED .and. code == CLOSED_FORM_OR_TAYLOR) then
-        call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, rows, &
+        call unpack(packed, n_packed, problem)
+        call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
                           n_rows, ended, count, needed)
-        omega = rows(:, 1)
       end if
     case (SPHERE)
-      call sphere_rows(problem, omega0, packed(EFFORT), 1, times, rows, n_rows, ended, needed)
-      omega = rows(:, 1)
+      call unpack(packed, n_packed, problem)
+      call sphere_rows(problem, omega0, packed(EFFORT), 1, times, omega, n_rows, ended, needed)
     case (TAYLOR, QUICK, QUICK_OR_TAYLOR)
+      call unpack(packed, n_packed, problem)
       ended = REFUSED
       tolerance_left = packed(TOLERANCE)
       if (code /= TAYLOR) then
@@ -159,18 +163,17 @@ contains
         count = quick_steps
       end if
       if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
-        call taylor_solve(problem, omega0, tolerance_left, packed(EFFORT), 1, times, rows, n_rows, &
-                          ended, count, needed)
-        omega = rows(:, 1)
+        call taylor_solve(problem, omega0, tolerance_left, packed(EFFORT), 1, times, omega, &
+                          n_rows, ended, count, needed)
       end if
     case (IMPROVED_EULER:RK4)
-      call fixed_step_rows(problem, omega0, 1, times, code, packed(STEP), packed(EFFORT), rows, &
+      call unpack(packed, n_packed, problem)
+      call fixed_step_rows(problem, omega0, 1, times, code, packed(STEP), packed(EFFORT), omega, &
                            n_rows, ended, count, evaluations, needed)
-      omega = rows(:, 1)
     case default
-      call gauss_rows(problem, omega0, 1, times, code - GAUSS, packed(STEP), packed(EFFORT), rows, &
-                      reached, n_rows, ended, count)
-      omega = rows(:, 1)
+      call unpack(packed, n_packed, problem)
+      call gauss_rows(problem, omega0, 1, times, code - GAUSS, packed(STEP), packed(EFFORT), &
+                      omega, reached, n_rows, ended, count)
     end select
     ! A start that is not finite may come back as it is, at time 0 for one.
     if (ended == COMPLETE) then
@@ -183,26 +186,19 @@ contains
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     type(problem_t), intent(out) :: problem
-    integer :: sines
-    integer :: cosines
     integer :: middle
 
-    sines = int(packed(N_SINES))
-    cosines = int(packed(N_COSINES))
-    middle = WAVES + 4*sines
     problem%coefficients = packed(COEFFICIENTS:COEFFICIENTS + 2)
     problem%constant = packed(CONSTANT:CONSTANT + 2)
     problem%rate = packed(RATE:RATE + 2)
-    problem%waves = sines + cosines
-    problem%sines(1:4, 1:sines) => packed(WAVES:middle - 1)
-    problem%cosines(1:4, 1:cosines) => packed(middle:middle + 4*cosines - 1)
+    problem%n_sines = int(packed(N_SINES))
+    problem%n_cosines = int(packed(N_COSINES))
+    ! To point at nothing would cost time.
+    if (problem%n_sines + problem%n_cosines > 0) then
+      middle = WAVES + 4*problem%n_sines
+      problem%sines(1:4, 1:problem%n_sines) => packed(WAVES:middle - 1)
+      problem%cosines(1:4, 1:problem%n_cosines) => packed(middle:middle + 4*problem%n_cosines - 1)
+    end if
   end subroutine unpack
-
-  pure logical function in_steps(code)
-    !! Whether a method goes in steps that are given.
-    integer, intent(in) :: code
-
-    in_steps = code > GAUSS .or. (code >= IMPROVED_EULER .and. code <= RK4)
-  end function in_steps
 
 end module prepared

@@ -1,7 +1,6 @@
 module problem
   !! What a modern method solves, divided by the moments:
   !! omega' = M(t) + (A w2 w3, B w1 w3, C w1 w2), M(t) = constant + rate t + sines + cosines.
-  !! A type and no code: it is compiled for every instruction set, and linked from any.
   use kinds, only: dp
   implicit none(type, external)
   private
@@ -10,7 +9,9 @@ module problem
     real(dp) :: coefficients(3)                    !! A, B, C
     real(dp) :: constant(3)                        !! 1/s2
     real(dp) :: rate(3)                            !! 1/s3
-    integer :: waves                               !! sines and cosines
+    integer :: n_sines
+    integer :: n_cosines
+    ! Pointing somewhere only where there is a wave.
     real(dp), pointer, contiguous :: sines(:, :)   !! amplitude (3) in 1/s2, frequency in rad/s
     real(dp), pointer, contiguous :: cosines(:, :) !! the same
   end type problem_t

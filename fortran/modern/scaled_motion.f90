@@ -64,10 +64,10 @@ contains
     motion%climb = problem%rate(motion%axes)/motion%scale
     motion%waves = 0
     motion%resolved = 0
-    do i = 1, size(problem%sines, 2)
+    do i = 1, problem%n_sines
       call add_wave(problem%sines(:, i), .false., t_end, motion)
     end do
-    do i = 1, size(problem%cosines, 2)
+    do i = 1, problem%n_cosines
       call add_wave(problem%cosines(:, i), .true., t_end, motion)
     end do
     status = COMPLETE

@@ -87,7 +87,7 @@ contains
     steps = 0
     result = omega
     call c_f_pointer(problem_at, problem)
-    if (problem%waves > MOST_WAVES) return
+    if (problem%n_sines + problem%n_cosines > MOST_WAVES) return
     call scaled(problem, t_end, motion, status)
     if (status /= COMPLETE) return
     start = omega(motion%axes)/motion%scale

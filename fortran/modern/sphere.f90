@@ -41,12 +41,12 @@ contains
 
     n_rows = 0
     status = GAVE_UP
-    needed = n_times*(1.0_dp + real(problem%waves, dp))/MOST_TERMS
+    needed = n_times*(1.0_dp + real(problem%n_sines + problem%n_cosines, dp))/MOST_TERMS
     if (needed > effort) return
     status = COMPLETE
     unseen = 0.0_dp
     do i = 1, n_times
-      unseen = unseen + (1.0_dp + real(problem%waves, dp))
+      unseen = unseen + (1.0_dp + real(problem%n_sines + problem%n_cosines, dp))
       if (unseen > BETWEEN_LOOKS) then
         unseen = 0.0_dp
         if (interrupt_raised() /= 0) then
@@ -59,14 +59,10 @@ contains
       rest = 0.0_dp
       call add(total, rest, problem%constant, t)
       call add(total, rest, problem%rate, 0.5_dp*t*t)
-      do k = 1, size(problem%sines, 2)
-        call half_angle(problem%sines(4, k), t, sine, cosine, quotient)
-        call add_wave(total, rest, problem%sines(1:3, k), t, sine*quotient)
-      end do
-      do k = 1, size(problem%cosines, 2)
-        call half_angle(problem%cosines(4, k), t, sine, cosine, quotient)
-        call add_wave(total, rest, problem%cosines(1:3, k), t, cosine*quotient)
-      end do
+      if (problem%n_sines + problem%n_cosines > 0) then
+        call add_waves(total, rest, problem%n_sines, problem%sines, .true., t)
+        call add_waves(total, rest, problem%n_cosines, problem%cosines, .false., t)
+      end if
       total = total + rest
       if (.not. all(abs(total) <= huge(t))) then
         status = OVERFLOW
@@ -77,21 +73,30 @@ contains
     end do
   end subroutine sphere_rows
 
-  pure subroutine add_wave(total, rest, amplitude, t, part)
-    !! Add amplitude times t times part; where the factors alone would leave the range of numbers,
-    !! in another order.
+  pure subroutine add_waves(total, rest, n, waves, are_sines, t)
+    !! Add the integral of each wave: amplitude times t times a part.
     real(dp), intent(inout) :: total(3)
     real(dp), intent(inout) :: rest(3)
-    real(dp), intent(in) :: amplitude(3)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: waves(4, n)
+    logical, intent(in) :: are_sines
     real(dp), intent(in) :: t
-    real(dp), intent(in) :: part
+    real(dp) :: sine, cosine   ! of half the angle
+    real(dp) :: quotient       ! sine over half the angle
+    real(dp) :: part
+    integer :: k
 
-    if (abs(t*part) >= SMALL) then
-      call add(total, rest, amplitude, t*part)
-    else
-      call add(total, rest, amplitude*t, part)
-    end if
-  end subroutine add_wave
+    do k = 1, n
+      call half_angle(waves(4, k), t, sine, cosine, quotient)
+      part = merge(sine, cosine, are_sines)*quotient
+      ! Where the factors alone would leave the range of numbers, in another order.
+      if (abs(t*part) >= SMALL) then
+        call add(total, rest, waves(1:3, k), t*part)
+      else
+        call add(total, rest, waves(1:3, k)*t, part)
+      end if
+    end do
+  end subroutine add_waves
 
   pure subroutine add(total, rest, amplitude, factor)
     !! Add amplitude times factor to total + rest.

@@ -73,7 +73,7 @@ contains
 
     call c_f_pointer(problem_at, problem)
     known = PLANNED
-    cost = 1.0_dp + A_WAVE*real(problem%waves, dp)
+    cost = 1.0_dp + A_WAVE*real(problem%n_sines + problem%n_cosines, dp)
     most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
     spent = 0.0_dp
     needed = 0.0_dp
@@ -160,7 +160,7 @@ contains
       n_rows = 1
       return
     end if
-    varies = problem%waves > 0 .or. any(problem%rate /= 0.0_dp)
+    varies = problem%n_sines + problem%n_cosines > 0 .or. any(problem%rate /= 0.0_dp)
     least_difference = merge(1.0_dp, huge(size), varies)
     roots(1) = sqrt(abs(problem%coefficients(2)*problem%coefficients(3)))
     roots(2) = sqrt(abs(problem%coefficients(1)*problem%coefficients(3)))
@@ -217,7 +217,7 @@ contains
             return
           end if
           h = h*0.0625_dp
-          if (problem%waves > MANY_WAVES) then
+          if (problem%n_sines + problem%n_cosines > MANY_WAVES) then
             if (interrupt_raised() /= 0) then
               status = INTERRUPTED
               return

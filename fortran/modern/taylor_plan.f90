@@ -44,10 +44,10 @@ contains
       gain = gain + push*time*time/6.0_dp
       rate = rate + sqrt(coupling)*sqrt(push*abs(time))
     end if
-    do n = 1, size(problem%sines, 2)
+    do n = 1, problem%n_sines
       call add_wave_rates(problem%sines(:, n), .true., coupling, time, gain, rate, turned)
     end do
-    do n = 1, size(problem%cosines, 2)
+    do n = 1, problem%n_cosines
       call add_wave_rates(problem%cosines(:, n), .false., coupling, time, gain, rate, turned)
     end do
     h = time

@@ -40,7 +40,7 @@ module torque_free
     real(dp) :: lower(MOST_LEVELS)   !! a(n) b(n-1)
   end type orbit_t
 
-  public :: torque_free_rows, torque_free_end
+  public :: torque_free_rows
 
 contains
 
@@ -71,20 +71,6 @@ contains
       end if
     end do
   end subroutine torque_free_rows
-
-  pure subroutine torque_free_end(coefficients, omega0, t_end, omega, status)
-    !! Angular velocity of a torque-free body at one time.
-    real(dp), intent(in) :: coefficients(3)  !! A, B, C; not all of one sign, finite
-    real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
-    real(dp), intent(in) :: t_end            !! s, finite
-    real(dp), intent(out) :: omega(3)        !! rad/s; omega0 where the status is not COMPLETE
-    integer, intent(out) :: status           !! COMPLETE, OVERFLOW, REFUSED or GAVE_UP
-    type(orbit_t) :: orbit
-
-    call prepare(coefficients, omega0, orbit, status)
-    if (status == COMPLETE) call evaluate(orbit, t_end, omega, status)
-    if (status /= COMPLETE) omega = omega0
-  end subroutine torque_free_end
 
   pure subroutine prepare(coefficients, omega0, orbit, status)
     !! Everything about a motion that does not depend on the time.

@@ -16,32 +16,32 @@ contains
     real(dp), intent(in) :: time      !! s
     real(dp), intent(in) :: time_low  !! what its rounding left out, s
     real(dp), intent(out) :: m(3)     !! 1/s2
-    real(dp) :: sine, cosine
-    integer :: k
 
     m = problem%constant + problem%rate*time
-    do k = 1, size(problem%sines, 2)
-      call wave_at(problem%sines(4, k), time, time_low, sine, cosine)
-      m = m + problem%sines(1:3, k)*sine
-    end do
-    do k = 1, size(problem%cosines, 2)
-      call wave_at(problem%cosines(4, k), time, time_low, sine, cosine)
-      m = m + problem%cosines(1:3, k)*cosine
-    end do
+    if (problem%n_sines + problem%n_cosines > 0) then
+      call add_waves(problem%n_sines, problem%sines, .true., time, time_low, m)
+      call add_waves(problem%n_cosines, problem%cosines, .false., time, time_low, m)
+    end if
   end subroutine torque_at
 
-  pure subroutine wave_at(frequency, time, time_low, sine, cosine)
-    !! With what the rounding of the angle leaves out: after 1e5 radians that is worth 1e-11.
-    real(dp), intent(in) :: frequency              !! rad/s
-    real(dp), intent(in) :: time                   !! s
-    real(dp), intent(in) :: time_low               !! s
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
-    real(dp) :: angle, angle_low
+  pure subroutine add_waves(n, waves, are_sines, time, time_low, m)
+    !! Add sines or cosines with what the rounding of the angle leaves out: after 1e5 radians that
+    !! is worth 1e-11.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: waves(4, n) !! amplitude (3), 1/s2; frequency, rad/s
+    logical, intent(in) :: are_sines
+    real(dp), intent(in) :: time        !! s
+    real(dp), intent(in) :: time_low    !! s
+    real(dp), intent(inout) :: m(3)     !! 1/s2
+    real(dp) :: angle, angle_low, sine, cosine
+    integer :: k
 
-    call two_product(frequency, time, angle, angle_low)
-    call sine_cosine(angle, angle_low + frequency*time_low, sine, cosine)
-  end subroutine wave_at
+    do k = 1, n
+      call two_product(waves(4, k), time, angle, angle_low)
+      call sine_cosine(angle, angle_low + waves(4, k)*time_low, sine, cosine)
+      m = m + waves(1:3, k)*merge(sine, cosine, are_sines)
+    end do
+  end subroutine add_waves
 
   pure subroutine torque_rate_at(problem, time, rate)
     !! Derivative of the torque by time.
@@ -52,11 +52,11 @@ contains
     integer :: k
 
     rate = problem%rate
-    do k = 1, size(problem%sines, 2)
+    do k = 1, problem%n_sines
       wave = problem%sines(:, k)
       rate = rate + wave(1:3)*(wave(4)*cos(wave(4)*time))
     end do
-    do k = 1, size(problem%cosines, 2)
+    do k = 1, problem%n_cosines
       wave = problem%cosines(:, k)
       rate = rate - wave(1:3)*(wave(4)*sin(wave(4)*time))
     end do

@@ -15,10 +15,8 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   integer(4), intent(in) :: by_moments     ! 1: body is I1, I2, I3; 0: A, B, C
   real(8), intent(in) :: body(3)
   real(8), intent(in) :: omega(3)          ! rad/s at time 0
-  real(8), intent(in) :: masses(3)
-  real(8), intent(in) :: forces(3)
-  real(8), intent(in) :: torque_constant(3)
-  real(8), intent(in) :: torque_rate(3)
+  real(8), intent(in) :: masses(3), forces(3)
+  real(8), intent(in) :: torque_constant(3), torque_rate(3)
   integer(4), intent(in) :: torque_varies  ! 0: only the constant acts
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), frequency in rad/s
@@ -55,8 +53,7 @@ subroutine solve_linear(n, m, a, b, factors, x, ier)
   !f2py threadsafe
   use linear_solver, only: leqt1f
   implicit none
-  integer(4), intent(in) :: n
-  integer(4), intent(in) :: m
+  integer(4), intent(in) :: n, m
   real(8), intent(in) :: a(n, n)
   real(8), intent(in) :: b(n, m)
   real(8), intent(out) :: factors(n, n)
@@ -144,8 +141,7 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
   real(8), intent(out) :: rows(3, n_times)
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status
+  integer(4), intent(out) :: n_rows, status
 
   call sphere_rows(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines, n_cosines, &
                              sines, cosines), &
@@ -160,9 +156,7 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   use gauss_collocation, only: gauss_rows
   use problem, only: problem_t
   implicit none
-  real(8), intent(in) :: coefficients(3)
-  real(8), intent(in) :: m_constant(3)
-  real(8), intent(in) :: m_rate(3)
+  real(8), intent(in) :: coefficients(3), m_constant(3), m_rate(3)
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
@@ -176,8 +170,7 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   real(8), intent(in) :: effort
   real(8), intent(out) :: rows(3, n_times)
   real(8), intent(out) :: reached(4)        ! time and omega after the last good step
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status
+  integer(4), intent(out) :: n_rows, status
   integer(8), intent(out) :: evaluations
 
   call gauss_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
@@ -194,9 +187,7 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   use fixed_step, only: fixed_step_rows
   use problem, only: problem_t
   implicit none
-  real(8), intent(in) :: coefficients(3)
-  real(8), intent(in) :: m_constant(3)
-  real(8), intent(in) :: m_rate(3)
+  real(8), intent(in) :: coefficients(3), m_constant(3), m_rate(3)
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
@@ -209,10 +200,8 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
   real(8), intent(out) :: rows(3, n_times)
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status
-  integer(8), intent(out) :: steps
-  integer(8), intent(out) :: evaluations
+  integer(4), intent(out) :: n_rows, status
+  integer(8), intent(out) :: steps, evaluations
 
   call fixed_step_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                                  cosines), &

@@ -27,10 +27,8 @@ contains
     real(dp), intent(out) :: m(3, MOST_ORDER)
     real(dp) :: even(3)                ! derivative 0 of the wave times h, rad/s
     real(dp) :: odd(3)                 ! derivative 1, over the frequency
-    real(dp) :: sine
-    real(dp) :: cosine
-    integer :: n
-    integer :: k
+    real(dp) :: sine, cosine
+    integer :: n, k
     integer :: shared                  ! pairs of waves that begin with one frequency
     integer :: waves                   ! added so far
 
@@ -80,8 +78,7 @@ contains
     real(dp), intent(in) :: frequency  !! rad/s
     real(dp), intent(in) :: t          !! s
     real(dp), intent(in) :: t_low      !! s
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
+    real(dp), intent(out) :: sine, cosine
     real(dp) :: angle                  ! rad
     real(dp) :: turn                   ! rad
     real(dp) :: unturned

@@ -39,9 +39,7 @@ contains
     integer(int64), intent(out) :: evaluations     !! right-hand sides
     real(dp), intent(out) :: needed                !! effort that the times ask for
     real(dp) :: y(3)
-    real(dp) :: begin
-    real(dp) :: h
-    real(dp) :: n_steps
+    real(dp) :: begin, h, n_steps
     real(dp) :: total          ! steps to all times
     real(dp) :: cost           ! of a step, in steps without waves
     integer(int64) :: stride   ! steps between looks at the user
@@ -124,8 +122,7 @@ contains
     integer, intent(in) :: method
     real(dp), intent(in) :: begin                  !! s
     real(dp), intent(in) :: h                      !! s
-    integer(int64), intent(in) :: first
-    integer(int64), intent(in) :: last
+    integer(int64), intent(in) :: first, last
     real(dp), intent(inout) :: y(3)                !! rad/s
     real(dp) :: a(3)
     real(dp) :: m(3), m_middle(3), m_end(3), m_slope(3)
@@ -184,9 +181,7 @@ contains
 
   pure function rates(a, m, y) result(f)
     !! Equations 16-18.
-    real(dp), intent(in) :: a(3)
-    real(dp), intent(in) :: m(3)
-    real(dp), intent(in) :: y(3)
+    real(dp), intent(in) :: a(3), m(3), y(3)
     real(dp) :: f(3)
 
     f(1) = m(1) + a(1)*(y(2)*y(3))

@@ -45,11 +45,9 @@ contains
     real(dp) :: m(MOST_STAGES, 3)    ! torque at the nodes
     real(dp) :: f(MOST_STAGES, 3)    ! rates at the nodes
     real(dp) :: at_node(3)
-    real(dp) :: begin
-    real(dp) :: h
+    real(dp) :: begin, h
     real(dp) :: h_low                ! what the rounding of the step left out, s
-    real(dp) :: waves
-    real(dp) :: n_steps
+    real(dp) :: waves, n_steps
     real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
     real(dp) :: span                 ! from time to time, s
@@ -64,8 +62,7 @@ contains
     real(dp) :: stride               ! steps between looks at the user
     real(dp) :: next_look            ! steps of the way to this time
     logical :: varies
-    integer :: i
-    integer :: k
+    integer :: i, k
 
     n_rows = 0
     status = COMPLETE
@@ -135,23 +132,17 @@ contains
     real(dp), intent(in) :: h
     integer, intent(in) :: stages
     integer(int64), intent(in) :: most            !! right-hand sides
-    real(dp), intent(inout) :: y(3)
-    real(dp), intent(inout) :: carry(3)
+    real(dp), intent(inout) :: y(3), carry(3)
     real(dp), intent(inout) :: f(MOST_STAGES, 3)  !! rates of the last step, 0 if there is none
     integer, intent(out) :: status
     integer(int64), intent(inout) :: evaluations
     real(dp) :: z(MOST_STAGES, 3)       ! states at the nodes less y
-    real(dp) :: zero(MOST_STAGES, 3)
-    real(dp) :: z_before(MOST_STAGES, 3)
+    real(dp) :: zero(MOST_STAGES, 3), z_before(MOST_STAGES, 3)
     real(dp) :: states(MOST_STAGES, 3)
     real(dp) :: low(MOST_STAGES, 3)     ! what the low words of the matrix add
-    real(dp) :: change
-    real(dp) :: change_before
-    real(dp) :: scale
+    real(dp) :: change, change_before, scale
     real(dp) :: increment, total, part, back, rest
-    integer :: axis
-    integer :: iteration
-    integer :: k
+    integer :: axis, iteration, k
 
     status = GAVE_UP
     scale = max(abs(y(1)), abs(y(2)), abs(y(3)))
@@ -215,13 +206,10 @@ contains
   pure subroutine stage_sums(table, f, start, stages, z)
     !! z = start + table times f.
     real(dp), intent(in) :: table(MOST_STAGES, MOST_STAGES)
-    real(dp), intent(in) :: f(MOST_STAGES, 3)
-    real(dp), intent(in) :: start(MOST_STAGES, 3)
+    real(dp), intent(in) :: f(MOST_STAGES, 3), start(MOST_STAGES, 3)
     integer, intent(in) :: stages
     real(dp), intent(out) :: z(MOST_STAGES, 3)
-    integer :: axis
-    integer :: j
-    integer :: k
+    integer :: axis, j, k
 
     z = start
     do axis = 1, 3

@@ -65,8 +65,7 @@ contains
     real(dp) :: share      ! of its amplitude that a wave comes to
     real(dp) :: time       ! in the new units
     integer :: power       ! omega is 2**power times what it is in the new units
-    integer :: code
-    integer :: i
+    integer :: code, i
 
     reach = largest
     do i = 0, 2
@@ -131,9 +130,7 @@ contains
     real(dp) :: times(1)
     real(dp) :: reached(4)
     real(dp) :: tolerance_left
-    integer :: code
-    integer :: n_rows
-    integer :: quick_steps
+    integer :: code, n_rows, quick_steps
     integer(int64) :: evaluations
     real(dp) :: needed
 

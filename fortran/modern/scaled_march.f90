@@ -32,9 +32,7 @@ contains
     real(dp) :: whole, half, third, sixth          ! of a step
     real(dp) :: whole_2, half_2, third_2, sixth_2  ! of the second unknown, with its sign
     real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, of longer steps
-    integer :: i
-    integer :: k
-    integer :: n
+    integer :: i, k, n
 
     whole = h
     half = 0.5_dp*h
@@ -148,12 +146,7 @@ contains
     real(dp) :: turn_versines(MOST_WAVES)
     real(dp) :: h
     logical :: afresh
-    integer :: begin
-    integer :: middle
-    integer :: end_
-    integer :: i
-    integer :: k
-    integer :: n
+    integer :: begin, middle, end_, i, k, n
 
     h = (0.25_dp*t_end)/fours
     whole = h
@@ -282,11 +275,9 @@ contains
     logical, intent(in) :: afresh                      !! from t, not from half a step before
     real(dp), intent(in) :: turn_sines(MOST_WAVES)     !! of half a step
     real(dp), intent(in) :: turn_versines(MOST_WAVES)
-    real(dp), intent(inout) :: sines(MOST_WAVES)
-    real(dp), intent(inout) :: versines(MOST_WAVES)
+    real(dp), intent(inout) :: sines(MOST_WAVES), versines(MOST_WAVES)
     real(dp), intent(out) :: s(3)
-    real(dp) :: turn_cosine
-    real(dp) :: held
+    real(dp) :: turn_cosine, held
     integer :: n
 
     s = motion%mean + t*(motion%slope + (0.5_dp*t)*motion%climb)

@@ -39,8 +39,7 @@ contains
     real(dp), intent(in) :: t_end    !! s
     type(motion_t), intent(out) :: motion
     integer, intent(out) :: status
-    real(dp) :: c(3)
-    real(dp) :: root(3)
+    real(dp) :: c(3), root(3)
     real(dp) :: turned       ! -1 where all signs are turned by turning the third axis
     integer :: i
 
@@ -120,10 +119,8 @@ contains
     real(dp) :: largest                  ! scale
     real(dp) :: change                   ! of the unknowns, 1/s2
     real(dp) :: f                        ! rad/s
-    real(dp) :: size
-    real(dp) :: error
-    integer :: n
-    integer :: k
+    real(dp) :: size, error
+    integer :: n, k
 
     largest = maxval(abs(motion%scale))
     change = 2.0_dp*rate*rate + maxval(abs(motion%slope)) + abs(t_end)*maxval(abs(motion%climb))
@@ -155,8 +152,7 @@ contains
   pure subroutine swap(motion, n, k)
     !! Two waves change places.
     type(motion_t), intent(inout) :: motion
-    integer, intent(in) :: n
-    integer, intent(in) :: k
+    integer, intent(in) :: n, k
 
     if (n == k) return
     motion%frequency([n, k]) = motion%frequency([k, n])
@@ -171,8 +167,7 @@ contains
     real(dp), intent(in) :: t            !! s
     real(dp) :: change(3)
     real(dp) :: o(3)
-    real(dp) :: sine
-    real(dp) :: vers
+    real(dp) :: sine, vers
     integer :: n
 
     o = 0.0_dp
@@ -236,8 +231,7 @@ contains
     !! that is averaged may have turned by any number of radians.
     real(dp), intent(in) :: frequency    !! rad/s
     real(dp), intent(in) :: t            !! s
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: vers
+    real(dp), intent(out) :: sine, vers
     real(dp) :: s                        ! of half the angle
     real(dp) :: c
 
@@ -251,8 +245,7 @@ contains
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t
     real(dp) :: s(3)
-    real(dp) :: sine
-    real(dp) :: vers
+    real(dp) :: sine, vers
     integer :: n
 
     s = t*(motion%slope + (0.5_dp*t)*motion%climb)

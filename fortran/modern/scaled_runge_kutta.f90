@@ -54,8 +54,7 @@ contains
     type(problem_t), pointer :: problem
     type(motion_t) :: motion
     logical :: varies
-    real(dp) :: start(3)
-    real(dp) :: x(3)
+    real(dp) :: start(3), x(3)
     real(dp) :: gaps(3, 2)   ! between steps of one length and of the next
     real(dp) :: top(3)       ! largest unknowns
     real(dp) :: rate         ! 1/s

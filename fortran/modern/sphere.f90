@@ -36,8 +36,7 @@ contains
     real(dp) :: cosine
     real(dp) :: quotient   ! sine over half the angle
     real(dp) :: unseen     ! terms since the last look
-    integer :: i
-    integer :: k
+    integer :: i, k
 
     n_rows = 0
     status = GAVE_UP
@@ -75,8 +74,7 @@ contains
 
   pure subroutine add_waves(total, rest, n, waves, are_sines, t)
     !! Add the integral of each wave: amplitude times t times a part.
-    real(dp), intent(inout) :: total(3)
-    real(dp), intent(inout) :: rest(3)
+    real(dp), intent(inout) :: total(3), rest(3)
     integer, intent(in) :: n
     real(dp), intent(in) :: waves(4, n)
     logical, intent(in) :: are_sines
@@ -100,8 +98,7 @@ contains
 
   pure subroutine add(total, rest, amplitude, factor)
     !! Add amplitude times factor to total + rest.
-    real(dp), intent(inout) :: total(3)
-    real(dp), intent(inout) :: rest(3)
+    real(dp), intent(inout) :: total(3), rest(3)
     real(dp), intent(in) :: amplitude(3)
     real(dp), intent(in) :: factor
     real(dp) :: term, term_low, sum_high, sum_low
@@ -118,11 +115,8 @@ contains
 
   pure subroutine half_angle(frequency, t, sine, cosine, quotient)
     !! Sine and cosine of frequency t/2, and the sine over it.
-    real(dp), intent(in) :: frequency
-    real(dp), intent(in) :: t
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
-    real(dp), intent(out) :: quotient
+    real(dp), intent(in) :: frequency, t
+    real(dp), intent(out) :: sine, cosine, quotient
     real(dp) :: angle, angle_low
 
     call two_product(frequency, 0.5_dp*t, angle, angle_low)

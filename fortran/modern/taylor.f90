@@ -8,8 +8,8 @@ module taylor
   use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_plan, only: plan
-  use taylor_series, only: expand_constant, expand_varying, fitting, following, scale_of, series_t, &
-                           shorten, size_of
+  use taylor_series, only: expand_constant, expand_varying, fitting, following, scale_of, &
+                           series_t, shorten, size_of
   implicit none(type, external)
   private
 
@@ -100,8 +100,7 @@ contains
     real(dp) :: w(3)          ! omega at the step's beginning, rad/s
     real(dp) :: w_low(3)      ! what its rounding left out
     real(dp) :: change(3)     ! of omega in the step
-    real(dp) :: total(3)
-    real(dp) :: back(3)
+    real(dp) :: total(3), back(3)
     real(dp) :: t             ! the step's beginning, s
     real(dp) :: t_low         ! what its rounding left out
     real(dp) :: h             ! step, s
@@ -299,8 +298,7 @@ contains
     real(dp), intent(in) :: half(3)         !! half the step times omega in its middle, rad
     real(dp), intent(inout) :: difference(3)
     real(dp) :: a2, a3, b1, b3, c1, c2      ! the products' derivatives, times half the step
-    real(dp) :: x, y, z
-    real(dp) :: determinant
+    real(dp) :: x, y, z, determinant
 
     a2 = coefficients(1)*half(2)
     a3 = coefficients(1)*half(3)

@@ -1,6 +1,6 @@
 module taylor_series
   !! The terms of one step by recurrence, and what they say of the next; unroll.py writes out the
-  !! marked loops. Terms are held with the power of the step in them, so a step ends with a plain sum.
+  !! marked loops. A term holds the power of the step in it, so that a step ends with a plain sum.
   use, intrinsic :: iso_fortran_env, only: int64
   use euler_equations, only: INVERSE, MOST_ORDER
   use kinds, only: dp
@@ -46,8 +46,7 @@ contains
     real(dp), intent(in) :: allowed  !! rad/s
     ! unroll: m 28
     real(dp) :: x, y, z
-    integer :: i
-    integer :: k
+    integer :: i, k
 
     s%tail = 0.0_dp
     do k = 1, most

@@ -24,8 +24,7 @@ module torque_free
   type :: orbit_t
     !! One torque-free motion. Axis 2 of the orbit has the coefficient of the odd sign (the
     !! middle moment), axis 3 is the one about which the motion does not change its direction.
-    integer :: kind
-    integer :: levels
+    integer :: kind, levels
     integer :: axes(3)               !! of the body, for each of the orbit
     integer :: time_exponent         !! orbit's time is 2**this times the time, 0 for most
     integer :: omega_exponent        !! angular velocity is 2**this times the orbit's
@@ -74,8 +73,7 @@ contains
 
   pure subroutine prepare(coefficients, omega0, orbit, status)
     !! Everything about a motion that does not depend on the time.
-    real(dp), intent(in) :: coefficients(3)
-    real(dp), intent(in) :: omega0(3)
+    real(dp), intent(in) :: coefficients(3), omega0(3)
     type(orbit_t), intent(out) :: orbit
     integer, intent(out) :: status           !! COMPLETE or REFUSED
     real(dp) :: a(3)         ! coefficients along the axes of the orbit
@@ -87,8 +85,7 @@ contains
     real(dp) :: modulus, modulus_low     ! square of the larger start of the mean
     real(dp) :: comodulus, comodulus_low ! square of the smaller one
     real(dp) :: largest
-    integer :: i
-    integer :: j
+    integer :: i, j
 
     a = coefficients
     w = omega0
@@ -184,10 +181,7 @@ contains
   pure subroutine climb(a0, a0_low, b0, b0_low, orbit)
     !! The arithmetic-geometric mean of a0 >= b0 > 0 to twice the working digits, and what the
     !! way back needs of each level.
-    real(dp), intent(in) :: a0
-    real(dp), intent(in) :: a0_low
-    real(dp), intent(in) :: b0
-    real(dp), intent(in) :: b0_low
+    real(dp), intent(in) :: a0, a0_low, b0, b0_low
     type(orbit_t), intent(inout) :: orbit
     real(dp) :: a, a_low, b, b_low
     real(dp) :: half_difference, total, mean

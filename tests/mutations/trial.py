@@ -19,11 +19,13 @@ OF_ALL = 2400.0  # s
 # By the beginning of a file: the tests that are most likely to see a change, the cheapest first.
 NEAR = {
     "fortran/modern/taylor.f90": ("taylor", "slow_waves", "solver", "effort", "methods"),
+    "fortran/modern/taylor_series.f90": ("taylor", "slow_waves", "solver"),
     "fortran/modern/taylor_plan.f90": ("taylor", "slow_waves", "solver"),
     "fortran/modern/euler_equations.f90": ("taylor", "slow_waves", "solver"),
     "fortran/modern/levels.c": ("taylor", "quick", "solver", "build"),
     "fortran/modern/levels.f90": ("taylor", "quick", "solver"),
     "fortran/modern/scaled_motion.f90": ("slow_waves", "quick", "solver"),
+    "fortran/modern/scaled_march.f90": ("quick", "slow_waves", "solver"),
     "fortran/modern/scaled_runge_kutta.f90": ("quick", "slow_waves", "solver"),
     "fortran/modern/prepared.f90": ("scaling", "solver", "fixed_step", "quick"),
     "fortran/modern/solver.c": ("values", "solver"),

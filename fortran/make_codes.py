@@ -3,28 +3,24 @@
 import runpy
 import sys
 from collections.abc import Iterator
-from enum import IntEnum
 from pathlib import Path
 
 
 def modules(source: str) -> str:
     """Return the text of the modules for the classes of pyharness/codes.py."""
-    classes = [each for each in runpy.run_path(source).values() if _is_ours(each)]
-    return "\n".join(line for each in classes for line in _module(each)) + "\n"
+    classes = [each for each in runpy.run_path(source).values() if isinstance(each, type)]
+    return "".join(f"{line}\n" for each in classes for line in _module(each))
 
 
-def _is_ours(found: object) -> bool:
-    return isinstance(found, type) and issubclass(found, IntEnum) and bool(found.__members__)
-
-
-def _module(codes: type[IntEnum]) -> Iterator[str]:
+def _module(codes: type) -> Iterator[str]:
     name = codes.__name__.lower()
     yield f"module {name}"
     yield "  !! Written by fortran/make_codes.py; pyharness/codes.py says what is what."
     yield "  implicit none(type, external)"
     yield "  private"
-    for each in codes:
-        yield f"  integer, parameter, public :: {each.name} = {each.value}"
+    for each, value in vars(codes).items():
+        if each.isupper():
+            yield f"  integer, parameter, public :: {each} = {value}"
     yield f"end module {name}"
 
 

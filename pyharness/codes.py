@@ -1,10 +1,8 @@
 """The numbers that Python and the kernels share: fortran/make_codes.py writes them in Fortran."""
 
-from enum import IntEnum
 
-
-class Statuses(IntEnum):
-    """How a computation ended."""
+class Statuses:
+    """How a computation ended; counted from 0."""
 
     COMPLETE = 0  # every row is a result
     STOPPED = 1  # the Lipschitz test ended the run
@@ -14,7 +12,7 @@ class Statuses(IntEnum):
     INTERRUPTED = 5  # by the user; an exception is set
 
 
-class Methods(IntEnum):
+class Methods:
     """What the kernel of a prepared solver may be asked for."""
 
     CLOSED_FORM = 1  # without torque
@@ -29,7 +27,7 @@ class Methods(IntEnum):
     GAUSS = 10  # and the number of stages
 
 
-class Places(IntEnum):
+class Places:
     """Where in the packed array of a prepared solver something stands, from 0."""
 
     METHOD = 0

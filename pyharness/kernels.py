@@ -14,9 +14,10 @@ from pyharness.scene import Scene, Wave, checked_scene
 from pyharness.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.values import number, truth
 
-COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP, INTERRUPTED = Statuses
+COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
+REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
 # What a user reads.
-ENDS = tuple(each.name.lower().replace("_", " ") for each in Statuses)
+ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.isupper())
 
 
 def extension() -> ModuleType:

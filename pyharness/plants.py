@@ -19,7 +19,7 @@ import numpy as np
 
 from pyharness import kernels
 from pyharness import reference as truth
-from pyharness.codes import Places
+from pyharness.codes import Methods, Places
 from pyharness.external_file import Problem, problems
 from pyharness.listing import Listing, entries
 from pyharness.methods import METHODS, PROGRAM_REGISTRY, Program
@@ -318,7 +318,7 @@ PLANTS = (
           lambda: _stale_method("taylor")),
     Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver),
     Plant("quick-refuses", "the solver for few digits refuses every scene",
-          lambda: _refusing_solver(7)),
+          lambda: _refusing_solver(Methods.QUICK)),
     Plant("label-in-fortran", "TIME shifted by half a step",
           lambda: _compiled(_half_step_label)),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",

@@ -282,20 +282,19 @@ def _code(chosen: Plan, asked: str) -> int:
 
 def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
-    waves = np.concatenate([sines, cosines], axis=1).T.ravel()
-    packed = np.zeros(Places.WAVES + waves.size)
-    parts = {
-        Places.METHOD: code,
-        Places.TOLERANCE: tolerance,
-        Places.STEP: scene.step_size,
-        Places.N_SINES: sines.shape[1],
-        Places.N_COSINES: cosines.shape[1],
-        Places.COEFFICIENTS: coefficients,
-        Places.CONSTANT: constant,
-        Places.RATE: rate,
-        Places.EFFORT: effort,
-        Places.WAVES: waves,
-    }
-    for place, values in parts.items():
-        packed[place : place + np.size(values)] = values
+    packed = np.zeros(Places.WAVES + sines.size + cosines.size)
+    packed[Places.METHOD] = code
+    packed[Places.TOLERANCE] = tolerance
+    packed[Places.STEP] = scene.step_size
+    packed[Places.N_SINES] = sines.shape[1]
+    packed[Places.N_COSINES] = cosines.shape[1]
+    packed[Places.EFFORT] = effort
+    for place, values in (
+        (Places.COEFFICIENTS, coefficients),
+        (Places.CONSTANT, constant),
+        (Places.RATE, rate),
+        (Places.WAVES, sines.T.ravel()),
+        (Places.WAVES + sines.size, cosines.T.ravel()),
+    ):
+        packed[place : place + values.size] = values
     return packed

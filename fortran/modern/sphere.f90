@@ -32,11 +32,8 @@ contains
     real(dp) :: total(3)
     real(dp) :: rest(3)    ! what rounding took off the total
     real(dp) :: t
-    real(dp) :: sine       ! of half the angle
-    real(dp) :: cosine
-    real(dp) :: quotient   ! sine over half the angle
     real(dp) :: unseen     ! terms since the last look
-    integer :: i, k
+    integer :: i
 
     n_rows = 0
     status = GAVE_UP

@@ -6,7 +6,7 @@ import numpy as np
 
 from pyharness.methods.problem import normalized, trajectory_of
 from pyharness.model.codes import Methods
-from pyharness.model.effort import Solver, advice
+from pyharness.model.effort import Integrator, advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
@@ -19,7 +19,7 @@ _NUMBERS = {
 }
 
 
-def fixed_step(name: str) -> Solver:
+def fixed_step(name: str) -> Integrator:
     """Return the solver of a method of III.2: steps of the scene's size, no error control.
 
     Before each time the last step is shortened to hit it.

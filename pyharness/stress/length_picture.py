@@ -12,7 +12,7 @@ from pyharness.theory.brouwer import LAWS
 from pyharness.views.text import csv_text
 
 if TYPE_CHECKING:
-    from pyharness.stress.trials.length import Curve
+    from pyharness.stress.trials.length import Drift
 
 _SHOWN = ("energy", "phase")
 _STYLES: dict[str, dict[str, Any]] = {
@@ -23,7 +23,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 
 
-def picture(found: Sequence["Curve"], path: str) -> dict[str, bytes]:
+def picture(found: Sequence["Drift"], path: str) -> dict[str, bytes]:
     """Draw energy and phase of each motion; content by path, with CSV."""
     import matplotlib
     from matplotlib.figure import Figure

@@ -21,7 +21,7 @@ from pyharness.methods import problem, taylor
 from pyharness.methods.registry import METHODS
 from pyharness.model import extension
 from pyharness.model.codes import Methods, Places
-from pyharness.model.listing import Listing, entries
+from pyharness.model.listing import Listing, flagged
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original import compiled
@@ -233,7 +233,7 @@ def _shifted(scene: Scene, times: Sequence[float], solve: Callable[..., Trajecto
 
 def _wrong_card() -> AbstractContextManager[Any]:
     """Let the compiled programs read one flag in place of its neighbour."""
-    known = [entry["flag"] for entry in entries() if entry["kind"] == "defect"]
+    known = [entry["flag"] for entry in flagged() if entry["kind"] == "defect"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 
     def wrong(self: Listing) -> int:

@@ -15,10 +15,8 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   integer(4), intent(in) :: by_moments     ! 1: body is I1, I2, I3; 0: A, B, C
   real(8), intent(in) :: body(3)
   real(8), intent(in) :: omega(3)          ! rad/s at time 0
-  real(8), intent(in) :: masses(3)
-  real(8), intent(in) :: forces(3)
-  real(8), intent(in) :: torque_constant(3)
-  real(8), intent(in) :: torque_rate(3)
+  real(8), intent(in) :: masses(3), forces(3)
+  real(8), intent(in) :: torque_constant(3), torque_rate(3)
   integer(4), intent(in) :: torque_varies  ! 0: only the constant acts
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), frequency in rad/s
@@ -55,8 +53,7 @@ subroutine solve_linear(n, m, a, b, factors, x, ier)
   !f2py threadsafe
   use linear_solver, only: leqt1f
   implicit none
-  integer(4), intent(in) :: n
-  integer(4), intent(in) :: m
+  integer(4), intent(in) :: n, m
   real(8), intent(in) :: a(n, n)
   real(8), intent(in) :: b(n, m)
   real(8), intent(out) :: factors(n, n)
@@ -73,14 +70,15 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   ! Taylor series: omega at times that lead away from 0 on one side.
   !f2py threadsafe
   use levels, only: taylor_solve
+  use problem, only: problem_t
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
   real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
   real(8), intent(in) :: m_rate(3)              ! 1/s3
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
+  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)         ! s
@@ -92,7 +90,8 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
   integer(8), intent(out) :: steps
 
-  call taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+  call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
+                              cosines), &
                     omega0, tolerance, effort(1), n_times, times, rows, n_rows, status, steps, &
                     effort(2))
 end subroutine taylor_rows
@@ -127,25 +126,26 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
                            n_times, times, effort, rows, n_rows, status)
   ! Closed form of a sphere under the torque law of a scene.
   !f2py threadsafe
+  use problem, only: problem_t
   use sphere, only: sphere_rows
   implicit none
   real(8), intent(in) :: m_constant(3)        ! all torque over moment
   real(8), intent(in) :: m_rate(3)
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)    ! amplitude (3), frequency in rad/s
+  real(8), intent(in), target :: sines(4, n_sines)  ! amplitude (3), frequency in rad/s
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
   real(8), intent(out) :: rows(3, n_times)
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status
+  integer(4), intent(out) :: n_rows, status
 
-  call sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, effort(1), &
-                   n_times, times, rows, n_rows, status, effort(2))
+  call sphere_rows(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines, n_cosines, &
+                             sines, cosines), &
+                   omega0, effort(1), n_times, times, rows, n_rows, status, effort(2))
 end subroutine sphere_solution
 
 subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
@@ -154,14 +154,13 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   ! Gauss collocation in equal steps between the times.
   !f2py threadsafe
   use gauss_collocation, only: gauss_rows
+  use problem, only: problem_t
   implicit none
-  real(8), intent(in) :: coefficients(3)
-  real(8), intent(in) :: m_constant(3)
-  real(8), intent(in) :: m_rate(3)
+  real(8), intent(in) :: coefficients(3), m_constant(3), m_rate(3)
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)
+  real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)     ! leading away from 0
@@ -171,12 +170,12 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   real(8), intent(in) :: effort
   real(8), intent(out) :: rows(3, n_times)
   real(8), intent(out) :: reached(4)        ! time and omega after the last good step
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status
+  integer(4), intent(out) :: n_rows, status
   integer(8), intent(out) :: evaluations
 
-  call gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
-                  n_times, times, stages, step, effort, rows, reached, n_rows, status, &
+  call gauss_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
+                            cosines), &
+                  omega0, n_times, times, stages, step, effort, rows, reached, n_rows, status, &
                   evaluations)
 end subroutine gauss_solution
 
@@ -186,28 +185,26 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   ! Improved Euler, three-term Taylor, Runge-Kutta: whole steps, the last before a time shorter.
   !f2py threadsafe
   use fixed_step, only: fixed_step_rows
+  use problem, only: problem_t
   implicit none
-  real(8), intent(in) :: coefficients(3)
-  real(8), intent(in) :: m_constant(3)
-  real(8), intent(in) :: m_rate(3)
+  real(8), intent(in) :: coefficients(3), m_constant(3), m_rate(3)
   integer(4), intent(in) :: n_sines
-  real(8), intent(in) :: sines(4, n_sines)
+  real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in) :: cosines(4, n_cosines)
+  real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)
-  integer(4), intent(in) :: method          ! 1 improved Euler, 2 three-term Taylor, 3 Runge-Kutta
+  integer(4), intent(in) :: method          ! of the module methods
   real(8), intent(in) :: step               ! above 0
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
   real(8), intent(out) :: rows(3, n_times)
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status
-  integer(8), intent(out) :: steps
-  integer(8), intent(out) :: evaluations
+  integer(4), intent(out) :: n_rows, status
+  integer(8), intent(out) :: steps, evaluations
 
-  call fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
+  call fixed_step_rows(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
+                                 cosines), &
                        omega0, n_times, times, method, step, effort(1), rows, n_rows, status, &
                        steps, evaluations, effort(2))
 end subroutine fixed_step_solution

@@ -20,9 +20,9 @@ import numpy as np
 
 from pyharness.methods.plan import EITHER
 from pyharness.methods.prepared import _CODES
+from pyharness.model.codes import Places
 from pyharness.model.extension import GAVE_UP, OVERFLOW
 
-_METHOD_AT = 0
 _ON_ARM = platform.machine().lower() in ("arm64", "aarch64")
 INVALID = 1
 DIVIDE = 2 if _ON_ARM else 4
@@ -61,7 +61,7 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
         if not raised:
             return answer
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
-        if name == "solve_packed" and args[0][_METHOD_AT] in _TRIES_AGAIN:
+        if name == "solve_packed" and args[0][Places.METHOD] in _TRIES_AGAIN:
             # An attempt with too long steps may overflow; then it is made again with shorter ones,
             # or the series answers.
             found["status"] = OVERFLOW

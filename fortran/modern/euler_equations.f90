@@ -2,6 +2,7 @@ module euler_equations
   !! Euler's equations divided by the moments: omega' = M(t) + (A w2 w3, B w1 w3, C w1 w2).
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
+  use problem, only: problem_t
   implicit none(type, external)
   private
 
@@ -12,22 +13,13 @@ module euler_equations
 
   real(dp), parameter :: SMALL_TURN = 1e-8_dp ! rad; its square no longer counts
 
-  type, public :: torque_t
-    real(dp) :: constant(3)            !! 1/s2
-    real(dp) :: rate(3)                !! 1/s3
-    integer :: n_sines
-    integer :: n_cosines
-    real(dp), pointer, contiguous :: sines(:, :)   !! amplitude (3) in 1/s2, frequency in rad/s
-    real(dp), pointer, contiguous :: cosines(:, :) !! the same
-  end type torque_t
-
   public :: sine_cosine, torque_terms
 
 contains
 
-  pure subroutine torque_terms(torque, t, t_low, h, most, m)
+  pure subroutine torque_terms(problem, t, t_low, h, most, m)
     !! What the torque adds to the Taylor terms 1 ... most of omega around t, rad/s.
-    type(torque_t), intent(in) :: torque
+    type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: t          !! s
     real(dp), intent(in) :: t_low      !! rounding of t, s
     real(dp), intent(in) :: h          !! step, s
@@ -35,40 +27,38 @@ contains
     real(dp), intent(out) :: m(3, MOST_ORDER)
     real(dp) :: even(3)                ! derivative 0 of the wave times h, rad/s
     real(dp) :: odd(3)                 ! derivative 1, over the frequency
-    real(dp) :: sine
-    real(dp) :: cosine
-    integer :: n
-    integer :: k
+    real(dp) :: sine, cosine
+    integer :: n, k
     integer :: shared                  ! pairs of waves that begin with one frequency
     integer :: waves                   ! added so far
 
     shared = 0
     waves = 0
-    do n = 1, min(torque%n_sines, torque%n_cosines)
-      if (torque%sines(4, n) /= torque%cosines(4, n)) exit
-      call sine_cosine(torque%sines(4, n), t, t_low, sine, cosine)
+    do n = 1, min(problem%n_sines, problem%n_cosines)
+      if (problem%sines(4, n) /= problem%cosines(4, n)) exit
+      call sine_cosine(problem%sines(4, n), t, t_low, sine, cosine)
       do k = 1, 3
-        even(k) = h*(sine*torque%sines(k, n) + cosine*torque%cosines(k, n))
-        odd(k) = h*(cosine*torque%sines(k, n) - sine*torque%cosines(k, n))
+        even(k) = h*(sine*problem%sines(k, n) + cosine*problem%cosines(k, n))
+        odd(k) = h*(cosine*problem%sines(k, n) - sine*problem%cosines(k, n))
       end do
-      call add_wave(torque%sines(4, n)*h, even, odd, most, waves, m)
+      call add_wave(problem%sines(4, n)*h, even, odd, most, waves, m)
       shared = n
     end do
-    do n = shared + 1, torque%n_sines
-      call sine_cosine(torque%sines(4, n), t, t_low, sine, cosine)
+    do n = shared + 1, problem%n_sines
+      call sine_cosine(problem%sines(4, n), t, t_low, sine, cosine)
       do k = 1, 3
-        even(k) = (h*sine)*torque%sines(k, n)
-        odd(k) = (h*cosine)*torque%sines(k, n)
+        even(k) = (h*sine)*problem%sines(k, n)
+        odd(k) = (h*cosine)*problem%sines(k, n)
       end do
-      call add_wave(torque%sines(4, n)*h, even, odd, most, waves, m)
+      call add_wave(problem%sines(4, n)*h, even, odd, most, waves, m)
     end do
-    do n = shared + 1, torque%n_cosines
-      call sine_cosine(torque%cosines(4, n), t, t_low, sine, cosine)
+    do n = shared + 1, problem%n_cosines
+      call sine_cosine(problem%cosines(4, n), t, t_low, sine, cosine)
       do k = 1, 3
-        even(k) = (h*cosine)*torque%cosines(k, n)
-        odd(k) = (-h*sine)*torque%cosines(k, n)
+        even(k) = (h*cosine)*problem%cosines(k, n)
+        odd(k) = (-h*sine)*problem%cosines(k, n)
       end do
-      call add_wave(torque%cosines(4, n)*h, even, odd, most, waves, m)
+      call add_wave(problem%cosines(4, n)*h, even, odd, most, waves, m)
     end do
     if (waves == 0) then
       do k = 1, most
@@ -76,8 +66,8 @@ contains
       end do
     end if
     do k = 1, 3
-      m(k, 1) = m(k, 1) + h*(torque%constant(k) + torque%rate(k)*t + torque%rate(k)*t_low)
-      m(k, 2) = m(k, 2) + (0.5_dp*h)*(h*torque%rate(k))
+      m(k, 1) = m(k, 1) + h*(problem%constant(k) + problem%rate(k)*t + problem%rate(k)*t_low)
+      m(k, 2) = m(k, 2) + (0.5_dp*h)*(h*problem%rate(k))
     end do
   end subroutine torque_terms
 
@@ -88,8 +78,7 @@ contains
     real(dp), intent(in) :: frequency  !! rad/s
     real(dp), intent(in) :: t          !! s
     real(dp), intent(in) :: t_low      !! s
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
+    real(dp), intent(out) :: sine, cosine
     real(dp) :: angle                  ! rad
     real(dp) :: turn                   ! rad
     real(dp) :: unturned

@@ -4,14 +4,13 @@ module fixed_step
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use methods, only: IMPROVED_EULER, RK4, TAYLOR_3
+  use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use torque_law, only: torque_at, torque_rate_at
   implicit none(type, external)
   private
 
-  integer, parameter, public :: IMPROVED_EULER = 1
-  integer, parameter, public :: TAYLOR_3 = 2
-  integer, parameter, public :: RUNGE_KUTTA_4 = 3
   ! Without waves; some ten seconds, as long as anyone waits who was not asked.
   real(dp), parameter :: MOST_STEPS = 4e8_dp
   real(dp), parameter :: COUNTABLE = 1e18_dp  ! steps
@@ -22,22 +21,15 @@ module fixed_step
 
 contains
 
-  subroutine fixed_step_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                             cosines, omega0, n_times, times, method, step, effort, rows, n_rows, &
+  subroutine fixed_step_rows(problem, omega0, n_times, times, method, step, effort, rows, n_rows, &
                              status, steps, evaluations, needed)
     !! Angular velocity at each of `times`, which lead away from 0: as many whole steps as fit
     !! between two of them, then a shorter one (or the last one longer by up to EXCESS).
-    real(dp), intent(in) :: coefficients(3)        !! A, B, C
-    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
-    real(dp), intent(in) :: m_rate(3)              !! 1/s3
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)         !! s
-    integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RUNGE_KUTTA_4
+    integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RK4
     real(dp), intent(in) :: step                   !! s, above 0
     real(dp), intent(in) :: effort                 !! factor on the steps allowed
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
@@ -47,9 +39,7 @@ contains
     integer(int64), intent(out) :: evaluations     !! right-hand sides
     real(dp), intent(out) :: needed                !! effort that the times ask for
     real(dp) :: y(3)
-    real(dp) :: begin
-    real(dp) :: h
-    real(dp) :: n_steps
+    real(dp) :: begin, h, n_steps
     real(dp) :: total          ! steps to all times
     real(dp) :: cost           ! of a step, in steps without waves
     integer(int64) :: stride   ! steps between looks at the user
@@ -61,8 +51,8 @@ contains
     n_rows = 0
     status = GAVE_UP
     ! A torque that varies costs as much as the step, a wave twice that.
-    cost = 1.0_dp + 2.0_dp*(real(n_sines, dp) + real(n_cosines, dp)) &
-           + merge(1.0_dp, 0.0_dp, any(abs(m_rate) > 0.0_dp))
+    cost = 1.0_dp + 2.0_dp*real(problem%n_sines + problem%n_cosines, dp) &
+           + merge(1.0_dp, 0.0_dp, any(abs(problem%rate) > 0.0_dp))
     steps = 0
     evaluations = 0
     total = 0.0_dp
@@ -93,14 +83,12 @@ contains
         end if
         piece = min(int(n_steps, int64) - 1 - done, stride)
         if (piece == 0) exit
-        call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                     method, begin, h, done, done + piece, y)
+        call advance(problem, method, begin, h, done, done + piece, y)
         done = done + piece
         unseen = unseen + piece
       end do
       begin = begin + h*(n_steps - 1.0_dp)
-      call advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                   method, begin, times(i) - begin, 0_int64, 1_int64, y)
+      call advance(problem, method, begin, times(i) - begin, 0_int64, 1_int64, y)
       begin = times(i)
       unseen = unseen + 1
       if (.not. all(abs(y) <= huge(step))) then
@@ -125,128 +113,75 @@ contains
     !! Right-hand sides in a step; the derivative of one counts as another.
     integer, intent(in) :: method
 
-    per_step = merge(4, 2, method == RUNGE_KUTTA_4)
+    per_step = merge(4, 2, method == RK4)
   end function per_step
 
-  pure subroutine advance(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                          method, begin, h, first, last, y)
+  pure subroutine advance(problem, method, begin, h, first, last, y)
     !! The steps after `first`, to `last`, of a number of equal ones.
-    real(dp), intent(in) :: coefficients(3)
-    real(dp), intent(in) :: m_constant(3)
-    real(dp), intent(in) :: m_rate(3)
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)
+    type(problem_t), intent(in) :: problem
     integer, intent(in) :: method
     real(dp), intent(in) :: begin                  !! s
     real(dp), intent(in) :: h                      !! s
-    integer(int64), intent(in) :: first
-    integer(int64), intent(in) :: last
+    integer(int64), intent(in) :: first, last
     real(dp), intent(inout) :: y(3)                !! rad/s
-    real(dp) :: m(3)
-    real(dp) :: m_middle(3)
-    real(dp) :: m_end(3)
-    real(dp) :: m_slope(3)
+    real(dp) :: a(3)
+    real(dp) :: m(3), m_middle(3), m_end(3), m_slope(3)
+    real(dp) :: k1(3), k2(3), k3(3), k4(3)
     real(dp) :: t
     logical :: varies
     integer(int64) :: n
 
-    varies = n_sines + n_cosines > 0 .or. any(abs(m_rate) > 0.0_dp)
-    if (method == RUNGE_KUTTA_4 .and. .not. varies) then
-      call runge_kutta_constant(coefficients, m_constant, h, last - first, y)
+    varies = problem%n_sines + problem%n_cosines > 0 .or. any(abs(problem%rate) > 0.0_dp)
+    if (method == RK4 .and. .not. varies) then
+      call runge_kutta_constant(problem, h, last - first, y)
       return
     end if
-    m = m_constant
-    m_middle = m_constant
-    m_end = m_constant
+    a = problem%coefficients
+    m = problem%constant
+    m_middle = problem%constant
+    m_end = problem%constant
     m_slope = 0.0_dp
     if (varies) then
       t = begin
       if (first > 0) t = (begin + real(first - 1, dp)*h) + h
-      call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t, 0.0_dp, m_end)
+      call torque_at(problem, t, 0.0_dp, m_end)
     end if
     do n = first + 1, last
       if (varies) then
         t = begin + real(n - 1, dp)*h
         m = m_end
-        call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t + h, &
-                       0.0_dp, m_end)
-        if (method == RUNGE_KUTTA_4) then
-          call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         t + 0.5_dp*h, 0.0_dp, m_middle)
+        call torque_at(problem, t + h, 0.0_dp, m_end)
+        if (method == RK4) then
+          call torque_at(problem, t + 0.5_dp*h, 0.0_dp, m_middle)
         else if (method == TAYLOR_3) then
-          call torque_rate_at(m_rate, n_sines, sines, n_cosines, cosines, t, m_slope)
+          call torque_rate_at(problem, t, m_slope)
         end if
       end if
+      k1 = rates(a, m, y)
       select case (method)
       case (IMPROVED_EULER)
-        call improved_euler_step(coefficients, m, m_end, h, y)
+        ! Eq. 29: the mean of the rates at both ends.
+        k2 = rates(a, m_end, y + h*k1)
+        y = y + (0.5_dp*h)*(k1 + k2)
       case (TAYLOR_3)
-        call taylor_step(coefficients, m, m_slope, h, y)
+        ! Eq. 30: omega + h omega' + h**2/2 omega''.
+        k2(1) = m_slope(1) + a(1)*(k1(2)*y(3) + y(2)*k1(3))
+        k2(2) = m_slope(2) + a(2)*(k1(3)*y(1) + y(3)*k1(1))
+        k2(3) = m_slope(3) + a(3)*(k1(1)*y(2) + y(1)*k1(2))
+        y = y + h*(k1 + (0.5_dp*h)*k2)
       case default
-        call runge_kutta_step(coefficients, m, m_middle, m_end, h, y)
+        ! Eq. 31.
+        k2 = rates(a, m_middle, y + (0.5_dp*h)*k1)
+        k3 = rates(a, m_middle, y + (0.5_dp*h)*k2)
+        k4 = rates(a, m_end, y + h*k3)
+        y = y + (h/6.0_dp)*((k1 + k4) + 2.0_dp*(k2 + k3))
       end select
     end do
   end subroutine advance
 
-  pure subroutine improved_euler_step(a, m, m_end, h, y)
-    !! Eq. 29: the mean of the rates at both ends.
-    real(dp), intent(in) :: a(3)
-    real(dp), intent(in) :: m(3)
-    real(dp), intent(in) :: m_end(3)
-    real(dp), intent(in) :: h
-    real(dp), intent(inout) :: y(3)
-    real(dp) :: first(3)
-    real(dp) :: second(3)
-
-    first = rates(a, m, y)
-    second = rates(a, m_end, y + h*first)
-    y = y + (0.5_dp*h)*(first + second)
-  end subroutine improved_euler_step
-
-  pure subroutine taylor_step(a, m, m_slope, h, y)
-    !! Eq. 30: omega + h omega' + h**2/2 omega''.
-    real(dp), intent(in) :: a(3)
-    real(dp), intent(in) :: m(3)
-    real(dp), intent(in) :: m_slope(3)
-    real(dp), intent(in) :: h
-    real(dp), intent(inout) :: y(3)
-    real(dp) :: first(3)
-    real(dp) :: second(3)
-
-    first = rates(a, m, y)
-    second(1) = m_slope(1) + a(1)*(first(2)*y(3) + y(2)*first(3))
-    second(2) = m_slope(2) + a(2)*(first(3)*y(1) + y(3)*first(1))
-    second(3) = m_slope(3) + a(3)*(first(1)*y(2) + y(1)*first(2))
-    y = y + h*(first + (0.5_dp*h)*second)
-  end subroutine taylor_step
-
-  pure subroutine runge_kutta_step(a, m, m_middle, m_end, h, y)
-    !! Eq. 31.
-    real(dp), intent(in) :: a(3)
-    real(dp), intent(in) :: m(3)
-    real(dp), intent(in) :: m_middle(3)
-    real(dp), intent(in) :: m_end(3)
-    real(dp), intent(in) :: h
-    real(dp), intent(inout) :: y(3)
-    real(dp) :: k1(3)
-    real(dp) :: k2(3)
-    real(dp) :: k3(3)
-    real(dp) :: k4(3)
-
-    k1 = rates(a, m, y)
-    k2 = rates(a, m_middle, y + (0.5_dp*h)*k1)
-    k3 = rates(a, m_middle, y + (0.5_dp*h)*k2)
-    k4 = rates(a, m_end, y + h*k3)
-    y = y + (h/6.0_dp)*((k1 + k4) + 2.0_dp*(k2 + k3))
-  end subroutine runge_kutta_step
-
   pure function rates(a, m, y) result(f)
     !! Equations 16-18.
-    real(dp), intent(in) :: a(3)
-    real(dp), intent(in) :: m(3)
-    real(dp), intent(in) :: y(3)
+    real(dp), intent(in) :: a(3), m(3), y(3)
     real(dp) :: f(3)
 
     f(1) = m(1) + a(1)*(y(2)*y(3))
@@ -254,50 +189,29 @@ contains
     f(3) = m(3) + a(3)*(y(1)*y(2))
   end function rates
 
-  pure subroutine runge_kutta_constant(coefficients, m_constant, h, n_steps, y)
+  pure subroutine runge_kutta_constant(problem, h, n_steps, y)
     !! Eq. 31 where the torque is constant: half a step is in the coefficients, and each stage
     !! is a sum of the last one's rates. What counts is the time from one product to the next.
-    real(dp), intent(in) :: coefficients(3)
-    real(dp), intent(in) :: m_constant(3)
+    type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: h
     integer(int64), intent(in) :: n_steps
     real(dp), intent(inout) :: y(3)
     real(dp), parameter :: third = 1.0_dp/3.0_dp
-    real(dp) :: a1
-    real(dp) :: a2
-    real(dp) :: a3
-    real(dp) :: u1      ! omega at the begin of the step
-    real(dp) :: u2
-    real(dp) :: u3
-    real(dp) :: b1      ! the same plus half a step of the torque
-    real(dp) :: b2
-    real(dp) :: b3
-    real(dp) :: v1      ! omega at the stage
-    real(dp) :: v2
-    real(dp) :: v3
-    real(dp) :: w1
-    real(dp) :: w2
-    real(dp) :: w3
-    real(dp) :: p1      ! half a step of the products at u
-    real(dp) :: p2
-    real(dp) :: p3
-    real(dp) :: q1      ! the same at v
-    real(dp) :: q2
-    real(dp) :: q3
-    real(dp) :: s1      ! sum of the increments
-    real(dp) :: s2
-    real(dp) :: s3
-    real(dp) :: m1      ! half a step of the torque
-    real(dp) :: m2
-    real(dp) :: m3
+    real(dp) :: a1, a2, a3, m1, m2, m3 ! half a step of the coefficients and of the torque
+    real(dp) :: u1, u2, u3 ! omega at the begin of the step
+    real(dp) :: b1, b2, b3 ! the same plus half a step of the torque
+    real(dp) :: v1, v2, v3, w1, w2, w3 ! omega at the stages
+    real(dp) :: p1, p2, p3 ! half a step of the products at u
+    real(dp) :: q1, q2, q3 ! the same at v
+    real(dp) :: s1, s2, s3 ! sum of the increments
     integer(int64) :: n
 
-    a1 = 0.5_dp*h*coefficients(1)
-    a2 = 0.5_dp*h*coefficients(2)
-    a3 = 0.5_dp*h*coefficients(3)
-    m1 = 0.5_dp*h*m_constant(1)
-    m2 = 0.5_dp*h*m_constant(2)
-    m3 = 0.5_dp*h*m_constant(3)
+    a1 = 0.5_dp*h*problem%coefficients(1)
+    a2 = 0.5_dp*h*problem%coefficients(2)
+    a3 = 0.5_dp*h*problem%coefficients(3)
+    m1 = 0.5_dp*h*problem%constant(1)
+    m2 = 0.5_dp*h*problem%constant(2)
+    m3 = 0.5_dp*h*problem%constant(3)
     u1 = y(1)
     u2 = y(2)
     u3 = y(3)

@@ -7,6 +7,7 @@ module gauss_collocation
   use kinds, only: dp
   use gauss_tables, only: MOST_STAGES, NODES, WEIGHTS, WEIGHTS_LOW, MATRIX, &
                           MATRIX_LOW, ONWARD
+  use problem, only: problem_t
   use torque_law, only: torque_at
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use two_words, only: two_product, two_sum
@@ -24,17 +25,10 @@ module gauss_collocation
 
 contains
 
-  subroutine gauss_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
-                        cosines, omega0, n_times, times, stages, step, effort, rows, reached, &
+  subroutine gauss_rows(problem, omega0, n_times, times, stages, step, effort, rows, reached, &
                         n_rows, status, evaluations)
     !! Angular velocity at each of `times`, which lead away from 0.
-    real(dp), intent(in) :: coefficients(3)        !! A, B, C
-    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
-    real(dp), intent(in) :: m_rate(3)              !! 1/s3
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)         !! s
@@ -51,10 +45,9 @@ contains
     real(dp) :: m(MOST_STAGES, 3)    ! torque at the nodes
     real(dp) :: f(MOST_STAGES, 3)    ! rates at the nodes
     real(dp) :: at_node(3)
-    real(dp) :: begin
-    real(dp) :: h
+    real(dp) :: begin, h
     real(dp) :: h_low                ! what the rounding of the step left out, s
-    real(dp) :: n_steps
+    real(dp) :: waves, n_steps
     real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
     real(dp) :: done
     real(dp) :: span                 ! from time to time, s
@@ -69,28 +62,28 @@ contains
     real(dp) :: stride               ! steps between looks at the user
     real(dp) :: next_look            ! steps of the way to this time
     logical :: varies
-    integer :: i
-    integer :: k
+    integer :: i, k
 
     n_rows = 0
     status = COMPLETE
     evaluations = 0
     most = int(min(COUNTABLE, effort*MOST_EVALUATIONS), int64)
-    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + real(n_sines, dp) + real(n_cosines, dp)))
+    waves = real(problem%n_sines + problem%n_cosines, dp)
+    stride = 1.0_dp + BETWEEN_LOOKS/(stages*(8.0_dp + waves))
     next_look = stride
     y = omega0
     carry = 0.0_dp
     f = 0.0_dp
     reached = [0.0_dp, y]
-    varies = n_sines + n_cosines > 0 .or. any(abs(m_rate) > 0.0_dp)
+    varies = waves > 0.0_dp .or. any(abs(problem%rate) > 0.0_dp)
     do k = 1, MOST_STAGES
-      m(k, :) = m_constant
+      m(k, :) = problem%constant
     end do
     begin = 0.0_dp
     do i = 1, n_times
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
       ! Two iterations a step at the least; a wave costs as much as one.
-      cost = n_steps*real(stages, dp)*(2.0_dp + real(n_sines, dp) + real(n_cosines, dp))
+      cost = n_steps*real(stages, dp)*(2.0_dp + waves)
       if (.not. cost <= real(most - evaluations, dp)) then
         status = GAVE_UP
         return
@@ -109,12 +102,11 @@ contains
             call two_sum(begin, walked, time, time_low)
             time_low = time_low + (walked_low + done*h_low)
             call two_sum(time, NODES(k, stages)*h, node, node_low)
-            call torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, node, &
-                           node_low + time_low, at_node)
+            call torque_at(problem, node, node_low + time_low, at_node)
             m(k, :) = at_node
           end do
         end if
-        call advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
+        call advance(problem%coefficients, m, h, stages, most, y, carry, f, status, evaluations)
         if (status /= COMPLETE) return
         done = done + 1.0_dp
         reached = [begin + done*h, y]
@@ -140,27 +132,17 @@ contains
     real(dp), intent(in) :: h
     integer, intent(in) :: stages
     integer(int64), intent(in) :: most            !! right-hand sides
-    real(dp), intent(inout) :: y(3)
-    real(dp), intent(inout) :: carry(3)
+    real(dp), intent(inout) :: y(3), carry(3)
     real(dp), intent(inout) :: f(MOST_STAGES, 3)  !! rates of the last step, 0 if there is none
     integer, intent(out) :: status
     integer(int64), intent(inout) :: evaluations
     real(dp) :: z(MOST_STAGES, 3)       ! states at the nodes less y
-    real(dp) :: zero(MOST_STAGES, 3)
-    real(dp) :: z_before(MOST_STAGES, 3)
+    real(dp) :: zero(MOST_STAGES, 3), z_before(MOST_STAGES, 3)
     real(dp) :: states(MOST_STAGES, 3)
     real(dp) :: low(MOST_STAGES, 3)     ! what the low words of the matrix add
-    real(dp) :: change
-    real(dp) :: change_before
-    real(dp) :: scale
-    real(dp) :: increment
-    real(dp) :: total
-    real(dp) :: part
-    real(dp) :: back
-    real(dp) :: rest
-    integer :: axis
-    integer :: iteration
-    integer :: k
+    real(dp) :: change, change_before, scale
+    real(dp) :: increment, total, part, back, rest
+    integer :: axis, iteration, k
 
     status = GAVE_UP
     scale = max(abs(y(1)), abs(y(2)), abs(y(3)))
@@ -224,13 +206,10 @@ contains
   pure subroutine stage_sums(table, f, start, stages, z)
     !! z = start + table times f.
     real(dp), intent(in) :: table(MOST_STAGES, MOST_STAGES)
-    real(dp), intent(in) :: f(MOST_STAGES, 3)
-    real(dp), intent(in) :: start(MOST_STAGES, 3)
+    real(dp), intent(in) :: f(MOST_STAGES, 3), start(MOST_STAGES, 3)
     integer, intent(in) :: stages
     real(dp), intent(out) :: z(MOST_STAGES, 3)
-    integer :: axis
-    integer :: j
-    integer :: k
+    integer :: axis, j, k
 
     z = start
     do axis = 1, 3

@@ -3,16 +3,13 @@
 #include <stdint.h>
 
 #define ARGUMENTS                                                                              \
-  const double *coefficients, const double *m_constant, const double *m_rate, int n_sines,     \
-      const double *sines, int n_cosines, const double *cosines, const double *omega,          \
-      const double *tolerance, const double *effort, int n_times, const double *times,         \
-      double *rows, int *n_rows, int *status, int64_t *steps, double *needed
+  const void *problem, const double *omega, const double *tolerance, const double *effort,     \
+      int n_times, const double *times, double *rows, int *n_rows, int *status,                \
+      int64_t *steps, double *needed
 
 #define QUICK_ARGUMENTS                                                                        \
-  const double *coefficients, const double *m_constant, const double *m_rate, int n_sines,     \
-      const double *sines, int n_cosines, const double *cosines, const double *omega,          \
-      const double *tolerance, const double *effort, const double *t_end, int contest,         \
-      double *result, int *status, int *steps
+  const void *problem, const double *omega, const double *tolerance, const double *effort,     \
+      const double *t_end, int contest, double *result, int *status, int *steps
 
 typedef void solver(ARGUMENTS);
 typedef void quick_solver(QUICK_ARGUMENTS);
@@ -64,12 +61,10 @@ __attribute__((constructor)) static void choose_best(void) { choose_level(2); }
 
 void taylor_solve(ARGUMENTS)
 {
-  chosen(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, tolerance,
-         effort, n_times, times, rows, n_rows, status, steps, needed);
+  chosen(problem, omega, tolerance, effort, n_times, times, rows, n_rows, status, steps, needed);
 }
 
 void quick_solve(QUICK_ARGUMENTS)
 {
-  chosen_quick(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega,
-               tolerance, effort, t_end, contest, result, status, steps);
+  chosen_quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps);
 }

@@ -2,39 +2,20 @@ module prepared
   !! One door for a solver that was prepared: all that does not change lies packed in one array,
   !! so that a call from Python converts three arguments and not fourteen.
   use, intrinsic :: iso_fortran_env, only: int64
-  use fixed_step, only: fixed_step_rows, IMPROVED_EULER, RUNGE_KUTTA_4, TAYLOR_3
+  use fixed_step, only: fixed_step_rows
   use gauss_collocation, only: gauss_rows
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
+  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, IMPROVED_EULER, QUICK, &
+                     QUICK_OR_TAYLOR, RK4, SPHERE, TAYLOR
+  use places, only: COEFFICIENTS, CONSTANT, EFFORT, METHOD, N_COSINES, N_SINES, RATE, STEP, &
+                    TOLERANCE, WAVES
+  use problem, only: problem_t
   use sphere, only: sphere_rows
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED
-  use torque_free, only: torque_free_end
+  use torque_free, only: torque_free_rows
   implicit none(type, external)
   private
-
-  ! Places in the packed array; pyharness/methods/prepared.py fills it, and any number of threads read it.
-  integer, parameter :: METHOD = 1
-  integer, parameter :: TOLERANCE = 2    ! relative, of the series
-  integer, parameter :: STEP = 3         ! s, of the methods with a fixed step
-  integer, parameter :: N_SINES = 4
-  integer, parameter :: N_COSINES = 5
-  integer, parameter :: COEFFICIENTS = 6 ! three
-  integer, parameter :: M_CONSTANT = 9   ! three, 1/s2
-  integer, parameter :: M_RATE = 12      ! three, 1/s3
-  integer, parameter :: EFFORT = 15      ! factor on the limits
-  integer, parameter :: WAVES = 16       ! four for each sine, then for each cosine
-
-  ! Values of METHOD; 10 + s is Gauss collocation of s stages.
-  integer, parameter :: TORQUE_FREE = 1
-  integer, parameter :: SPHERE = 2
-  integer, parameter :: SERIES = 3
-  integer, parameter :: EULER_STEPS = 4
-  integer, parameter :: TAYLOR_3_STEPS = 5
-  integer, parameter :: RUNGE_KUTTA_STEPS = 6
-  integer, parameter :: QUICK = 7           ! Runge-Kutta for few digits
-  integer, parameter :: QUICK_OR_SERIES = 8 ! whichever takes fewer operations
-  integer, parameter :: FREE_OR_SERIES = 9  ! the closed form, or the series where it refuses
-  integer, parameter :: GAUSS = 10
 
   ! Beyond it, or below its inverse, products of omegas may overflow or underflow, though the
   ! solution is an ordinary number.
@@ -50,7 +31,7 @@ contains
   subroutine solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps)
     !! Angular velocity at `t_end` by the method that was prepared; NaN unless `status` is 0.
     integer, intent(in) :: n_packed
-    real(dp), intent(in) :: packed(n_packed)
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
@@ -71,24 +52,24 @@ contains
   subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps)
     !! The same in units that bring omega near 1, by a power of two: it changes no digit.
     integer, intent(in) :: n_packed
-    real(dp), intent(in) :: packed(n_packed)
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(in) :: largest    !! of omega0, rad/s
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
-    real(dp) :: copy(n_packed)
+    real(dp), target :: copy(0:n_packed - 1)
     real(dp) :: start(3)
     real(dp) :: reach      ! omega0 and what the torque gives, rad/s
     real(dp) :: share      ! of its amplitude that a wave comes to
     real(dp) :: time       ! in the new units
     integer :: power       ! omega is 2**power times what it is in the new units
-    integer :: i
+    integer :: code, i
 
     reach = largest
     do i = 0, 2
-      reach = max(reach, abs(packed(M_CONSTANT + i)*t_end), abs(packed(M_RATE + i)*t_end*t_end))
+      reach = max(reach, abs(packed(CONSTANT + i)*t_end), abs(packed(RATE + i)*t_end*t_end))
     end do
     do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 4, 4
       share = 1.0_dp
@@ -104,10 +85,13 @@ contains
     time = scale(t_end, power)
     copy = packed
     ! Where the step plays no part it may be no number in the new unit.
-    if (in_steps(int(packed(METHOD)))) copy(STEP) = scale(packed(STEP), power)
+    code = int(packed(METHOD))
+    if (code > GAUSS .or. (code >= IMPROVED_EULER .and. code <= RK4)) then
+      copy(STEP) = scale(packed(STEP), power)
+    end if
     do i = 0, 2
-      copy(M_CONSTANT + i) = scale(scale(packed(M_CONSTANT + i), -power), -power)
-      copy(M_RATE + i) = scale(scale(scale(packed(M_RATE + i), -power), -power), -power)
+      copy(CONSTANT + i) = scale(scale(packed(CONSTANT + i), -power), -power)
+      copy(RATE + i) = scale(scale(scale(packed(RATE + i), -power), -power), -power)
     end do
     do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 1
       copy(i) = scale(packed(i), -power)
@@ -136,72 +120,57 @@ contains
   subroutine solve_as_given(packed, n_packed, omega0, t_end, omega, ended, count)
     !! The same without a look at the scale; omega means nothing unless `ended` is 0.
     integer, intent(in) :: n_packed
-    real(dp), intent(in) :: packed(n_packed)
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: ended      !! of the module statuses
     integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
+    type(problem_t) :: problem
     real(dp) :: times(1)
-    real(dp) :: rows(3, 1)
     real(dp) :: reached(4)
     real(dp) :: tolerance_left
-    integer :: sines
-    integer :: cosines
-    integer :: cosines_at
-    integer :: n_rows
-    integer :: quick_steps
+    integer :: code, n_rows, quick_steps
     integer(int64) :: evaluations
     real(dp) :: needed
 
-    sines = int(packed(N_SINES))
-    cosines = int(packed(N_COSINES))
-    cosines_at = WAVES + 4*sines
+    code = int(packed(METHOD))
     times(1) = t_end
     count = 0
-    select case (int(packed(METHOD)))
-    case (TORQUE_FREE, FREE_OR_SERIES)
-      call torque_free_end(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, t_end, omega, ended)
-      if (ended == REFUSED .and. int(packed(METHOD)) == FREE_OR_SERIES) then
-        call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                          packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
-                          packed(EFFORT), 1, times, rows, n_rows, ended, count, needed)
-        omega = rows(:, 1)
+    select case (code)
+    case (CLOSED_FORM, CLOSED_FORM_OR_TAYLOR)
+      call torque_free_rows(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, 1, times, omega, &
+                            n_rows, ended)
+      if (ended == REFUSED .and. code == CLOSED_FORM_OR_TAYLOR) then
+        call unpack(packed, n_packed, problem)
+        call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
+                          n_rows, ended, count, needed)
       end if
     case (SPHERE)
-      call sphere_rows(packed(M_CONSTANT), packed(M_RATE), sines, packed(WAVES), cosines, &
-                       packed(cosines_at), omega0, packed(EFFORT), 1, times, rows, n_rows, ended, &
-                       needed)
-      omega = rows(:, 1)
-    case (SERIES, QUICK, QUICK_OR_SERIES)
+      call unpack(packed, n_packed, problem)
+      call sphere_rows(problem, omega0, packed(EFFORT), 1, times, omega, n_rows, ended, needed)
+    case (TAYLOR, QUICK, QUICK_OR_TAYLOR)
+      call unpack(packed, n_packed, problem)
       ended = REFUSED
       tolerance_left = packed(TOLERANCE)
-      if (int(packed(METHOD)) /= SERIES) then
+      if (code /= TAYLOR) then
         tolerance_left = AUTO_SHARE*tolerance_left
-        call quick_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                         packed(WAVES), cosines, packed(cosines_at), omega0, packed(TOLERANCE), &
-                         packed(EFFORT), t_end, int(packed(METHOD)) - QUICK, omega, ended, &
-                         quick_steps)
+        call quick_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), t_end, &
+                         merge(1, 0, code == QUICK_OR_TAYLOR), omega, ended, quick_steps)
         count = quick_steps
       end if
-      if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. int(packed(METHOD)) /= QUICK) then
-        call taylor_solve(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                          packed(WAVES), cosines, packed(cosines_at), omega0, tolerance_left, &
-                          packed(EFFORT), 1, times, rows, n_rows, ended, count, needed)
-        omega = rows(:, 1)
+      if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
+        call taylor_solve(problem, omega0, tolerance_left, packed(EFFORT), 1, times, omega, &
+                          n_rows, ended, count, needed)
       end if
-    case (EULER_STEPS:RUNGE_KUTTA_STEPS)
-      call fixed_step_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                           packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
-                           fixed_method(int(packed(METHOD))), packed(STEP), packed(EFFORT), rows, &
+    case (IMPROVED_EULER:RK4)
+      call unpack(packed, n_packed, problem)
+      call fixed_step_rows(problem, omega0, 1, times, code, packed(STEP), packed(EFFORT), omega, &
                            n_rows, ended, count, evaluations, needed)
-      omega = rows(:, 1)
     case default
-      call gauss_rows(packed(COEFFICIENTS), packed(M_CONSTANT), packed(M_RATE), sines, &
-                      packed(WAVES), cosines, packed(cosines_at), omega0, 1, times, &
-                      int(packed(METHOD)) - GAUSS, packed(STEP), packed(EFFORT), rows, reached, &
-                      n_rows, ended, count)
-      omega = rows(:, 1)
+      call unpack(packed, n_packed, problem)
+      call gauss_rows(problem, omega0, 1, times, code - GAUSS, packed(STEP), packed(EFFORT), &
+                      omega, reached, n_rows, ended, count)
     end select
     ! A start that is not finite may come back as it is, at time 0 for one.
     if (ended == COMPLETE) then
@@ -209,25 +178,24 @@ contains
     end if
   end subroutine solve_as_given
 
-  pure logical function in_steps(code)
-    !! Whether the method of a value of METHOD goes in steps that are given.
-    integer, intent(in) :: code
+  subroutine unpack(packed, n_packed, problem)
+    !! The waves stay where they are.
+    integer, intent(in) :: n_packed
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
+    type(problem_t), intent(out) :: problem
+    integer :: middle
 
-    in_steps = code > GAUSS .or. (code >= EULER_STEPS .and. code <= RUNGE_KUTTA_STEPS)
-  end function in_steps
-
-  pure integer function fixed_method(code)
-    !! The fixed-step method of a value of METHOD.
-    integer, intent(in) :: code
-
-    select case (code)
-    case (EULER_STEPS)
-      fixed_method = IMPROVED_EULER
-    case (TAYLOR_3_STEPS)
-      fixed_method = TAYLOR_3
-    case default
-      fixed_method = RUNGE_KUTTA_4
-    end select
-  end function fixed_method
+    problem%coefficients = packed(COEFFICIENTS:COEFFICIENTS + 2)
+    problem%constant = packed(CONSTANT:CONSTANT + 2)
+    problem%rate = packed(RATE:RATE + 2)
+    problem%n_sines = int(packed(N_SINES))
+    problem%n_cosines = int(packed(N_COSINES))
+    ! To point at nothing would cost time.
+    if (problem%n_sines + problem%n_cosines > 0) then
+      middle = WAVES + 4*problem%n_sines
+      problem%sines(1:4, 1:problem%n_sines) => packed(WAVES:middle - 1)
+      problem%cosines(1:4, 1:problem%n_cosines) => packed(middle:middle + 4*problem%n_cosines - 1)
+    end if
+  end subroutine unpack
 
 end module prepared

@@ -3,6 +3,7 @@ module scaled_motion
   !! torque in them; waves that are fast and weak are averaged, to second order.
   use euler_equations, only: sine_cosine
   use kinds, only: dp
+  use problem, only: problem_t
   use statuses, only: COMPLETE, REFUSED
   implicit none(type, external)
   private
@@ -32,30 +33,23 @@ module scaled_motion
 
 contains
 
-  pure subroutine scaled(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         t_end, motion, status)
+  pure subroutine scaled(problem, t_end, motion, status)
     !! Unknowns in which every product has the coefficient 1 or -1, and -1 only the second.
-    real(dp), intent(in) :: coefficients(3)
-    real(dp), intent(in) :: m_constant(3)
-    real(dp), intent(in) :: m_rate(3)
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)
+    type(problem_t), intent(in) :: problem !! of no more than MOST_WAVES waves
     real(dp), intent(in) :: t_end    !! s
     type(motion_t), intent(out) :: motion
     integer, intent(out) :: status
-    real(dp) :: c(3)
-    real(dp) :: root(3)
+    real(dp) :: c(3), root(3)
     real(dp) :: turned       ! -1 where all signs are turned by turning the third axis
     integer :: i
 
     status = REFUSED
     ! The axis whose sign stands alone becomes the second.
     motion%axes = [3, 1, 2]
-    if (coefficients(1)*coefficients(2) > 0.0_dp) motion%axes = [2, 3, 1]
-    if (coefficients(1)*coefficients(3) > 0.0_dp) motion%axes = [1, 2, 3]
-    c = coefficients(motion%axes)
+    c = problem%coefficients
+    if (c(1)*c(2) > 0.0_dp) motion%axes = [2, 3, 1]
+    if (c(1)*c(3) > 0.0_dp) motion%axes = [1, 2, 3]
+    c = c(motion%axes)
     motion%sign_2 = merge(-1.0_dp, 1.0_dp, c(1)*c(2) < 0.0_dp)
     turned = 1.0_dp
     if (c(1) < 0.0_dp) turned = -1.0_dp
@@ -65,30 +59,31 @@ contains
     motion%scale(2) = 1.0_dp/(root(1)*root(3))
     motion%scale(3) = turned/(root(1)*root(2))
     if (.not. maxval(abs(motion%scale)) <= 1e100_dp) return
-    motion%slope = m_constant(motion%axes)/motion%scale
-    motion%climb = m_rate(motion%axes)/motion%scale
+    motion%slope = problem%constant(motion%axes)/motion%scale
+    motion%climb = problem%rate(motion%axes)/motion%scale
     motion%waves = 0
     motion%resolved = 0
-    do i = 1, n_sines
-      call add_wave(sines(1:3, i), sines(4, i), .false., t_end, motion)
+    do i = 1, problem%n_sines
+      call add_wave(problem%sines(:, i), .false., t_end, motion)
     end do
-    do i = 1, n_cosines
-      call add_wave(cosines(1:3, i), cosines(4, i), .true., t_end, motion)
+    do i = 1, problem%n_cosines
+      call add_wave(problem%cosines(:, i), .true., t_end, motion)
     end do
     status = COMPLETE
   end subroutine scaled
 
-  pure subroutine add_wave(amplitude, frequency, is_cosine, t_end, motion)
+  pure subroutine add_wave(wave, is_cosine, t_end, motion)
     !! The integral of one more wave; waves of one frequency share their sine and versine.
-    real(dp), intent(in) :: amplitude(3)  !! 1/s2
-    real(dp), intent(in) :: frequency     !! rad/s
+    real(dp), intent(in) :: wave(4)       !! amplitude (3), 1/s2; frequency, rad/s
     logical, intent(in) :: is_cosine
     real(dp), intent(in) :: t_end         !! s
     type(motion_t), intent(inout) :: motion
     real(dp) :: part(3)
+    real(dp) :: frequency
     integer :: n
 
-    part = amplitude(motion%axes)/motion%scale
+    part = wave(motion%axes)/motion%scale
+    frequency = wave(4)
     if (abs(frequency*t_end) < SLOW) then
       if (is_cosine) then
         motion%slope = motion%slope + part
@@ -124,10 +119,8 @@ contains
     real(dp) :: largest                  ! scale
     real(dp) :: change                   ! of the unknowns, 1/s2
     real(dp) :: f                        ! rad/s
-    real(dp) :: size
-    real(dp) :: error
-    integer :: n
-    integer :: k
+    real(dp) :: size, error
+    integer :: n, k
 
     largest = maxval(abs(motion%scale))
     change = 2.0_dp*rate*rate + maxval(abs(motion%slope)) + abs(t_end)*maxval(abs(motion%climb))
@@ -159,8 +152,7 @@ contains
   pure subroutine swap(motion, n, k)
     !! Two waves change places.
     type(motion_t), intent(inout) :: motion
-    integer, intent(in) :: n
-    integer, intent(in) :: k
+    integer, intent(in) :: n, k
 
     if (n == k) return
     motion%frequency([n, k]) = motion%frequency([k, n])
@@ -175,8 +167,7 @@ contains
     real(dp), intent(in) :: t            !! s
     real(dp) :: change(3)
     real(dp) :: o(3)
-    real(dp) :: sine
-    real(dp) :: vers
+    real(dp) :: sine, vers
     integer :: n
 
     o = 0.0_dp
@@ -240,8 +231,7 @@ contains
     !! that is averaged may have turned by any number of radians.
     real(dp), intent(in) :: frequency    !! rad/s
     real(dp), intent(in) :: t            !! s
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: vers
+    real(dp), intent(out) :: sine, vers
     real(dp) :: s                        ! of half the angle
     real(dp) :: c
 
@@ -255,8 +245,7 @@ contains
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t
     real(dp) :: s(3)
-    real(dp) :: sine
-    real(dp) :: vers
+    real(dp) :: sine, vers
     integer :: n
 
     s = t*(motion%slope + (0.5_dp*t)*motion%climb)

@@ -2,6 +2,7 @@ module sphere
   !! Closed form of the sphere under the torque law of a scene: the integral of the torque.
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use two_words, only: sine_cosine, two_product, two_sum
   implicit none(type, external)
@@ -16,16 +17,10 @@ module sphere
 
 contains
 
-  subroutine sphere_rows(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, effort, &
-                         n_times, times, rows, n_rows, status, needed)
+  subroutine sphere_rows(problem, omega0, effort, n_times, times, rows, n_rows, status, needed)
     !! Angular velocity of a sphere, or of any body with A = B = C = 0: omega0 and the integral
     !! of the torque over the moment.
-    real(dp), intent(in) :: m_constant(3)          !! torque over moment, 1/s2
-    real(dp), intent(in) :: m_rate(3)              !! 1/s3
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
+    type(problem_t), intent(in) :: problem         !! whose coefficients are not looked at
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
     real(dp), intent(in) :: effort                 !! factor on the terms allowed
     integer, intent(in) :: n_times
@@ -37,21 +32,17 @@ contains
     real(dp) :: total(3)
     real(dp) :: rest(3)    ! what rounding took off the total
     real(dp) :: t
-    real(dp) :: sine       ! of half the angle
-    real(dp) :: cosine
-    real(dp) :: quotient   ! sine over half the angle
     real(dp) :: unseen     ! terms since the last look
     integer :: i
-    integer :: k
 
     n_rows = 0
     status = GAVE_UP
-    needed = n_times*(1.0_dp + real(n_sines, dp) + real(n_cosines, dp))/MOST_TERMS
+    needed = n_times*(1.0_dp + real(problem%n_sines + problem%n_cosines, dp))/MOST_TERMS
     if (needed > effort) return
     status = COMPLETE
     unseen = 0.0_dp
     do i = 1, n_times
-      unseen = unseen + (1.0_dp + real(n_sines, dp) + real(n_cosines, dp))
+      unseen = unseen + (1.0_dp + real(problem%n_sines + problem%n_cosines, dp))
       if (unseen > BETWEEN_LOOKS) then
         unseen = 0.0_dp
         if (interrupt_raised() /= 0) then
@@ -62,16 +53,12 @@ contains
       t = times(i)
       total = omega0
       rest = 0.0_dp
-      call add(total, rest, m_constant, t)
-      call add(total, rest, m_rate, 0.5_dp*t*t)
-      do k = 1, n_sines
-        call half_angle(sines(4, k), t, sine, cosine, quotient)
-        call add_wave(total, rest, sines(1:3, k), t, sine*quotient)
-      end do
-      do k = 1, n_cosines
-        call half_angle(cosines(4, k), t, sine, cosine, quotient)
-        call add_wave(total, rest, cosines(1:3, k), t, cosine*quotient)
-      end do
+      call add(total, rest, problem%constant, t)
+      call add(total, rest, problem%rate, 0.5_dp*t*t)
+      if (problem%n_sines + problem%n_cosines > 0) then
+        call add_waves(total, rest, problem%n_sines, problem%sines, .true., t)
+        call add_waves(total, rest, problem%n_cosines, problem%cosines, .false., t)
+      end if
       total = total + rest
       if (.not. all(abs(total) <= huge(t))) then
         status = OVERFLOW
@@ -82,32 +69,36 @@ contains
     end do
   end subroutine sphere_rows
 
-  pure subroutine add_wave(total, rest, amplitude, t, part)
-    !! Add amplitude times t times part; where the factors alone would leave the range of numbers,
-    !! in another order.
-    real(dp), intent(inout) :: total(3)
-    real(dp), intent(inout) :: rest(3)
-    real(dp), intent(in) :: amplitude(3)
+  pure subroutine add_waves(total, rest, n, waves, are_sines, t)
+    !! Add the integral of each wave: amplitude times t times a part.
+    real(dp), intent(inout) :: total(3), rest(3)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: waves(4, n)
+    logical, intent(in) :: are_sines
     real(dp), intent(in) :: t
-    real(dp), intent(in) :: part
+    real(dp) :: sine, cosine   ! of half the angle
+    real(dp) :: quotient       ! sine over half the angle
+    real(dp) :: part
+    integer :: k
 
-    if (abs(t*part) >= SMALL) then
-      call add(total, rest, amplitude, t*part)
-    else
-      call add(total, rest, amplitude*t, part)
-    end if
-  end subroutine add_wave
+    do k = 1, n
+      call half_angle(waves(4, k), t, sine, cosine, quotient)
+      part = merge(sine, cosine, are_sines)*quotient
+      ! Where the factors alone would leave the range of numbers, in another order.
+      if (abs(t*part) >= SMALL) then
+        call add(total, rest, waves(1:3, k), t*part)
+      else
+        call add(total, rest, waves(1:3, k)*t, part)
+      end if
+    end do
+  end subroutine add_waves
 
   pure subroutine add(total, rest, amplitude, factor)
     !! Add amplitude times factor to total + rest.
-    real(dp), intent(inout) :: total(3)
-    real(dp), intent(inout) :: rest(3)
+    real(dp), intent(inout) :: total(3), rest(3)
     real(dp), intent(in) :: amplitude(3)
     real(dp), intent(in) :: factor
-    real(dp) :: term
-    real(dp) :: term_low
-    real(dp) :: sum_high
-    real(dp) :: sum_low
+    real(dp) :: term, term_low, sum_high, sum_low
     integer :: axis
 
     do axis = 1, 3
@@ -121,13 +112,9 @@ contains
 
   pure subroutine half_angle(frequency, t, sine, cosine, quotient)
     !! Sine and cosine of frequency t/2, and the sine over it.
-    real(dp), intent(in) :: frequency
-    real(dp), intent(in) :: t
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
-    real(dp), intent(out) :: quotient
-    real(dp) :: angle
-    real(dp) :: angle_low
+    real(dp), intent(in) :: frequency, t
+    real(dp), intent(out) :: sine, cosine, quotient
+    real(dp) :: angle, angle_low
 
     call two_product(frequency, 0.5_dp*t, angle, angle_low)
     call sine_cosine(angle, angle_low, sine, cosine)

@@ -1,13 +1,15 @@
 module taylor
-  !! Taylor series by recurrence, order and step adapted; unroll.py writes out the marked loops.
-  !! Terms are held with the power of the step in them, so a step ends with a plain sum.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  !! Taylor series, order and step adapted.
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use euler_equations, only: INVERSE, MOST_ORDER, torque_t, torque_terms
+  use euler_equations, only: INVERSE, torque_terms
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_plan, only: plan
+  use taylor_series, only: expand_constant, expand_varying, fitting, following, scale_of, &
+                           series_t, shorten, size_of
   implicit none(type, external)
   private
 
@@ -28,37 +30,15 @@ module taylor
   real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass: orders that vary cost time
 
-  type :: series_t
-    ! Term k is the coefficient times step**k, rad/s. The products of a column of `left` and one of
-    ! `right` are those of equations 13-15, three at once: w2 w3, w1 w3, w1 w2; the fourth is idle.
-    real(dp) :: left(4, 0:MOST_ORDER)  !! omega2, omega1, omega1, 0
-    real(dp) :: right(4, 0:MOST_ORDER) !! omega3, omega3, omega2, 0
-    real(dp) :: sums(4)              !! of products, (rad/s)**2
-    real(dp) :: k1(MOST_ORDER)       !! A step over order; with a varying torque the first only
-    real(dp) :: k2(MOST_ORDER)       !! B
-    real(dp) :: k3(MOST_ORDER)       !! C
-    real(dp) :: m(3, MOST_ORDER)     !! what the torque adds to the terms, rad/s
-    real(dp) :: tail(3)              !! sum of the terms from 4, rad/s
-    real(dp) :: last                 !! size of the last two terms, rad/s
-    integer :: order                 !! of the last term
-  end type series_t
-
   public :: taylor_solve
 
 contains
 
-  subroutine taylor_solve(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                          omega, tolerance, effort, n_times, times, rows, n_rows, status, &
-                          steps, needed) &
+  subroutine taylor_solve(problem_at, omega, tolerance, effort, n_times, times, rows, n_rows, &
+                          status, steps, needed) &
     bind(c, name="taylor_solve_level")
     !! Solution at `times`, which lead away from 0 on one side.
-    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
-    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
-    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
-    integer(c_int), intent(in), value :: n_sines
-    real(c_double), intent(in), target :: sines(4, n_sines)     !! amplitude (3), frequency in rad/s
-    integer(c_int), intent(in), value :: n_cosines
-    real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
+    type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
     real(c_double), intent(in) :: effort                !! factor on the steps allowed
@@ -69,6 +49,7 @@ contains
     integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted
     integer(c_int64_t), intent(out) :: steps            !! of the last march
     real(c_double), intent(out) :: needed               !! effort, as far as known; where it gave up
+    type(problem_t), pointer :: problem
     real(dp) :: growth  ! of a small difference on the way
     real(dp) :: known   ! the same, as far as it was reckoned with
     real(dp) :: cost    ! of a step, in steps without waves
@@ -76,14 +57,14 @@ contains
     real(dp) :: spent   ! steps of the marches before
     real(dp) :: ahead   ! steps that this march would need
 
+    call c_f_pointer(problem_at, problem)
     known = PLANNED
-    cost = 1.0_dp + A_WAVE*(real(n_sines, dp) + real(n_cosines, dp))
+    cost = 1.0_dp + A_WAVE*real(problem%n_sines + problem%n_cosines, dp)
     most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
     spent = 0.0_dp
     needed = 0.0_dp
     do
-      call march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega, &
-                 tolerance*(PLANNED/known), most - spent, &
+      call march(problem, omega, tolerance*(PLANNED/known), most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, c_int64_t), n_times, times, rows, n_rows, &
                  status, steps, growth, ahead)
       if (status == GAVE_UP) then
@@ -99,17 +80,10 @@ contains
     end do
   end subroutine taylor_solve
 
-  subroutine march(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                   omega, tolerance, most_steps, stride, n_times, times, rows, n_rows, status, &
-                   steps, growth, ahead)
+  subroutine march(problem, omega, tolerance, most_steps, stride, n_times, times, rows, n_rows, &
+                   status, steps, growth, ahead)
     !! Once from 0 to the last of the times.
-    real(c_double), intent(in) :: coefficients(3)       !! A, B, C
-    real(c_double), intent(in) :: m_constant(3)         !! torque over moment, 1/s2
-    real(c_double), intent(in) :: m_rate(3)             !! 1/s3
-    integer(c_int), intent(in), value :: n_sines
-    real(c_double), intent(in), target :: sines(4, n_sines)     !! amplitude (3), frequency in rad/s
-    integer(c_int), intent(in), value :: n_cosines
-    real(c_double), intent(in), target :: cosines(4, n_cosines) !! the same
+    type(problem_t), intent(in) :: problem
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
     real(dp), intent(in) :: most_steps
@@ -123,12 +97,10 @@ contains
     real(dp), intent(out) :: growth !! of a small difference; looked at where the torque varies
     real(dp), intent(out) :: ahead  !! steps to the end, as far as known; where it gave up
     type(series_t) :: s
-    type(torque_t) :: torque
     real(dp) :: w(3)          ! omega at the step's beginning, rad/s
     real(dp) :: w_low(3)      ! what its rounding left out
     real(dp) :: change(3)     ! of omega in the step
-    real(dp) :: total(3)
-    real(dp) :: back(3)
+    real(dp) :: total(3), back(3)
     real(dp) :: t             ! the step's beginning, s
     real(dp) :: t_low         ! what its rounding left out
     real(dp) :: h             ! step, s
@@ -173,19 +145,13 @@ contains
       n_rows = 1
       return
     end if
-    torque%constant = m_constant
-    torque%rate = m_rate
-    torque%n_sines = n_sines
-    torque%n_cosines = n_cosines
-    torque%sines => sines
-    torque%cosines => cosines
-    varies = n_sines + n_cosines > 0 .or. any(m_rate /= 0.0_dp)
+    varies = problem%n_sines + problem%n_cosines > 0 .or. any(problem%rate /= 0.0_dp)
     least_difference = merge(1.0_dp, huge(size), varies)
-    roots(1) = sqrt(abs(coefficients(2)*coefficients(3)))
-    roots(2) = sqrt(abs(coefficients(1)*coefficients(3)))
-    roots(3) = sqrt(abs(coefficients(1)*coefficients(2)))
+    roots(1) = sqrt(abs(problem%coefficients(2)*problem%coefficients(3)))
+    roots(2) = sqrt(abs(problem%coefficients(1)*problem%coefficients(3)))
+    roots(3) = sqrt(abs(problem%coefficients(1)*problem%coefficients(2)))
     scale = max(abs(w(1)), abs(w(2)), abs(w(3)))
-    call plan(coefficients, torque, varies, scale, tolerance, rest, best, most, share, h)
+    call plan(problem, varies, scale, tolerance, rest, best, most, share, h)
     best_share = 65536/best
     s%left(4, :) = 0.0_dp
     s%right(4, :) = 0.0_dp
@@ -207,16 +173,16 @@ contains
       s%left(:, 0) = [w(2), w(1), w(1), 0.0_dp]
       s%right(:, 0) = [w(3), w(3), w(2), 0.0_dp]
       if (varies) then
-        s%k1(1) = coefficients(1)*h
-        s%k2(1) = coefficients(2)*h
-        s%k3(1) = coefficients(3)*h
-        call torque_terms(torque, t, t_low, h, most, s%m)
+        s%k1(1) = problem%coefficients(1)*h
+        s%k2(1) = problem%coefficients(2)*h
+        s%k3(1) = problem%coefficients(3)*h
+        call torque_terms(problem, t, t_low, h, most, s%m)
         call expand_varying(s, least, most, SLACK*allowed)
       else
-        s%k1 = (coefficients(1)*h)*INVERSE
-        s%k2 = (coefficients(2)*h)*INVERSE
-        s%k3 = (coefficients(3)*h)*INVERSE
-        s%m(:, 1) = h*m_constant
+        s%k1 = (problem%coefficients(1)*h)*INVERSE
+        s%k2 = (problem%coefficients(2)*h)*INVERSE
+        s%k3 = (problem%coefficients(3)*h)*INVERSE
+        s%m(:, 1) = h*problem%constant
         call expand_constant(s, least, most, SLACK*allowed)
       end if
       if (steps == 0) then
@@ -236,7 +202,7 @@ contains
             return
           end if
           h = h*0.0625_dp
-          if (n_sines + n_cosines > MANY_WAVES) then
+          if (problem%n_sines + problem%n_cosines > MANY_WAVES) then
             if (interrupt_raised() /= 0) then
               status = INTERRUPTED
               return
@@ -277,7 +243,7 @@ contains
       back = total - w
       w_low = (w - (total - back)) + (change - back)
       if (varies) then
-        call carry(coefficients, (0.25_dp*h)*(w + total), difference)
+        call carry(problem%coefficients, (0.25_dp*h)*(w + total), difference)
         size = max(abs(difference(1)), abs(difference(2)), abs(difference(3)))
       else
         ! Its own change is a small difference too, and known; over what grows with the torque.
@@ -332,8 +298,7 @@ contains
     real(dp), intent(in) :: half(3)         !! half the step times omega in its middle, rad
     real(dp), intent(inout) :: difference(3)
     real(dp) :: a2, a3, b1, b3, c1, c2      ! the products' derivatives, times half the step
-    real(dp) :: x, y, z
-    real(dp) :: determinant
+    real(dp) :: x, y, z, determinant
 
     a2 = coefficients(1)*half(2)
     a3 = coefficients(1)*half(3)
@@ -350,81 +315,6 @@ contains
     difference(2) = ((b3 + b1*c2)*x + (1.0_dp - a2*c2)*y + (b1 + a2*b3)*z)/determinant
     difference(3) = ((c2 + b3*c1)*x + (c1 + a3*c2)*y + (1.0_dp - a3*b3)*z)/determinant
   end subroutine carry
-
-  pure subroutine following(h, s, best, share, allowed, decay, next)
-    !! The step with which order `best` would just do, from the terms before the last two and the
-    !! decay seen in the step before, so that the processor need not wait for the last terms.
-    !! The bits of a positive number, read as an integer, are its logarithm: 6 % suffice here.
-    real(dp), intent(in) :: h                !! s
-    type(series_t), intent(in) :: s
-    integer, intent(in) :: best              !! order
-    integer(int64), intent(in) :: share      !! 65536 over best
-    real(dp), intent(in) :: allowed          !! rad/s
-    integer(int64), intent(inout) :: decay   !! logarithm, over two orders
-    real(dp), intent(out) :: next            !! s
-    integer(int64) :: before                 ! logarithm
-    integer(int64) :: change                 ! logarithm
-    integer :: k
-
-    k = s%order
-    before = transfer(size_of(s, k - 2), before)
-    change = transfer(allowed, change) - before - ((best - k + 2)/2)*decay
-    change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), shifta(change, 16)*share))
-    next = transfer(transfer(h, change) + change, h)
-    decay = transfer(s%last, before) - before
-  end subroutine following
-
-  pure real(dp) function size_of(s, k)
-    !! Size of the terms k - 1 and k, rad/s.
-    type(series_t), intent(in) :: s
-    integer, intent(in) :: k
-
-    size_of = (abs(s%left(2, k)) + abs(s%left(2, k - 1))) &
-              + (abs(s%left(1, k)) + abs(s%left(1, k - 1))) &
-              + (abs(s%right(1, k)) + abs(s%right(1, k - 1)))
-  end function size_of
-
-  pure real(dp) function scale_of(s)
-    !! Size of the first terms, rad/s: what a body at rest is about to reach.
-    type(series_t), intent(in) :: s
-    integer :: k
-
-    scale_of = 0.0_dp
-    do k = 1, 4
-      scale_of = max(scale_of, abs(s%left(2, k)), abs(s%left(1, k)), abs(s%right(1, k)))
-    end do
-    scale_of = min(scale_of, huge(scale_of))
-  end function scale_of
-
-  pure real(dp) function fitting(h, s, allowed)
-    !! The step with which the terms at hand would just do.
-    real(dp), intent(in) :: h        !! s
-    type(series_t), intent(in) :: s
-    real(dp), intent(in) :: allowed  !! rad/s
-    integer(int64) :: change         ! of the logarithm
-
-    change = (transfer(allowed, change) - transfer(s%last, change))/s%order
-    change = max(-ishft(40_int64, 52), min(ishft(40_int64, 52), change))
-    fitting = transfer(transfer(h, change) + change, h)
-  end function fitting
-
-  pure subroutine shorten(s, ratio)
-    !! The terms of a step that is `ratio` times as long.
-    type(series_t), intent(inout) :: s
-    real(dp), intent(in) :: ratio
-    real(dp) :: power
-    integer :: k
-
-    power = 1.0_dp
-    s%tail = 0.0_dp
-    do k = 1, s%order
-      power = power*ratio
-      s%left(2, k) = s%left(2, k)*power
-      s%left(1, k) = s%left(1, k)*power
-      s%right(1, k) = s%right(1, k)*power
-      if (k > 3) s%tail = s%tail + [s%left(2, k), s%left(1, k), s%right(1, k)]
-    end do
-  end subroutine shorten
 
   pure function inside(s, part) result(change)
     !! Change of omega at a part of the step, rad/s.
@@ -444,9 +334,7 @@ contains
     real(dp), intent(inout) :: t     !! s
     real(dp), intent(inout) :: t_low !! s
     real(dp), intent(in) :: h        !! s
-    real(dp) :: step
-    real(dp) :: total
-    real(dp) :: back
+    real(dp) :: step, total, back
 
     step = h + t_low
     total = t + step
@@ -454,49 +342,5 @@ contains
     t_low = (t - (total - back)) + (step - back)
     t = total
   end subroutine add_time
-
-  pure subroutine expand_constant(s, least, most, allowed)
-    !! Terms up to the first even order from `least` whose last two are small; constant torque.
-    type(series_t), intent(inout) :: s
-    integer, intent(in) :: least     !! order
-    integer, intent(in) :: most      !! order
-    real(dp), intent(in) :: allowed  !! rad/s
-    ! unroll: m 1
-    s%m(:, 2:) = 0.0_dp
-    call expand_varying(s, least, most, allowed)
-    ! end unroll
-  end subroutine expand_constant
-
-  pure subroutine expand_varying(s, least, most, allowed)
-    !! The same with a torque in every term.
-    type(series_t), intent(inout) :: s
-    integer, intent(in) :: least     !! order
-    integer, intent(in) :: most      !! order
-    real(dp), intent(in) :: allowed  !! rad/s
-    ! unroll: m 28
-    real(dp) :: x
-    real(dp) :: y
-    real(dp) :: z
-    integer :: i
-    integer :: k
-
-    s%tail = 0.0_dp
-    do k = 1, most
-      do i = 1, 3
-        s%sums(i) = dot_product(s%left(i, 0:k - 1), s%right(i, k - 1:0:-1))
-      end do
-      x = s%k1(1)*INVERSE(k)*s%sums(1) + s%m(1, k)
-      y = s%k2(1)*INVERSE(k)*s%sums(2) + s%m(2, k)
-      z = s%k3(1)*INVERSE(k)*s%sums(3) + s%m(3, k)
-      s%left(:3, k) = [y, x, x]
-      s%right(:3, k) = [z, z, y]
-      if (k > 3) s%tail = s%tail + [x, y, z]
-      if (k < max(6, least) .or. mod(k, 2) == 1) cycle
-      s%order = k
-      s%last = size_of(s, k)
-      if (s%last <= allowed) exit
-    end do
-    ! end unroll
-  end subroutine expand_varying
 
 end module taylor

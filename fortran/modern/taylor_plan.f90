@@ -2,8 +2,9 @@ module taylor_plan
   !! What a Taylor series is begun with: the order from the digits that are asked for, the share of
   !! the error that a step may have, the first step from the rates of the problem.
   use, intrinsic :: iso_fortran_env, only: int64
-  use euler_equations, only: MOST_ORDER, torque_t
+  use euler_equations, only: MOST_ORDER
   use kinds, only: dp
+  use problem, only: problem_t
   implicit none(type, external)
   private
 
@@ -14,10 +15,9 @@ module taylor_plan
 
 contains
 
-  pure subroutine plan(coefficients, torque, varies, scale, tolerance, time, best, most, share, h)
+  pure subroutine plan(problem, varies, scale, tolerance, time, best, most, share, h)
     !! Order from the tolerance, the first step from the rates of the problem.
-    real(dp), intent(in) :: coefficients(3) !! A, B, C
-    type(torque_t), intent(in) :: torque
+    type(problem_t), intent(in) :: problem
     logical, intent(in) :: varies           !! torque with time
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
     real(dp), intent(in) :: tolerance
@@ -34,20 +34,21 @@ contains
     integer :: n
 
     turned = 0.0_dp
-    coupling = max(abs(coefficients(1)), abs(coefficients(2)), abs(coefficients(3)))
-    push = max(abs(torque%constant(1)), abs(torque%constant(2)), abs(torque%constant(3)))
+    coupling = max(abs(problem%coefficients(1)), abs(problem%coefficients(2)), &
+                   abs(problem%coefficients(3)))
+    push = max(abs(problem%constant(1)), abs(problem%constant(2)), abs(problem%constant(3)))
     gain = 0.5_dp*push*abs(time)
     rate = coupling*scale + sqrt(coupling)*sqrt(push)
-    push = max(abs(torque%rate(1)), abs(torque%rate(2)), abs(torque%rate(3)))
+    push = max(abs(problem%rate(1)), abs(problem%rate(2)), abs(problem%rate(3)))
     if (push > 0.0_dp) then
       gain = gain + push*time*time/6.0_dp
       rate = rate + sqrt(coupling)*sqrt(push*abs(time))
     end if
-    do n = 1, torque%n_sines
-      call add_wave_rates(torque%sines(:, n), .true., coupling, time, gain, rate, turned)
+    do n = 1, problem%n_sines
+      call add_wave_rates(problem%sines(:, n), .true., coupling, time, gain, rate, turned)
     end do
-    do n = 1, torque%n_cosines
-      call add_wave_rates(torque%cosines(:, n), .false., coupling, time, gain, rate, turned)
+    do n = 1, problem%n_cosines
+      call add_wave_rates(problem%cosines(:, n), .false., coupling, time, gain, rate, turned)
     end do
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)

@@ -24,8 +24,7 @@ module torque_free
   type :: orbit_t
     !! One torque-free motion. Axis 2 of the orbit has the coefficient of the odd sign (the
     !! middle moment), axis 3 is the one about which the motion does not change its direction.
-    integer :: kind
-    integer :: levels
+    integer :: kind, levels
     integer :: axes(3)               !! of the body, for each of the orbit
     integer :: time_exponent         !! orbit's time is 2**this times the time, 0 for most
     integer :: omega_exponent        !! angular velocity is 2**this times the orbit's
@@ -40,7 +39,7 @@ module torque_free
     real(dp) :: lower(MOST_LEVELS)   !! a(n) b(n-1)
   end type orbit_t
 
-  public :: torque_free_rows, torque_free_end
+  public :: torque_free_rows
 
 contains
 
@@ -72,44 +71,21 @@ contains
     end do
   end subroutine torque_free_rows
 
-  pure subroutine torque_free_end(coefficients, omega0, t_end, omega, status)
-    !! Angular velocity of a torque-free body at one time.
-    real(dp), intent(in) :: coefficients(3)  !! A, B, C; not all of one sign, finite
-    real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
-    real(dp), intent(in) :: t_end            !! s, finite
-    real(dp), intent(out) :: omega(3)        !! rad/s; omega0 where the status is not COMPLETE
-    integer, intent(out) :: status           !! COMPLETE, OVERFLOW, REFUSED or GAVE_UP
-    type(orbit_t) :: orbit
-
-    call prepare(coefficients, omega0, orbit, status)
-    if (status == COMPLETE) call evaluate(orbit, t_end, omega, status)
-    if (status /= COMPLETE) omega = omega0
-  end subroutine torque_free_end
-
   pure subroutine prepare(coefficients, omega0, orbit, status)
     !! Everything about a motion that does not depend on the time.
-    real(dp), intent(in) :: coefficients(3)
-    real(dp), intent(in) :: omega0(3)
+    real(dp), intent(in) :: coefficients(3), omega0(3)
     type(orbit_t), intent(out) :: orbit
     integer, intent(out) :: status           !! COMPLETE or REFUSED
     real(dp) :: a(3)         ! coefficients along the axes of the orbit
     real(dp) :: w(3)         ! angular velocity along them
     real(dp) :: s(3)         ! |a|
-    real(dp) :: y(3)         ! squares of w
-    real(dp) :: y_low(3)
-    real(dp) :: left         ! parts of sums, with their low words
-    real(dp) :: left_low
-    real(dp) :: right
-    real(dp) :: right_low
-    real(dp) :: gap          ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
-    real(dp) :: gap_low
-    real(dp) :: modulus      ! square of the larger start of the mean
-    real(dp) :: modulus_low
-    real(dp) :: comodulus    ! square of the smaller one
-    real(dp) :: comodulus_low
+    real(dp) :: y(3), y_low(3) ! squares of w
+    real(dp) :: left, left_low, right, right_low ! parts of sums
+    real(dp) :: gap, gap_low ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
+    real(dp) :: modulus, modulus_low     ! square of the larger start of the mean
+    real(dp) :: comodulus, comodulus_low ! square of the smaller one
     real(dp) :: largest
-    integer :: i
-    integer :: j
+    integer :: i, j
 
     a = coefficients
     w = omega0
@@ -156,9 +132,7 @@ contains
     left_low = gap_low + (left_low - right_low)
     call two_sum(left, left_low, gap, gap_low)
     if (gap < 0.0_dp) then
-      i = orbit%axes(1)
-      orbit%axes(1) = orbit%axes(3)
-      orbit%axes(3) = i
+      orbit%axes = [orbit%axes(3), orbit%axes(2), orbit%axes(1)]
       a = [a(3), a(2), a(1)]
       w = [w(3), w(2), w(1)]
       s = [s(3), s(2), s(1)]
@@ -207,22 +181,11 @@ contains
   pure subroutine climb(a0, a0_low, b0, b0_low, orbit)
     !! The arithmetic-geometric mean of a0 >= b0 > 0 to twice the working digits, and what the
     !! way back needs of each level.
-    real(dp), intent(in) :: a0
-    real(dp), intent(in) :: a0_low
-    real(dp), intent(in) :: b0
-    real(dp), intent(in) :: b0_low
+    real(dp), intent(in) :: a0, a0_low, b0, b0_low
     type(orbit_t), intent(inout) :: orbit
-    real(dp) :: a
-    real(dp) :: a_low
-    real(dp) :: b
-    real(dp) :: b_low
-    real(dp) :: half_difference
-    real(dp) :: total
-    real(dp) :: mean
-    real(dp) :: product
-    real(dp) :: product_low
-    real(dp) :: square
-    real(dp) :: square_low
+    real(dp) :: a, a_low, b, b_low
+    real(dp) :: half_difference, total, mean
+    real(dp) :: product, product_low, square, square_low
     integer :: n
 
     a = a0
@@ -261,12 +224,9 @@ contains
     real(dp), intent(out) :: omega(3)
     integer, intent(out) :: status
     real(dp) :: t              ! in the orbit's unit
-    real(dp) :: phase
-    real(dp) :: phase_low
-    real(dp) :: sine
-    real(dp) :: cosine
-    real(dp) :: s2             ! sine**2
-    real(dp) :: c2             ! cosine**2
+    real(dp) :: phase, phase_low
+    real(dp) :: sine, cosine
+    real(dp) :: s2, c2         ! their squares
     real(dp) :: dn             ! of this level
     real(dp) :: dn_below       ! of the next one
     real(dp) :: inverse

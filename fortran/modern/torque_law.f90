@@ -1,6 +1,7 @@
 module torque_law
   !! Torque over moment: constant + rate t + sines + cosines.
   use kinds, only: dp
+  use problem, only: problem_t
   use two_words, only: sine_cosine, two_product
   implicit none(type, external)
   private
@@ -9,64 +10,55 @@ module torque_law
 
 contains
 
-  pure subroutine torque_at(m_constant, m_rate, n_sines, sines, n_cosines, cosines, time, &
-                            time_low, m)
+  pure subroutine torque_at(problem, time, time_low, m)
     !! Torque at time + time_low.
-    real(dp), intent(in) :: m_constant(3)          !! 1/s2
-    real(dp), intent(in) :: m_rate(3)              !! 1/s3
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)      !! amplitude (3), 1/s2; frequency, rad/s
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)  !! the same
-    real(dp), intent(in) :: time                   !! s
-    real(dp), intent(in) :: time_low               !! what its rounding left out, s
-    real(dp), intent(out) :: m(3)                  !! 1/s2
-    real(dp) :: sine
-    real(dp) :: cosine
-    integer :: k
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: time      !! s
+    real(dp), intent(in) :: time_low  !! what its rounding left out, s
+    real(dp), intent(out) :: m(3)     !! 1/s2
 
-    m = m_constant + m_rate*time
-    do k = 1, n_sines
-      call wave_at(sines(4, k), time, time_low, sine, cosine)
-      m = m + sines(1:3, k)*sine
-    end do
-    do k = 1, n_cosines
-      call wave_at(cosines(4, k), time, time_low, sine, cosine)
-      m = m + cosines(1:3, k)*cosine
-    end do
+    m = problem%constant + problem%rate*time
+    if (problem%n_sines + problem%n_cosines > 0) then
+      call add_waves(problem%n_sines, problem%sines, .true., time, time_low, m)
+      call add_waves(problem%n_cosines, problem%cosines, .false., time, time_low, m)
+    end if
   end subroutine torque_at
 
-  pure subroutine wave_at(frequency, time, time_low, sine, cosine)
-    !! With what the rounding of the angle leaves out: after 1e5 radians that is worth 1e-11.
-    real(dp), intent(in) :: frequency              !! rad/s
-    real(dp), intent(in) :: time                   !! s
-    real(dp), intent(in) :: time_low               !! s
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
-    real(dp) :: angle
-    real(dp) :: angle_low
-
-    call two_product(frequency, time, angle, angle_low)
-    call sine_cosine(angle, angle_low + frequency*time_low, sine, cosine)
-  end subroutine wave_at
-
-  pure subroutine torque_rate_at(m_rate, n_sines, sines, n_cosines, cosines, time, rate)
-    !! Derivative of the torque by time.
-    real(dp), intent(in) :: m_rate(3)
-    integer, intent(in) :: n_sines
-    real(dp), intent(in) :: sines(4, n_sines)
-    integer, intent(in) :: n_cosines
-    real(dp), intent(in) :: cosines(4, n_cosines)
-    real(dp), intent(in) :: time
-    real(dp), intent(out) :: rate(3)               !! 1/s3
+  pure subroutine add_waves(n, waves, are_sines, time, time_low, m)
+    !! Add sines or cosines with what the rounding of the angle leaves out: after 1e5 radians that
+    !! is worth 1e-11.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: waves(4, n) !! amplitude (3), 1/s2; frequency, rad/s
+    logical, intent(in) :: are_sines
+    real(dp), intent(in) :: time        !! s
+    real(dp), intent(in) :: time_low    !! s
+    real(dp), intent(inout) :: m(3)     !! 1/s2
+    real(dp) :: angle, angle_low, sine, cosine
     integer :: k
 
-    rate = m_rate
-    do k = 1, n_sines
-      rate = rate + sines(1:3, k)*(sines(4, k)*cos(sines(4, k)*time))
+    do k = 1, n
+      call two_product(waves(4, k), time, angle, angle_low)
+      call sine_cosine(angle, angle_low + waves(4, k)*time_low, sine, cosine)
+      m = m + waves(1:3, k)*merge(sine, cosine, are_sines)
     end do
-    do k = 1, n_cosines
-      rate = rate - cosines(1:3, k)*(cosines(4, k)*sin(cosines(4, k)*time))
+  end subroutine add_waves
+
+  pure subroutine torque_rate_at(problem, time, rate)
+    !! Derivative of the torque by time.
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: time      !! s
+    real(dp), intent(out) :: rate(3)  !! 1/s3
+    real(dp) :: wave(4)
+    integer :: k
+
+    rate = problem%rate
+    do k = 1, problem%n_sines
+      wave = problem%sines(:, k)
+      rate = rate + wave(1:3)*(wave(4)*cos(wave(4)*time))
+    end do
+    do k = 1, problem%n_cosines
+      wave = problem%cosines(:, k)
+      rate = rate - wave(1:3)*(wave(4)*sin(wave(4)*time))
     end do
   end subroutine torque_rate_at
 

@@ -14,12 +14,9 @@ contains
 
   pure subroutine sine_cosine(angle, angle_low, sine, cosine)
     !! Sine and cosine of angle + angle_low.
-    real(dp), intent(in) :: angle
-    real(dp), intent(in) :: angle_low
-    real(dp), intent(out) :: sine
-    real(dp), intent(out) :: cosine
-    real(dp) :: s
-    real(dp) :: c
+    real(dp), intent(in) :: angle, angle_low
+    real(dp), intent(out) :: sine, cosine
+    real(dp) :: s, c
 
     s = sin(angle)
     c = cos(angle)
@@ -34,12 +31,9 @@ contains
 
   pure subroutine square_root(x, x_low, root, root_low)
     !! Square root of x + x_low to twice the working digits.
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: x_low
-    real(dp), intent(out) :: root
-    real(dp), intent(out) :: root_low
-    real(dp) :: square
-    real(dp) :: square_low
+    real(dp), intent(in) :: x, x_low
+    real(dp), intent(out) :: root, root_low
+    real(dp) :: square, square_low
 
     root = sqrt(x)
     call two_product(root, root, square, square_low)
@@ -48,11 +42,8 @@ contains
 
   pure subroutine scaled(x, x_low, factor, y, y_low)
     !! (x + x_low) factor to twice the working digits.
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: x_low
-    real(dp), intent(in) :: factor
-    real(dp), intent(out) :: y
-    real(dp), intent(out) :: y_low
+    real(dp), intent(in) :: x, x_low, factor
+    real(dp), intent(out) :: y, y_low
 
     call two_product(x, factor, y, y_low)
     y_low = y_low + x_low*factor
@@ -60,12 +51,9 @@ contains
 
   pure subroutine two_sum(x, y, total, rest)
     !! x + y = total + rest, exactly (Knuth).
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: y
-    real(dp), intent(out) :: total
-    real(dp), intent(out) :: rest
-    real(dp) :: s
-    real(dp) :: part
+    real(dp), intent(in) :: x, y
+    real(dp), intent(out) :: total, rest
+    real(dp) :: s, part
 
     s = x + y
     part = s - x
@@ -75,15 +63,9 @@ contains
 
   pure subroutine two_product(x, y, product, rest)
     !! x y = product + rest up to 2**-106 of it (Dekker, halves cut off by their bits).
-    real(dp), intent(in) :: x
-    real(dp), intent(in) :: y
-    real(dp), intent(out) :: product
-    real(dp), intent(out) :: rest
-    real(dp) :: xh
-    real(dp) :: xl
-    real(dp) :: yh
-    real(dp) :: yl
-    real(dp) :: p
+    real(dp), intent(in) :: x, y
+    real(dp), intent(out) :: product, rest
+    real(dp) :: xh, xl, yh, yl, p
 
     xh = transfer(iand(transfer(x, UPPER_BITS), UPPER_BITS), x)
     yh = transfer(iand(transfer(y, UPPER_BITS), UPPER_BITS), y)

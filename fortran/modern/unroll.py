@@ -4,7 +4,15 @@ import re
 import sys
 from collections.abc import Iterator
 
-MODULES = ("taylor", "taylor_plan", "euler_equations", "scaled_motion", "scaled_runge_kutta")
+MODULES = (
+    "euler_equations",
+    "scaled_motion",
+    "scaled_march",
+    "scaled_runge_kutta",
+    "taylor_plan",
+    "taylor_series",
+    "taylor",
+)
 MOST_ORDER = 28
 FIRST_CHECK = 6
 # From this order on the products of the three equations are summed side by side.

@@ -5,16 +5,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyharness.methods.problem import normalized, trajectory_of
-from pyharness.model.effort import Solver, advice
+from pyharness.model.codes import Methods
+from pyharness.model.effort import Integrator, advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
-_NUMBERS = {"improved-euler": 1, "taylor-3": 2, "rk4": 3}
+_NUMBERS = {
+    "improved-euler": Methods.IMPROVED_EULER,
+    "taylor-3": Methods.TAYLOR_3,
+    "rk4": Methods.RK4,
+}
 
 
-def fixed_step(name: str) -> Solver:
+def fixed_step(name: str) -> Integrator:
     """Return the solver of a method of III.2: steps of the scene's size, no error control.
 
     Before each time the last step is shortened to hit it.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.methods.problem import normalized, trajectory_of
-from pyharness.model.effort import Solver, advice, waves
+from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.scene import Scene
@@ -24,7 +24,7 @@ _ROUNDING = 16 * 2.0**-53
 _NEAR_THE_END = 1e300
 
 
-def gauss(stages: int) -> Solver:
+def gauss(stages: int) -> Integrator:
     """Return the solver by Gauss collocation, steps halved until two solutions agree.
 
     The error of the finer one is taken to be their difference over ratio**order - 1, where their

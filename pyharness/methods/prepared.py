@@ -11,6 +11,7 @@ import numpy as np
 
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
 from pyharness.methods.problem import normalized
+from pyharness.model.codes import Methods, Places
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import ENDS, extension
@@ -34,20 +35,17 @@ else:
     except ImportError:  # not built, as `extension` says when a solver is made
         BoundKernel = object
 
-# Places in the packed array: see fortran/modern/prepared.f90.
-_EFFORT_AT, _WAVES_AT = 14, 15
 _CODES = {
-    "closed-form": 1,
-    "sphere": 2,
-    "taylor": 3,
-    "improved-euler": 4,
-    "taylor-3": 5,
-    "rk4": 6,
-    "quick": 7,
-    EITHER: 8,
-    **{f"gauss-{stages}": 10 + stages for stages in range(1, 9)},
+    "closed-form": Methods.CLOSED_FORM,
+    "sphere": Methods.SPHERE,
+    "taylor": Methods.TAYLOR,
+    "improved-euler": Methods.IMPROVED_EULER,
+    "taylor-3": Methods.TAYLOR_3,
+    "rk4": Methods.RK4,
+    "quick": Methods.QUICK,
+    EITHER: Methods.QUICK_OR_TAYLOR,
+    **{f"gauss-{stages}": Methods.GAUSS + stages for stages in range(1, 9)},
 }
-_FREE_OR_SERIES = 9
 PREPARED = (
     "auto",
     "closed-form",
@@ -239,18 +237,25 @@ def _code(chosen: Plan) -> int:
         if chosen.closed_form == "sphere":
             return _CODES["sphere"]
         # A disturbance too faint to square: then the series, if that is not against the order.
-        return _FREE_OR_SERIES if chosen.fallback else _CODES["closed-form"]
+        return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else _CODES["closed-form"]
     return _CODES[chosen.method]
 
 
 def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
-    # Four places more than the waves need: the kernel names where the cosines would begin.
-    packed = np.zeros(_WAVES_AT + sines.size + cosines.size + 4)
-    packed[0] = code
-    packed[1:5] = tolerance, scene.step_size, sines.shape[1], cosines.shape[1]
-    packed[5:14] = np.concatenate([coefficients, constant, rate])
-    packed[_EFFORT_AT] = effort
-    packed[_WAVES_AT : _WAVES_AT + sines.size] = sines.T.ravel()
-    packed[_WAVES_AT + sines.size : -4] = cosines.T.ravel()
+    packed = np.zeros(Places.WAVES + sines.size + cosines.size)
+    packed[Places.METHOD] = code
+    packed[Places.TOLERANCE] = tolerance
+    packed[Places.STEP] = scene.step_size
+    packed[Places.N_SINES] = sines.shape[1]
+    packed[Places.N_COSINES] = cosines.shape[1]
+    packed[Places.EFFORT] = effort
+    for place, values in (
+        (Places.COEFFICIENTS, coefficients),
+        (Places.CONSTANT, constant),
+        (Places.RATE, rate),
+        (Places.WAVES, sines.T.ravel()),
+        (Places.WAVES + sines.size, cosines.T.ravel()),
+    ):
+        packed[place : place + values.size] = values
     return packed

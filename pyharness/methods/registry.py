@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pyharness.methods.problem import rows_trajectory
 from pyharness.methods.scipy_ivp import FINEST, scipy_method
-from pyharness.model.effort import Solver
+from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
@@ -45,7 +45,7 @@ class Method:
     title: str
     source: str
     finest: float
-    solve: Solver
+    solve: Integrator
     gives_rows: bool = True
     order: int = 0
     evaluations: int = 0
@@ -74,7 +74,7 @@ def _no_rows(
     raise InputError("method 'quick' gives the end alone; prepare it, or take auto")
 
 
-def _from(room: str, name: str, *arguments: str | int) -> Solver:
+def _from(room: str, name: str, *arguments: str | int) -> Integrator:
     """Return a solver of a room of `pyharness.methods`, which is imported when it is first used."""
 
     def solve(

@@ -14,7 +14,7 @@ import numpy as np
 
 from pyharness.methods.linearised import growth, propagators
 from pyharness.methods.problem import rows_trajectory
-from pyharness.model.effort import Solver, advice, waves
+from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -90,7 +90,7 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
     return _Run(scene, time, name).ahead().finest(name)
 
 
-def scipy_method(name: str) -> Solver:
+def scipy_method(name: str) -> Integrator:
     """Return the solver by a method of `solve_ivp`, with the scene's own right-hand side."""
 
     def solve(

@@ -26,7 +26,7 @@ _MOST_STEPS = {"fortran": 1e8, "python": 5e5}
 _A_WAVE = {"fortran": 1.0, "python": 0.05}
 
 
-class Solver(Protocol):
+class Integrator(Protocol):
     """What turns a scene into rows at times that run away from 0."""
 
     def __call__(

@@ -4,13 +4,15 @@ from types import ModuleType
 
 import numpy as np
 
+from pyharness.model.codes import Statuses
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.scene import Wave
 from pyharness.model.trajectory import Array
 
-# The status codes of fortran/statuses.f90, and what a user reads.
-COMPLETE, STOPPED, OVERFLOW, REFUSED, GAVE_UP, INTERRUPTED = range(6)
-ENDS = ("complete", "stopped", "overflow", "refused", "gave up", "interrupted")
+COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
+REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
+# What a user reads.
+ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.isupper())
 
 
 def extension() -> ModuleType:

@@ -56,14 +56,14 @@ class Listing:
     def flags(self) -> int:
         """The active names as the bits that the Fortran reads."""
         active = self.defects | self.readings
-        return sum(1 << entry["flag"] for entry in entries() if entry["id"] in active)
+        return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in active)
 
     def has(self, name: str) -> bool:
         """Whether the defect or reading `name` is active."""
         return name in self.defects or name in self.readings
 
 
-def entries() -> list[dict[str, Any]]:
+def flagged() -> list[dict[str, Any]]:
     """Return the defects and readings of the apparatus that have a flag."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
@@ -72,7 +72,7 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
     """Return the names of a kind (`defect` or `reading`), of one program or of all."""
     return tuple(
         entry["id"]
-        for entry in entries()
+        for entry in flagged()
         if entry["kind"] == kind and (program is None or program in entry["programs"])
     )
 

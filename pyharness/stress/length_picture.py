@@ -9,7 +9,7 @@ from pyharness.model.report import Picture, numbers
 from pyharness.theory.brouwer import LAWS
 
 if TYPE_CHECKING:
-    from pyharness.stress.trials.length import Curve
+    from pyharness.stress.trials.length import Drift
 
 _SHOWN = ("energy", "phase")
 _STYLES: dict[str, dict[str, Any]] = {
@@ -19,7 +19,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 
 
-def length_picture(found: Sequence["Curve"]) -> Picture:
+def length_picture(found: Sequence["Drift"]) -> Picture:
     """Draw energy and phase of each motion."""
     from matplotlib.figure import Figure
 

@@ -11,8 +11,7 @@ from pyharness import InputError, Scene, case_scene
 from pyharness.cli.main import main
 from pyharness.history.ablation import Effect, effects_of, entries, entry, lattice
 from pyharness.history.apparatus_report import lattice_report
-from pyharness.model.listing import Listing, names_of, original
-from pyharness.model.listing import entries as flagged
+from pyharness.model.listing import Listing, flagged, names_of, original
 from pyharness.truth.reference import Reference
 from pyharness.views.render import render
 

@@ -4,6 +4,7 @@ import ctypes
 import os
 import shutil
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from pyharness import InputError, Scene, case_scene
 from pyharness.methods.problem import normalized
 from pyharness.methods.solve import solve
+from pyharness.model import codes
 from pyharness.model.build import build
 from pyharness.model.extension import extension
 from pyharness.model.scene import TorqueLaw
@@ -223,23 +225,26 @@ def test_levels_agree_to_rounding() -> None:
 @pytest.mark.skipif(shutil.which(os.environ.get("FC", "gfortran")) is None, reason="no compiler")
 def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
     """The source is the definition; unroll.py only writes its loops out."""
-    modules = ("euler_equations", "taylor_plan", "taylor")
-    sources = ["kinds.f90", "statuses.f90", "interruption.f90", "../tests/never_interrupted.f90"]
+    modules = ("problem", "euler_equations", "taylor_plan", "taylor_series", "taylor")
+    sources = ["kinds.f90", "interruption.f90", "../tests/never_interrupted.f90"]
     sources += [f"modern/{name}.f90" for name in modules]
+    sources += ["../tests/taylor_as_written.f90"]
     library = tmp_path / "loops.so"
+    maker = [sys.executable, str(FORTRAN / "make_codes.py"), codes.__file__, "codes.f90"]
+    subprocess.run(maker, cwd=tmp_path, check=True)
     command = [os.environ.get("FC", "gfortran"), "-shared", "-fPIC", "-O1", "-o", str(library)]
-    subprocess.run([*command, *(str(FORTRAN / s) for s in sources)], cwd=tmp_path, check=True)
-    loops = ctypes.CDLL(str(library)).taylor_solve_level
+    command += ["codes.f90", *(str(FORTRAN / source) for source in sources)]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    loops = ctypes.CDLL(str(library)).taylor_as_written
     for name, scene in SCENES.items():
         coefficients, constant, rate, sines, cosines = normalized(scene)
         found = np.zeros(3)
-        n_rows, ended, count = ctypes.c_int(), ctypes.c_int(), ctypes.c_int64()
+        ended, count = ctypes.c_int(), ctypes.c_int64()
         loops(
             *map(_address, (coefficients, constant, rate)),
             sines.shape[1], _address(sines), cosines.shape[1], _address(cosines),
             _address(np.array(scene.omega)), _address(np.array([1e-12])),
-            _address(np.array([1.0])), 1, _address(np.array([2.0])), _address(found),
-            *(ctypes.byref(each) for each in (n_rows, ended, count, ctypes.c_double())),
+            _address(np.array([2.0])), _address(found), ctypes.byref(ended), ctypes.byref(count),
         )  # fmt: skip
         omega, status, steps = _end(scene, 2.0, 1e-12)
         assert (ended.value, abs(count.value - steps) <= 1) == (status, True), name

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from pyharness import InputError, Listing, subset
-from pyharness.model.listing import PROGRAMS, corrected, entries, names_of, original
+from pyharness.model.listing import PROGRAMS, corrected, flagged, names_of, original
 from tests.divergences import divergences
 
 
@@ -15,12 +15,12 @@ def test_names_are_those_of_the_fortran_and_the_bits_agree() -> None:
     source = (Path(__file__).parent.parent.parent / "fortran/original/listing.f90").read_text()
     found = dict(re.findall(r"listing%(\w+) = btest\(bits, (\d+)\)", source))
     assert {name.replace("_", "-"): int(bit) for name, bit in found.items()} == {
-        entry["id"]: entry["flag"] for entry in entries()
+        entry["id"]: entry["flag"] for entry in flagged()
     }
 
 
 def test_every_entry_names_its_cards_in_every_program_that_has_it() -> None:
-    for entry in entries():
+    for entry in flagged():
         assert set(entry["cards"]) == set(entry["programs"])
         assert entry["kind"] in ("defect", "reading")
 

@@ -25,6 +25,8 @@ NEAR = {
         "model/effort",
         "methods/registry",
     ),
+    "fortran/modern/taylor_series.f90": ("methods/taylor", "methods/slow_waves"),
+    "fortran/modern/scaled_march.f90": ("methods/quick", "methods/slow_waves"),
     "fortran/modern/taylor_plan.f90": (
         "methods/taylor", "methods/slow_waves", "methods/prepared",
     ),

@@ -248,10 +248,10 @@ def kept(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @cache
-def _contenders() -> dict[str, length.Contender]:
+def _contenders() -> dict[str, length.Marcher]:
     return {
         name: replace(each, run=kept(each.run), noise=kept(each.noise), revolutions=1e3, others=1e3)
-        for name, each in length.CONTENDERS.items()
+        for name, each in length.MARCHERS.items()
     }
 
 
@@ -259,7 +259,7 @@ def _contenders() -> dict[str, length.Contender]:
 def shorter() -> Iterator[None]:
     """Follow two starts through a thousand revolutions."""
     contenders = _contenders()
-    with patch.object(length, "CONTENDERS", contenders), patch.object(length, "STARTS", 2):
+    with patch.object(length, "MARCHERS", contenders), patch.object(length, "STARTS", 2):
         yield
 
 

@@ -102,12 +102,12 @@ def test_bounds_hold(name: str, only: list[str]) -> None:
     assert worst(outcomes)
 
 
-@pytest.mark.parametrize("name", length.CONTENDERS)
+@pytest.mark.parametrize("name", length.MARCHERS)
 @pytest.mark.parametrize("motion", length.MOTIONS)
 def test_brouwers_law_holds(name: str, motion: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """To 1e4 revolutions; with four stages energy drifts there if weights lose their low words."""
     monkeypatch.setattr(length, "_FIT_FROM", 1e2)
-    shorter = replace(length.CONTENDERS[name], revolutions=1e4, others=1e4)
+    shorter = replace(length.MARCHERS[name], revolutions=1e4, others=1e4)
     checks = [each.check for each in length.hold(name, shorter, motion)]
     assert _failed(checks) == []
     assert len(checks) == 3 * 8
@@ -155,9 +155,7 @@ def test_a_rounding_with_a_preference_is_found(
     bias: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(length, "_FIT_FROM", 10.0)
-    contender = replace(
-        length.CONTENDERS["gauss-8"], run=_stepped(bias), revolutions=1e3, others=1e3
-    )
+    contender = replace(length.MARCHERS["gauss-8"], run=_stepped(bias), revolutions=1e3, others=1e3)
     failed = _failed([each.check for each in length.hold("planted", contender, "tumbling")])
     wanted = [f"length/planted/tumbling/{what}/power" for what in ("energy", "momentum", "phase")]
     assert [id for id in failed if id.endswith("power")] == (wanted if bias else [])
@@ -168,7 +166,7 @@ def test_half_a_step_in_the_label_of_time_is_found_by_phase_alone() -> None:
         half = 0.5 * times[-1] / 1e5
         return solve(scene, [t + half for t in times], "taylor", 1e-15).omega, np.array(times)
 
-    contender = replace(length.CONTENDERS["taylor"], run=late, revolutions=1e4, others=1e4)
+    contender = replace(length.MARCHERS["taylor"], run=late, revolutions=1e4, others=1e4)
     failed = _failed([each.check for each in length.hold("late", contender, "case-4")])
     at_horizons = [id for id in failed if not id.endswith("power")]
     assert len(at_horizons) == 7

@@ -4,6 +4,7 @@ import ctypes
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from pyharness.compare.agreement import differences
 from pyharness.compare.orders import measured_order
+from pyharness.model import codes
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
@@ -20,7 +22,6 @@ from pyharness.verify.plants.planted_twins import plant_in_twin
 FORTRAN = Path(__file__).parent.parent.parent / "fortran"
 SOURCES = (
     "kinds",
-    "statuses",
     "interruption",
     "../tests/never_interrupted",
     "original/listing",
@@ -125,7 +126,9 @@ def test_fault_in_the_fortran_is_caught(name: str, tmp_path: Path) -> None:
 
 
 def _compiled(folder: Path, file: str, old: str, new: str) -> ctypes.CDLL:
-    paths = []
+    paths = ["codes.f90"]
+    maker = [sys.executable, str(FORTRAN / "make_codes.py"), codes.__file__, *paths]
+    subprocess.run(maker, cwd=folder, check=True)
     for source in SOURCES:
         text = (FORTRAN / f"{source}.f90").read_text()
         if source == "api":

@@ -52,7 +52,7 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
-class Contender:
+class Marcher:
     """A method: how it runs, the noise of its steps, and how far it is followed.
 
     Attributes
@@ -115,22 +115,22 @@ def _rate(scene: Scene) -> float:
     return float(a.max()) * _largest(scene)
 
 
-CONTENDERS = {
+MARCHERS = {
     # What a series leaves out keeps its sign; and its steps fall in with a periodic motion, so
     # that the rounding of a step comes back with every revolution.
-    "taylor": Contender(_taylor, _taylor_noise, 1e6, 10**5.5, preference=True),
+    "taylor": Marcher(_taylor, _taylor_noise, 1e6, 10**5.5, preference=True),
     # Equal steps of a part of a radian; ten times as costly as a Taylor step.
-    "gauss-8": Contender(_gauss(8, _PARTS[8]), _gauss_noise(8), 1e6, 1e5),
-    "gauss-4": Contender(_gauss(4, _PARTS[4]), _gauss_noise(4), 1e5, 10**4.5),
+    "gauss-8": Marcher(_gauss(8, _PARTS[8]), _gauss_noise(8), 1e6, 1e5),
+    "gauss-4": Marcher(_gauss(4, _PARTS[4]), _gauss_noise(4), 1e5, 10**4.5),
 }
 
 
 def run(only: Sequence[str]) -> Iterator[Outcome]:
     """Follow each motion by each method."""
     for motion in MOTIONS:
-        for name, contender in CONTENDERS.items():
+        for name, marcher in MARCHERS.items():
             if may_hold(f"length/{name}/{motion}", only):
-                yield from hold(name, contender, motion)
+                yield from hold(name, marcher, motion)
                 if name != "gauss-4":
                     yield _prepared(name, motion)
         if may_hold(f"length/closed-form/{motion}", only):
@@ -144,11 +144,11 @@ def run(only: Sequence[str]) -> Iterator[Outcome]:
                     yield from _program(listing, motion)
 
 
-def hold(name: str, contender: Contender, motion: str) -> Iterator[Outcome]:
+def hold(name: str, marcher: Marcher, motion: str) -> Iterator[Outcome]:
     """Hold one method to Brouwer's law: a bound at each horizon, and the power of the growth."""
     scene = MOTIONS[motion]
     body = orbit_of(motion)
-    for what, found, steps, limits in measured(contender, scene, body):
+    for what, found, steps, limits in measured(marcher, scene, body):
         for k, revolutions in enumerate(REVOLUTIONS[: len(steps)]):
             id = f"length/{name}/{motion}/{what}/{revolutions:.0f}"
             value = float(np.nanmax(np.abs(found[:, k])))
@@ -161,12 +161,12 @@ def hold(name: str, contender: Contender, motion: str) -> Iterator[Outcome]:
         ]
         power = brouwer.exponent(steps[fitted], found[:, fitted])
         id = f"length/{name}/{motion}/{what}/power"
-        due = LAWS[what] + (0.5 if contender.preference else 0.0)
+        due = LAWS[what] + (0.5 if marcher.preference else 0.0)
         yield Outcome(bounded(id, power, due + _HALFWAY, replay(id), f"due {due}"), scene)
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Drift:
     """The error of one method over the number of steps, its bound, and by how many starts."""
 
     motion: str
@@ -178,36 +178,36 @@ class Curve:
     starts: Array
 
 
-def curves() -> Iterator[Curve]:
+def curves() -> Iterator[Drift]:
     """Measure every method on every motion, as the trial does."""
     for motion, scene in MOTIONS.items():
-        for method, contender in CONTENDERS.items():
-            for what, found, steps, limits in measured(contender, scene, orbit_of(motion)):
+        for method, marcher in MARCHERS.items():
+            for what, found, steps, limits in measured(marcher, scene, orbit_of(motion)):
                 starts = (~np.isnan(found)).sum(axis=0)
                 error = brouwer.root_mean_square(found)
-                yield Curve(motion, method, what, steps, error, np.array(limits), starts)
+                yield Drift(motion, method, what, steps, error, np.array(limits), starts)
 
 
 def measured(
-    contender: Contender, scene: Scene, body: Orbit
+    marcher: Marcher, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
     """Yield what is watched, its errors, the steps to each horizon and the bounds there.
 
     The errors have a row for each start and a column for each horizon, NaN beyond its run.
     """
     turn = 2.0 * math.pi / body.largest
-    reached = [r for r in REVOLUTIONS if r <= 1.01 * contender.revolutions]
+    reached = [r for r in REVOLUTIONS if r <= 1.01 * marcher.revolutions]
     found = {what: np.full((STARTS, len(reached)), math.nan) for what in LAWS}
     steps = np.zeros(len(reached))
     for number, start in enumerate(starts(scene, body)):
-        most = contender.others if number else contender.revolutions
+        most = marcher.others if number else marcher.revolutions
         times = [r * turn for r in reached if r <= 1.01 * most]
-        rows, counted = contender.run(start, times)
+        rows, counted = marcher.run(start, times)
         steps[: len(times)] = np.maximum(steps[: len(times)], counted)
         for k, (time, row) in enumerate(zip(times, rows, strict=True)):
             for what, error in brouwer.errors(start, body, time, row).items():
                 found[what][number, k] = error
-    noise = contender.noise(body, scene, reached[-1] * turn / steps[-1])
+    noise = marcher.noise(body, scene, reached[-1] * turn / steps[-1])
     limits = [body.limits(noise, count) for count in steps]
     for what in LAWS:
         yield what, found[what], steps, [each[what] for each in limits]
@@ -238,7 +238,7 @@ def _prepared(name: str, motion: str) -> Outcome:
         rows = _taylor(scene, [time])[0]
         found = called(name, METHODS[name].finest).end(scene, time).omega
     else:
-        rows = CONTENDERS[name].run(scene, [time])[0]
+        rows = MARCHERS[name].run(scene, [time])[0]
         stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
         found = called(name, 1.0).end(stepped, time).omega
     id = f"length/{name}/{motion}/prepared"

@@ -20,7 +20,8 @@ import numpy as np
 from pyharness.methods import problem, taylor
 from pyharness.methods.registry import METHODS
 from pyharness.model import extension
-from pyharness.model.listing import Listing, entries
+from pyharness.model.codes import Methods, Places
+from pyharness.model.listing import Listing, flagged
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original import compiled
@@ -176,11 +177,13 @@ def _stale_solver() -> AbstractContextManager[Any]:
 
 
 def _refusing_solver(code: int) -> AbstractContextManager[Any]:
-    """Let a prepared solver refuse everything; `code` names its method in `prepared.f90`."""
+    """Let a prepared solver refuse everything; `code` is one of `Methods`."""
 
     def change(packed: Array, answer: _Answer) -> _Answer:
         omega, _, steps = answer
-        return (omega * np.nan, extension.REFUSED, steps) if packed[0] == code else answer
+        return (
+            (omega * np.nan, extension.REFUSED, steps) if packed[Places.METHOD] == code else answer
+        )
 
     return _prepared(change)
 
@@ -215,7 +218,7 @@ def _wrong_steps() -> AbstractContextManager[Any]:
 
     def change(packed: Array, answer: _Answer) -> _Answer:
         omega, *rest = answer
-        return (omega * 1.01, *rest) if packed[0] in steps else answer  # type: ignore[return-value]
+        return (omega * 1.01, *rest) if packed[Places.METHOD] in steps else answer  # type: ignore[return-value]
 
     return _prepared(change)
 
@@ -230,7 +233,7 @@ def _shifted(scene: Scene, times: Sequence[float], solve: Callable[..., Trajecto
 
 def _wrong_card() -> AbstractContextManager[Any]:
     """Let the compiled programs read one flag in place of its neighbour."""
-    known = [entry["flag"] for entry in entries() if entry["kind"] == "defect"]
+    known = [entry["flag"] for entry in flagged() if entry["kind"] == "defect"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 
     def wrong(self: Listing) -> int:
@@ -320,7 +323,7 @@ PLANTS = (
           lambda: _stale_method("taylor")),
     Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver),
     Plant("quick-refuses", "the solver for few digits refuses every scene",
-          lambda: _refusing_solver(7)),
+          lambda: _refusing_solver(Methods.QUICK)),
     Plant("label-in-fortran", "TIME shifted by half a step",
           lambda: _compiled(_half_step_label)),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",

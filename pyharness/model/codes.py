@@ -1,0 +1,42 @@
+"""The numbers that Python and the kernels share: fortran/make_codes.py writes them in Fortran."""
+
+
+class Statuses:
+    """How a computation ended; counted from 0."""
+
+    COMPLETE = 0  # every row is a result
+    STOPPED = 1  # the Lipschitz test ended the run
+    OVERFLOW = 2  # an angular velocity left the range of numbers
+    REFUSED = 3  # the method can't take these coefficients
+    GAVE_UP = 4  # no digit of the phase is left, or too many steps
+    INTERRUPTED = 5  # by the user; an exception is set
+
+
+class Methods:
+    """What the kernel of a prepared solver may be asked for."""
+
+    CLOSED_FORM = 1  # without torque
+    SPHERE = 2
+    TAYLOR = 3
+    IMPROVED_EULER = 4
+    TAYLOR_3 = 5
+    RK4 = 6
+    QUICK = 7  # Runge-Kutta for few digits
+    QUICK_OR_TAYLOR = 8  # whichever takes fewer operations
+    CLOSED_FORM_OR_TAYLOR = 9  # the series where the closed form refuses
+    GAUSS = 10  # and the number of stages
+
+
+class Places:
+    """Where in the packed array of a prepared solver something stands, from 0."""
+
+    METHOD = 0
+    TOLERANCE = 1  # relative, of the series
+    STEP = 2  # s, of the methods with a fixed step
+    N_SINES = 3
+    N_COSINES = 4
+    COEFFICIENTS = 5  # three
+    CONSTANT = 8  # three, 1/s2
+    RATE = 11  # three, 1/s3
+    EFFORT = 14  # factor on the limits
+    WAVES = 15  # four for each sine, then for each cosine

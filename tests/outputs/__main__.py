@@ -23,7 +23,7 @@ from typing import Any
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 # Not the same in two runs: seconds, and what follows from them; the build, and where it stands.
-_VARIES = ("seconds", "build", "speed", "preparation", "time_ratio")
+_VARIES = ("seconds", "seconds_per_step", "build", "speed", "preparation", "time_ratio")
 _SCENE = """\
 name = "forced"
 [body]

@@ -55,7 +55,7 @@ class Contender:
 
 
 def own() -> list[Contender]:
-    """Return our methods and the three programs, as punched and as mended."""
+    """Return our methods and the three programs, original and corrected."""
     methods = [
         Contender(name, "method", "tolerance", _made(partial(called, name)), TOLERANCES)
         for name in ("auto", "taylor")

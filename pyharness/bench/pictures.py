@@ -77,7 +77,7 @@ def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
             family = "program" if name.startswith(_PROGRAMS) else "peer"
         marker = _MARKERS[used.get(family, 0) % len(_MARKERS)]
         used[family] = used.get(family, 0) + 1
-        # As punched filled, as mended open; the same for peers and ours.
+        # Original filled, corrected open; the same for peers and ours.
         face = _FAMILIES[family]["color"] if family in ("ours", "program") else "white"
         styles[name] = _FAMILIES[family] | {
             "marker": marker, "markersize": 5.0, "markerfacecolor": face, "markeredgewidth": 0.8,

@@ -77,8 +77,8 @@ def add_scene_options(parser: Parser) -> None:
 def add_listing_options(parser: Parser) -> None:
     """Declare what chooses the defects, the readings and the stop test."""
     parser.add_argument("--listing", metavar="L", help="original or corrected")
-    parser.add_argument("--fix", metavar="NAME,...", help="mend these defects")
-    parser.add_argument("--keep", metavar="NAME,...", help="keep these; alone: mend all others")
+    parser.add_argument("--fix", metavar="NAME,...", help="correct these defects")
+    parser.add_argument("--keep", metavar="NAME,...", help="keep these; alone: correct all others")
     parser.add_argument("--reading", metavar="NAME,...", help="select readings not adopted")
     parser.add_argument("--lipschitz", metavar="L", help="constant of the stop test (default 500)")
     parser.add_argument(

@@ -78,7 +78,7 @@ class Comparison:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Of which mended programs the scene can't tell whether they are right, and why."""
+        """Of which corrected programs the scene can't tell whether they are right, and why."""
         return tuple(
             f"{each.listing.program} {each.listing.label}: {each.order}"
             for each in self.programs
@@ -101,8 +101,8 @@ def compare_programs(
     scene : Scene
         What to integrate.
     listings : sequence of Listing, optional
-        The programs to run, each with its active defects; by default all three, as punched and as
-        mended.
+        The programs to run, each with its active defects; by default all three, original and
+        corrected.
     lipschitz : float
         Constant of the stop test (1/s).
     may_stop : bool
@@ -181,13 +181,13 @@ def listings_for(
     result = []
     for program in chosen:
         defects, own_readings = names_of("defect", program), names_of("reading", program)
-        mended = [name for name in fix if name in defects]
+        fixed = [name for name in fix if name in defects]
         kept = [name for name in keep if name in defects]
         selected = [name for name in readings if name in own_readings]
         bases = [base] if base and not (fix or keep) else ["original", "corrected"]
         rows = [subset(program, each, readings=selected) for each in bases]
-        if mended or kept:
-            rows.insert(1, subset(program, base, mended, kept, selected))
+        if fixed or kept:
+            rows.insert(1, subset(program, base, fixed, kept, selected))
         result += rows
     return result
 

@@ -67,7 +67,7 @@ def _as_expected(comparison: Comparison) -> str:
     if not orders:
         return text
     seen = ", ".join(map(_seen, orders))
-    return f"{text}; orders mended {seen} (due: {', '.join(str(each.due) for each in orders)})"
+    return f"{text}; orders corrected {seen} (due: {', '.join(str(each.due) for each in orders)})"
 
 
 def _seen(order: Order) -> str:

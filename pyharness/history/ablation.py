@@ -1,4 +1,4 @@
-"""What each defect does: alone mended, alone kept, and in every company."""
+"""What each defect does: alone corrected, alone kept, and in every company."""
 
 import math
 from collections.abc import Iterator
@@ -46,14 +46,14 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """A defect or reading in one program and case, alone mended and alone kept."""
+    """A defect or reading in one program and case, alone corrected and alone kept."""
 
     program: str
     case: int
-    punched: Effect
-    mended_alone: Effect
+    original: Effect
+    corrected_alone: Effect
     kept_alone: Effect
-    mended: Effect
+    corrected: Effect
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
@@ -97,8 +97,8 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield what a flagged defect or reading does in each of its programs, case by case.
 
-    For a reading, which no listing has by default, *mended alone* is the program as punched and
-    *kept alone* the mended program with the reading; both have it where they are compared.
+    For a reading, which no listing has by default, *corrected alone* is the original program and
+    *kept alone* the corrected program with the reading; both have it where they are compared.
     """
     known = entry(name)
     for program in known["programs"]:

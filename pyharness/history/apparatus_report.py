@@ -26,7 +26,7 @@ from pyharness.model.scene_report import heading
 
 _FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "why")
 _ENTRIES = (*words("name kind certainty flag"), Column("what it is", left=True, fit="wrap"))
-_LISTINGS = ("punched", "mended_alone", "kept_alone", "mended")
+_LISTINGS = ("original", "corrected_alone", "kept_alone", "corrected")
 _EFFECTS = words("case")
 for _a in "abcd":
     _EFFECTS += [Column(f"w.{_a}", short, unit="rad/s"), Column(f"V.{_a}", short, unit="m/s")]
@@ -60,8 +60,8 @@ def entry_report(entry: dict[str, Any], effects: Sequence[CaseEffects]) -> Repor
         if value:
             fields.append(Field(f"{name:10s} ", value))
     text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
-    if "punched" in entry:
-        text.append(_beside("as punched", entry["punched"], "as mended", entry["mended"]))
+    if "original" in entry:
+        text.append(_beside("original", entry["original"], "corrected", entry["corrected"]))
     if effects:
         text += _effects(effects, entry["kind"] == "reading")
     return Report(
@@ -92,10 +92,10 @@ def _beside(left_head: str, left: str, right_head: str, right: str) -> list[str]
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return errors and stops by program and case: as punched, alone mended, alone kept, mended."""
-    columns = ("as punched", "this alone mended", "this alone kept", "all mended")
+    """Return errors and stops by program and case, under each of four listings."""
+    columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
-        columns = ("punched, with it", "punched", "mended, with it", "mended")
+        columns = ("original, with it", "original", "corrected, with it", "corrected")
     told: list[Section] = [
         [
             "effect, measured now, 100 steps: largest error of w (rad/s) and of V (m/s), the stop;",

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.history.figures import Curve, Finding
+from pyharness.history.figures import Curve, FigureFinding
 from pyharness.model.report import Picture, Table, numbers
 from pyharness.model.trajectory import Array
 
@@ -33,10 +33,10 @@ _END: dict[str, Any] = {
     "color": "black", "marker": "X", "markersize": 9, "markeredgecolor": "white",
     "linestyle": "none", "zorder": 5, "clip_on": False,
 }  # fmt: skip
-_SETS = {"punched": "programs as punched", "mended": "programs mended"}
+_SETS = {"original": "original programs", "corrected": "corrected programs"}
 
 
-def figure_picture(finding: Finding) -> Picture:
+def figure_picture(finding: FigureFinding) -> Picture:
     """Draw a figure: its curves over the reference."""
     from matplotlib.figure import Figure
 
@@ -63,7 +63,7 @@ def figure_picture(finding: Finding) -> Picture:
     return Picture(figure, curve_numbers(finding))
 
 
-def curve_numbers(finding: Finding) -> Table:
+def curve_numbers(finding: FigureFinding) -> Table:
     """Return the plotted numbers: omega (rad/s) by curve and time (s)."""
     truth = finding.reference
     rows = [
@@ -92,7 +92,7 @@ def label(curve: Curve) -> str:
     return f"{name} ({end})" if end else name
 
 
-def _heading(finding: Finding) -> str:
+def _heading(finding: FigureFinding) -> str:
     plan, scene = finding.plan, finding.scene
     title = f"{plan.title}. Case {scene.case}: {scene.name}; {_SETS[plan.set]}"
     note = f"Reference: {finding.reference.source}."
@@ -112,7 +112,7 @@ def _draw(axes: "Axes", curve: Curve, row: int, bottom: float, top: float) -> No
         axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
 
 
-def _frame(finding: Finding, row: int) -> tuple[float, float]:
+def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """Return the frame: all of what stays near the reference; what diverges leaves it."""
     truth: Array = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

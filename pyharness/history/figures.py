@@ -12,12 +12,12 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
-SETS = {"punched": original, "mended": corrected}
+SETS = {"original": original, "corrected": corrected}
 ENDINGS = ("svg", "png", "csv")
 
 
 @dataclass(frozen=True)
-class Plan:
+class FigurePlan:
     """One figure of one set, before anything is computed for it.
 
     Attributes
@@ -46,7 +46,7 @@ class Plan:
     def stem(self) -> str:
         """The name of its files without their endings."""
         return f"figure-{self.number:02d}{self.part.lower()}" + (
-            "-mended" if self.set == "mended" else ""
+            "-corrected" if self.set == "corrected" else ""
         )
 
     @property
@@ -69,26 +69,26 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
+class FigureFinding:
     """A figure with its numbers."""
 
-    plan: Plan
+    plan: FigurePlan
     scene: Scene
     reference: Reference
     curves: tuple[Curve, ...]
 
 
-def plans() -> list[Plan]:
-    """Return all figures, those from the programs as punched first."""
+def plans() -> list[FigurePlan]:
+    """Return all figures, those from the original programs first."""
     return [_plan(entry, each) for each in SETS for entry in facts("figures")["figure"]]
 
 
-def findings() -> Iterator[Finding]:
+def findings() -> Iterator[FigureFinding]:
     """Compute figure after figure, in the order of `plans`.
 
     Yields
     ------
-    Finding
+    FigureFinding
         Its curves end where the program ended.
 
     Raises
@@ -105,11 +105,11 @@ def findings() -> Iterator[Finding]:
         for program in plan.programs:
             listing = SETS[plan.set](program)
             curves.append(Curve(listing, PROGRAM_REGISTRY[program].run(scene, listing)))
-        yield Finding(plan, scene, truths[plan.case], tuple(curves))
+        yield FigureFinding(plan, scene, truths[plan.case], tuple(curves))
 
 
-def _plan(entry: dict[str, Any], which: str) -> Plan:
-    return Plan(
+def _plan(entry: dict[str, Any], which: str) -> FigurePlan:
+    return FigurePlan(
         number=entry["number"],
         part=entry.get("part", ""),
         set=which,

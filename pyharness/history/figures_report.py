@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 from pyharness.history.figure_pictures import label
-from pyharness.history.figures import ENDINGS, Finding
+from pyharness.history.figures import ENDINGS, FigureFinding
 from pyharness.model.records import build_record
 from pyharness.model.report import Report, Table, words
 
 
-def figures_report(findings: Sequence[Finding]) -> Report:
+def figures_report(findings: Sequence[FigureFinding]) -> Report:
     """Report the files, a line for each figure."""
     rows = [
         [

@@ -1,4 +1,4 @@
-"""What the programs as punched tend to as the step goes to zero.
+"""What the original programs tend to as the step goes to zero.
 
 A program that does not converge to the solution converges to something else, or to nothing.
 The derivations stand in docs/findings.md; here each limit is solved for, independently of the
@@ -32,7 +32,7 @@ NOTHING = "nothing: TIME = t^2/(2h) + t/2 leaves every bound"
 
 @dataclass(frozen=True)
 class Halving:
-    """A program as punched at one step size.
+    """A original program at one step size.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a program as punched tends to, and how it comes near.
+    """What a original program tends to, and how it comes near.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Hold a program as punched, without its stop test, against its limit.
+    """Hold a original program, without its stop test, against its limit.
 
     Parameters
     ----------
@@ -210,18 +210,18 @@ def _solved(
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
     """Name the defects, by program, that change no omega of a scene beyond rounding.
 
-    A defect is invisible where mending it alone, all others kept, moves no omega by more than
+    A defect is invisible where correcting it alone, all others kept, moves no omega by more than
     rounding and leaves the last step where it was.
     """
     found = {}
     for program in PROGRAMS:
         run = PROGRAM_REGISTRY[program].run
-        punched = run(scene, original(program))
+        before = run(scene, original(program))
         names = []
         for name in names_of("defect", program):
-            mended = run(scene, subset(program, "original", fix=[name]))
-            same_end = (mended.steps, mended.ended) == (punched.steps, punched.ended)
-            if same_end and _same(punched.omega, mended.omega):
+            after = run(scene, subset(program, "original", fix=[name]))
+            same_end = (after.steps, after.ended) == (before.steps, before.ended)
+            if same_end and _same(before.omega, after.omega):
                 names.append(name)
         found[program] = tuple(names)
     return found

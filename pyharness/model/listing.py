@@ -13,7 +13,7 @@ PROGRAMS = ("two-term", "four-term", "runge-kutta")
 
 @dataclass(frozen=True)
 class Listing:
-    """A program as punched, as mended, or anything between.
+    """A original program, corrected, or anything between.
 
     Attributes
     ----------
@@ -78,12 +78,12 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def original(program: str, readings: Iterable[str] = ()) -> Listing:
-    """Return the program as punched: every defect is active."""
+    """Return the original program: every defect is active."""
     return Listing(program, frozenset(names_of("defect", program)), frozenset(readings))
 
 
 def corrected(program: str, readings: Iterable[str] = ()) -> Listing:
-    """Return the program as mended: no defect is active."""
+    """Return the corrected program: no defect is active."""
     return Listing(program, frozenset(), frozenset(readings))
 
 
@@ -101,7 +101,7 @@ def subset(
     base : {"original", "corrected"}, optional
         What to start from; where only `keep` is given, `corrected`, else `original`.
     fix, keep : iterable of str
-        Defects to mend, and defects to keep.
+        Defects to correct, and defects to keep.
     readings : iterable of str
         Readings to select that are not the adopted ones.
 
@@ -111,22 +111,22 @@ def subset(
         For a name in both `fix` and `keep`, or one that the program does not have.
     """
     _check_program(program)
-    mended, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
-    for name in sorted(mended & kept):
+    fixed, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
+    for name in sorted(fixed & kept):
         raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
     for option, kind, names in (
-        ("--fix", "defect", mended),
+        ("--fix", "defect", fixed),
         ("--keep", "defect", kept),
         ("--reading", "reading", chosen),
     ):
         for name in sorted(names - set(names_of(kind, program))):
             raise _foreign(kind, name, program, option)
     if base is None:
-        base = "corrected" if kept and not mended else "original"
+        base = "corrected" if kept and not fixed else "original"
     if not isinstance(base, str) or base not in ("original", "corrected"):
         raise unknown("listing", base, ("original", "corrected"), "--listing")
     defects = set(names_of("defect", program)) if base == "original" else set()
-    return Listing(program, frozenset((defects - mended) | kept), frozenset(chosen))
+    return Listing(program, frozenset((defects - fixed) | kept), frozenset(chosen))
 
 
 def checked_listing(listing: object) -> Listing:

@@ -21,7 +21,7 @@ class Program:
     name : str
         As in `pyharness.model.listing.PROGRAMS`.
     order : int
-        The power of the step with which the error of the mended program falls.
+        The power of the step with which the error of the corrected program falls.
     source : str
         Where it stands.
     """

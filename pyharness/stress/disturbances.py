@@ -242,7 +242,7 @@ def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Arra
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
-        # As punched each stage stands on the last one: the larger terms.
+        # In the original each stage stands on the last one: the larger terms.
         return _LONGEST * runge_kutta_punched(on, sizes)
     first = on.times_step(on.rate(sizes))
     estimate = sizes + moved * first

@@ -249,7 +249,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 def describe_programs(
     trial: str, circumstance: str, scene: Scene, only: Sequence[str] = ()
 ) -> Iterator[Outcome]:
-    """Say how far the programs, as punched and as mended, are from the truth over their steps."""
+    """Say how far the programs, original and corrected, are from the truth over their steps."""
     asked = [p for p in PROGRAMS if may_hold(f"{trial}/{p}/{circumstance}", only)]
     if not asked:
         return

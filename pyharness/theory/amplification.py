@@ -3,7 +3,7 @@
 A disturbance of a steady rotation obeys x' = J x, and so does the velocity beside one. Along an
 eigenvector of J a step is a matrix whose elements are polynomials in z = h times the eigenvalue.
 They are worked out here by the algebra of each scheme, in fractions, and hold as they stand for
-hJ in place of z. The Runge-Kutta program as punched keeps a second vector, U(1), from step to
+hJ in place of z. The original Runge-Kutta program keeps a second vector, U(1), from step to
 step: its matrix has two rows, for U(1) and for the result.
 """
 

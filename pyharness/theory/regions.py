@@ -58,9 +58,9 @@ class Regions:
 def matrices() -> dict[str, Amplification]:
     """Return the matrices that differ, by what they belong to."""
     return {
-        "two-term and four-term, punched and mended": amplification(corrected("two-term")),
-        "runge-kutta mended, rk4": amplification(corrected("runge-kutta")),
-        "runge-kutta punched": amplification(original("runge-kutta")),
+        "two-term and four-term, original and corrected": amplification(corrected("two-term")),
+        "runge-kutta corrected, rk4": amplification(corrected("runge-kutta")),
+        "runge-kutta original": amplification(original("runge-kutta")),
         "runge-kutta, stage-base alone": amplification(subset("runge-kutta", keep=["stage-base"])),
         "runge-kutta, base-not-restored alone": amplification(
             subset("runge-kutta", keep=["base-not-restored"])

@@ -160,7 +160,7 @@ def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
 
 
 def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
-    """Return the first step of the Runge-Kutta program as punched."""
+    """Return the first step of the original Runge-Kutta program."""
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
     second = on.times_step(on.rate(at))

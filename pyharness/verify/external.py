@@ -176,7 +176,7 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 
 
 def _program(scene: Scene, time: float, program: str, accuracy: float) -> _Result | None:
-    """Run a mended program in steps that are halved until the print is met or rounding reigns.
+    """Run a corrected program in steps that are halved until the print is met or rounding reigns.
 
     The error is taken from the last halving, and twice that for safety; rounding may add half a
     unit in the last place a step. None where no step is long enough for its linear equations.

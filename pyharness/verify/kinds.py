@@ -6,13 +6,13 @@ cells
     program x case x listing x reading: Fortran against twin, bit for bit over the whole
     trajectory, counters and stop.
 schemes
-    every step of the mended programs against its scheme, to rounding.
+    every step of the corrected programs against its scheme, to rounding.
 stops
     where and why the Runge-Kutta program stops, against the formula of its test.
 methods, prepared
     modern methods against the reference, within the tolerance that they were given.
 orders
-    mended programs against `solve_ivp`, fixed-step methods against the reference: the power with
+    corrected programs against `solve_ivp`, fixed-step methods against the reference: the power with
     which the error falls as the step is halved.
 random
     all of these in scenes drawn from a seed, half of them nasty.

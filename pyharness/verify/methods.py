@@ -113,7 +113,7 @@ def _same_steps(chosen: Selection, scene: Scene, case: int) -> Iterator[Check]:
 
 
 def orders(chosen: Selection) -> Iterator[Check]:
-    """Measure the order of mended programs against `solve_ivp`, of methods against the reference.
+    """Measure orders: of corrected programs by `solve_ivp`, of methods by the reference.
 
     That of the programs' velocity too, against the reference: no other method has one. The value
     is what is missing to the order that is due.

@@ -1,4 +1,4 @@
-"""The mended programs against the schemes that they are, every step worked out anew.
+"""The corrected programs against the schemes that they are, every step worked out anew.
 
 Both languages could be wrong alike, by less than an order shows. Here each step starts from what
 the program had before it, so that only the rounding of one step may differ.
@@ -41,7 +41,7 @@ class Stage:
 
 
 def schemes(chosen: Selection) -> Iterator[Check]:
-    """Hold every step of the mended programs against its scheme, omega and velocity.
+    """Hold every step of the corrected programs against its scheme, omega and velocity.
 
     The value is the largest share of what rounding may do.
     """

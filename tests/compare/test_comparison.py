@@ -48,7 +48,7 @@ def test_all_is_as_expected_in_every_case() -> None:
 
 
 def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> None:
-    """Case 2 as punched: step 25, by V2."""
+    """Case 2 original: step 25, by V2."""
     lines = _text(case_2).splitlines()
     row = next(line for line in lines if line.startswith("runge-kutta") and "original" in line)
     assert row.split()[2:5] == ["25", "V2", "3305>500"]
@@ -213,11 +213,11 @@ def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyP
     """Its order is nobody's due, and its steps are those that were run."""
     monkeypatch.setattr(room, "timed", lambda *_: [1.0])
     listings = [corrected("two-term", ["c1-for-c"]), original("runge-kutta")]
-    reading, punched = compare_programs(case_scene(2), listings).programs
+    reading, before = compare_programs(case_scene(2), listings).programs
     assert reading.listing.label == "corrected"
     assert reading.order is None
     assert reading.seconds_per_step == 1.0 / 100.0
-    assert (punched.trajectory.steps, punched.seconds_per_step) == (25, 1.0 / 25.0)
+    assert (before.trajectory.steps, before.seconds_per_step) == (25, 1.0 / 25.0)
     with pytest.raises(InputError, match="'dt-accumulates' is given to both"):
         subset("two-term", None, ["dt-accumulates"], ["dt-accumulates"])
 

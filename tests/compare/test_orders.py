@@ -123,7 +123,7 @@ def test_matrix_that_a_fault_makes_singular_is_a_miss(
 
 @pytest.mark.parametrize("steps", [150, 300])
 def test_program_that_does_not_settle_where_others_do_misses(steps: int) -> None:
-    """As punched, TIME runs away and the torque with it."""
+    """In the original, TIME runs away and the torque with it."""
     scene = _steps(6, 0.01, steps)
     listing = Listing("two-term", frozenset({"dt-accumulates"}))
     truth = reference(scene, scene.times())
@@ -247,11 +247,11 @@ def test_compare_tells_what_it_does_not_judge() -> None:
     report = comparison_report(found)
     table = render(report, "table")
     assert "not judged: four-term corrected: IER = 129" in table
-    assert "orders mended - (due: 2)" in table
+    assert "orders corrected - (due: 2)" in table
     assert report.record()["not_judged"] == list(found.not_judged)
 
 
 def test_compare_names_rounding() -> None:
     found = compare_programs(case_scene(1), [corrected("two-term")])
-    assert "orders mended rounding (due: 2)" in render(comparison_report(found), "table")
+    assert "orders corrected rounding (due: 2)" in render(comparison_report(found), "table")
     assert found.not_judged == ()

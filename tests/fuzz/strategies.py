@@ -233,7 +233,7 @@ def listing_input(random: Random) -> ListingInput:
         mutated_word(random, random.choice(PROGRAMS))
         if random.random() < 0.05
         else random.choice(PROGRAMS),
-        random.choice((None, None, "original", "corrected", "", "mended")),
+        random.choice((None, None, "original", "corrected", "", "corrected")),
         several(kind),
         several(kind),
         several("reading" if kind == "defect" else kind),

@@ -29,38 +29,38 @@ def test_every_entry_is_complete() -> None:
         for key in ("summary", "scan", "adopted", "evidence", "why"):
             assert each[key], (each["id"], key)
         if each["kind"] in ("defect", "reading"):
-            assert each["punched"], each["id"]
-            assert each["mended"], each["id"]
+            assert each["original"], each["id"]
+            assert each["corrected"], each["id"]
         # A quotation is a few words.
         assert len(each["scan"]) < 120, each["id"]
 
 
 def test_effects_show_what_each_entry_says() -> None:
-    """Alone mended and alone kept, in the case that shows it best."""
+    """Alone corrected and alone kept, in the case that shows it best."""
 
     def at(name: str, program: str, case: int) -> dict[str, float]:
         found = next(e for e in effects_of(name) if (e.program, e.case) == (program, case))
         return {
-            "punched": found.punched.omega,
-            "mended_alone": found.mended_alone.omega,
+            "original": found.original.omega,
+            "corrected_alone": found.corrected_alone.omega,
             "kept_alone": found.kept_alone.omega,
-            "mended": found.mended.omega,
+            "corrected": found.corrected.omega,
             "v_kept": found.kept_alone.velocity,
-            "v_mended": found.mended.velocity,
+            "v_mended": found.corrected.velocity,
         }
 
     dt = at("dt-accumulates", "two-term", 5)
-    assert dt["punched"] > 1.0 > 100 * dt["mended_alone"]
-    assert dt["kept_alone"] > 1.0 > 100 * dt["mended"]
+    assert dt["original"] > 1.0 > 100 * dt["corrected_alone"]
+    assert dt["kept_alone"] > 1.0 > 100 * dt["corrected"]
     x3 = at("x3-reads-acl2", "two-term", 5)
-    assert x3["kept_alone"] == x3["mended"]
+    assert x3["kept_alone"] == x3["corrected"]
     assert x3["v_kept"] > 10 * x3["v_mended"]
     base = at("base-not-restored", "runge-kutta", 4)
     stage = at("stage-base", "runge-kutta", 4)
     for each in (base, stage):
-        assert each["kept_alone"] > 1e4 * each["mended"]
+        assert each["kept_alone"] > 1e4 * each["corrected"]
     held = at("torque-held", "runge-kutta", 7)
-    assert held["kept_alone"] > 100 * held["mended"]
+    assert held["kept_alone"] > 100 * held["corrected"]
 
 
 def test_lattice_is_whole_and_sorted() -> None:
@@ -74,7 +74,7 @@ def test_lattice_is_whole_and_sorted() -> None:
     assert found[0].steps == 100
     best = [each for each in found if each.steps == 100][-1]
     assert not best.listing.defects & {"stage-base", "base-not-restored"}
-    # Among the runs that as punched stop at step 25, all have the three defects that make it.
+    # Among the runs that original stop at step 25, all have the three defects that make it.
     stopped = [each for each in found if each.stop and each.steps == 25]
     assert stopped
     for each in stopped:
@@ -114,7 +114,7 @@ def test_defects_on_the_command_line(capsys: Capture) -> None:
     assert main(["defects", "dt-accumulates", "--format", "json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert len(record["effects"]) == 2 * 7
-    assert record["effects"][5]["punched"]["ended"] == "overflow"
+    assert record["effects"][5]["original"]["ended"] == "overflow"
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The ledger: complete, computed, and its verdicts turn when what they hang on is mended."""
+"""The ledger: complete, computed, and its verdicts turn when what they hang on is corrected."""
 
 import csv
 import json
@@ -26,8 +26,8 @@ pytestmark = pytest.mark.claims
 Capture = pytest.CaptureFixture[str]
 
 
-def _verdict(identity: str, *mended: str, punched: bool = True) -> str:
-    return outcome(claim(identity), Laboratory(punched, mended=frozenset(mended))).verdict
+def _verdict(identity: str, *fixed: str, is_original: bool = True) -> str:
+    return outcome(claim(identity), Laboratory(is_original, fixed=frozenset(fixed))).verdict
 
 
 def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
@@ -49,16 +49,16 @@ def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
 def test_every_claim_is_judged_and_its_numbers_are_told() -> None:
     for each in claims():
         found = judge(each)
-        assert found.programs.verdict in VERDICTS
-        assert found.methods.verdict in VERDICTS
-        assert found.programs.numbers or found.methods.numbers
+        assert found.original.verdict in VERDICTS
+        assert found.corrected.verdict in VERDICTS
+        assert found.original.numbers or found.corrected.numbers
         assert len(found.survivals) >= len(each["assumptions"])
         text = render(explanation(found), "table")
         assert each["quote"] in text
         assert max(map(len, text.splitlines())) <= 100
 
 
-# claim, as punched, defects mended, what the verdict turns to
+# claim, original, defects corrected, what the verdict turns to
 TURNS = [
     ("v2-case-2-stopped", REPRODUCED, ["base-not-restored"], IN_PART),
     ("v2-case-2-stopped", REPRODUCED, ["lipschitz-tests-velocity"], IN_PART),
@@ -84,18 +84,18 @@ TURNS = [
 ]
 
 
-@pytest.mark.parametrize(("identity", "before", "mended", "after"), TURNS)
+@pytest.mark.parametrize(("identity", "before", "fixed", "after"), TURNS)
 def test_mending_a_defect_turns_the_verdicts_that_hang_on_it(
-    identity: str, before: str, mended: list[str], after: str
+    identity: str, before: str, fixed: list[str], after: str
 ) -> None:
     assert _verdict(identity) == before
-    assert _verdict(identity, *mended) == after
+    assert _verdict(identity, *fixed) == after
 
 
 def test_mending_everything_gives_the_verdict_of_the_methods() -> None:
     for each in claims():
         everything = frozenset(names_of("defect"))
-        by_mending = outcome(each, Laboratory(True, mended=everything)).verdict
+        by_mending = outcome(each, Laboratory(True, fixed=everything)).verdict
         of_methods = outcome(each, Laboratory(False)).verdict
         if of_methods != by_mending:
             # What the thesis does not list stays untestable for the programs.
@@ -111,7 +111,7 @@ def test_programs_and_methods_disagree_about_the_conclusion() -> None:
     """What the thesis concluded is what its programs show, but for Case 7, and is false."""
     for identity in ("abstract-superior", "vi-superior"):
         assert _verdict(identity) == IN_PART
-        assert _verdict(identity, punched=False) == FALSE
+        assert _verdict(identity, is_original=False) == FALSE
     found = outcome(claim("vi-superior"), Laboratory(True))
     assert found.numbers["cases won by collocation"] == 5
 
@@ -129,7 +129,7 @@ def test_operations_that_are_done_once_are_not_those_of_a_step() -> None:
 
 
 def test_operations_counted_by_hand() -> None:
-    """Runge-Kutta as mended: 4 stages of 27, 3 of 12 to store, 6 x 7 to combine, and the rest."""
+    """Runge-Kutta corrected: 4 stages of 27, 3 of 12 to store, 6 x 7 to combine, and the rest."""
     stage = 3 * 3 + 6 * 2 + 6  # F, G, H: M + a*u*v; X, Y, Z: a + u*v - w*z, counted one by one
     assert stage == 27
     count = operations_per_step(corrected("runge-kutta"))
@@ -176,11 +176,11 @@ def test_claims_in_every_form(capsys: Capture) -> None:
     record: dict[str, Any] = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert record["schema"] == 1
     assert len(record["claims"]) == len(claims())
-    wanted = {"id", "where", "quote", "programs", "methods", "numbers", "assumptions"}
+    wanted = {"id", "where", "quote", "original", "corrected", "numbers", "assumptions"}
     assert all(set(each) == wanted for each in record["claims"])
     assert main(["claims", "--format", "csv"]) == 0
     rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
-    assert [row["as punched"] for row in rows] == [each["programs"] for each in record["claims"]]
+    assert [row["original"] for row in rows] == [each["original"] for each in record["claims"]]
     assert main(["claims", "--explain", "v2-case-2-stopped"]) == 0
     assert "stopped at step  25" in capsys.readouterr().out
     assert main(["claims", "--assignments"]) == 0
@@ -208,7 +208,7 @@ def test_weightings_within_ten_times_the_error_of_collocation_are_as_good(
 
     monkeypatch.setattr("pyharness.history.claims.about_methods._error", error)
     lab: Any = SimpleNamespace(
-        punched=False, truth=lambda case: SimpleNamespace(omega=np.ones((2, 3)))
+        is_original=False, truth=lambda case: SimpleNamespace(omega=np.ones((2, 3)))
     )
     assert others_failed(lab, {"cases": [3], "terms": [2]}).verdict == verdict
 
@@ -244,14 +244,14 @@ def test_what_mending_gains_tenfold_is_an_error(monkeypatch: pytest.MonkeyPatch)
         assert (no_error(lab, {"case": 3}).verdict == FALSE) == is_false
 
 
-@pytest.mark.parametrize("turning", ["punched", "mended"])
+@pytest.mark.parametrize("turning", ["original", "corrected"])
 def test_a_verdict_that_turns_on_either_side_does_not_survive(
     turning: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     entry = next(each for each in claims() if judge(each).survivals)
 
     def other(entry: dict[str, Any], laboratory: Laboratory) -> Any:
-        turns = laboratory.punched == (turning == "punched")
+        turns = laboratory.is_original == (turning == "original")
         verdict = FALSE if turns and laboratory.assumptions != Assumptions() else REPRODUCED
         return SimpleNamespace(verdict=verdict)
 

@@ -260,10 +260,10 @@ def test_singularity_test_fires_only_for_five_terms_at_small_steps() -> None:
 @pytest.mark.parametrize("case", range(1, 7))
 def test_points_out_of_place_do_not_show_in_four_terms(case: int) -> None:
     scene = case_scene(case)
-    punched, mended = (compiled.run(scene, f("four-term")).omega for f in (original, corrected))
-    np.testing.assert_allclose(punched, mended, rtol=0, atol=ROUNDING * np.abs(mended).max())
-    punched, mended = (compiled.run(scene, f("two-term")).omega for f in (original, corrected))
-    shows = len(punched) < len(mended) or np.abs(punched - mended).max() > 1e-4
+    before, after = (compiled.run(scene, f("four-term")).omega for f in (original, corrected))
+    np.testing.assert_allclose(before, after, rtol=0, atol=ROUNDING * np.abs(after).max())
+    before, after = (compiled.run(scene, f("two-term")).omega for f in (original, corrected))
+    shows = len(before) < len(after) or np.abs(before - after).max() > 1e-4
     assert shows == (case > 2)  # in Case 2 f is a straight line, which two terms follow
 
 

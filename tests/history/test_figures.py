@@ -17,7 +17,7 @@ from pyharness.cli.main import main
 from pyharness.cli.output import write_folder
 from pyharness.history import figure_pictures as figure_plots
 from pyharness.history import figures
-from pyharness.history.figures import Curve, Finding
+from pyharness.history.figures import Curve, FigureFinding
 from pyharness.model.listing import corrected, original
 from pyharness.original import compiled
 from pyharness.truth.reference import reference
@@ -26,7 +26,7 @@ from pyharness.views.pictures import saved
 
 Capture = pytest.CaptureFixture[str]
 STEMS = ["06", "07", "08", "09", "10a", "10b", "11", "12"]
-ALL = [f"figure-{stem}{part}" for part in ("", "-mended") for stem in STEMS]
+ALL = [f"figure-{stem}{part}" for part in ("", "-corrected") for stem in STEMS]
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def _finding(stem: str) -> Finding:
+def _finding(stem: str) -> FigureFinding:
     return next(each for each in figures.findings() if each.plan.stem == stem)
 
 
@@ -61,12 +61,12 @@ def test_figure_n_is_case_n_minus_5_and_holds_what_the_text_says() -> None:
     assert all(plan.case == plan.number - 5 for plan in figures.plans())
     every = ("two-term", "four-term", "runge-kutta")
     for stem in ("06", "07", "08", "09"):
-        assert programs[f"figure-{stem}"] == programs[f"figure-{stem}-mended"] == every
+        assert programs[f"figure-{stem}"] == programs[f"figure-{stem}-corrected"] == every
     for stem in ("10a", "10b", "11", "12"):
         assert "runge-kutta" not in programs[f"figure-{stem}"]
     assert set(programs["figure-10a"]) | set(programs["figure-10b"]) == {"two-term", "four-term"}
     assert "two-term" not in programs["figure-11"]
-    assert "two-term" in programs["figure-11-mended"]
+    assert "two-term" in programs["figure-11-corrected"]
     for plan in figures.plans():
         assert plan.source
         assert plan.caption.endswith(".")
@@ -80,12 +80,12 @@ def test_numbers_are_those_of_the_trajectories(folder: Path) -> None:
         rows = _rows(text, "reference")
         np.testing.assert_array_equal(rows, np.hstack([truth.time[:, None], truth.omega]))
         for program in plan.programs:
-            listing = original(program) if plan.set == "punched" else corrected(program)
+            listing = original(program) if plan.set == "original" else corrected(program)
             run = compiled.run(scene, listing)
             rows = _rows(text, program)
             np.testing.assert_array_equal(rows, np.hstack([run.time[:, None], run.omega]))
         listings = {row["listing"] for row in csv.DictReader(text.splitlines())}
-        assert listings == {"", "original" if plan.set == "punched" else "corrected"}
+        assert listings == {"", "original" if plan.set == "original" else "corrected"}
         curves = {row["curve"] for row in csv.DictReader(text.splitlines())}
         assert curves == {"reference", *plan.programs}
 
@@ -101,8 +101,8 @@ def test_curves_stop_where_the_program_stopped(folder: Path) -> None:
     ends = {"figure-06": 100, "figure-07": 25, "figure-08": 24, "figure-09": 23}
     for stem, steps in ends.items():
         assert len(_rows((folder / f"{stem}.csv").read_text(), "runge-kutta")) == steps
-        mended = (folder / f"{stem}-mended.csv").read_text()
-        assert len(_rows(mended, "runge-kutta")) == 100
+        after = (folder / f"{stem}-corrected.csv").read_text()
+        assert len(_rows(after, "runge-kutta")) == 100
 
 
 def test_lines_are_drawn_to_their_end_which_is_marked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,7 +140,7 @@ def test_lines_are_drawn_to_their_end_which_is_marked(monkeypatch: pytest.Monkey
 
 
 def test_curve_that_diverges_leaves_the_picture() -> None:
-    """The two-term program of Case 6 as punched, to 1e111, beside curves that stay legible."""
+    """The two-term program of Case 6 original, to 1e111, beside curves that stay legible."""
     finding = _finding("figure-11")
     wild = Curve(original("two-term"), compiled.run(finding.scene, original("two-term")))
     assert np.abs(wild.trajectory.omega).max() > 1e100

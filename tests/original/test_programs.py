@@ -1,4 +1,4 @@
-"""Fortran against twin, bit for bit; mended programs against the truth; stops of the thesis."""
+"""Fortran against twin, bit for bit; corrected programs against the truth; stops of the thesis."""
 
 import itertools
 import math
@@ -114,7 +114,7 @@ def test_rk_as_punched_stops_at_step_25_in_case_2() -> None:
 
 
 def test_case_6_two_term_as_punched_diverges_and_the_others_stay() -> None:
-    """Section V.2: the two-term model diverged, the four-term did not; mended, both stay."""
+    """Section V.2: the two-term model diverged, the four-term did not; corrected, both stay."""
     scene = case_scene(6)
     bound = 2.0 * np.abs(reference(scene, scene.times()).omega).max()
     ended = {}
@@ -169,7 +169,7 @@ def test_measured_order_is_the_programs_own(program: str, case: int) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_programs_as_punched_are_caught_as_missing_their_order(program: str) -> None:
-    """In Case 7 no program as punched comes near the solution; the order check must object.
+    """In Case 7 no original program comes near the solution; the order check must object.
 
     Without a torque that varies the four-term program hides its defect: see test below.
     """
@@ -201,10 +201,10 @@ def test_four_term_hides_the_accumulating_step_where_no_torque_varies() -> None:
     """The right-hand sides along the first estimate are quadratic: any four points will do."""
     for case in range(1, 7):
         scene = case_scene(case)
-        punched = compiled.run(scene, original("four-term"))
-        mended = compiled.run(scene, corrected("four-term"))
-        largest = np.abs(mended.omega).max()
-        np.testing.assert_allclose(punched.omega, mended.omega, rtol=0.0, atol=1e-11 * largest)
+        before = compiled.run(scene, original("four-term"))
+        after = compiled.run(scene, corrected("four-term"))
+        largest = np.abs(after.omega).max()
+        np.testing.assert_allclose(before.omega, after.omega, rtol=0.0, atol=1e-11 * largest)
 
 
 @pytest.mark.parametrize("reading", names_of("reading"))
@@ -219,14 +219,14 @@ def test_readings_not_adopted_lose_an_order(reading: str) -> None:
 
 
 def test_recorded_time_is_what_tape5_got() -> None:
-    """TIME runs quadratically as punched, and linearly, by repeated addition, as mended."""
+    """TIME runs quadratically original, and linearly, by repeated addition, corrected."""
     scene = case_scene(3)
-    punched = compiled.run(scene, original("four-term"))
+    before = compiled.run(scene, original("four-term"))
     n = np.arange(1, 101)
-    np.testing.assert_allclose(punched.recorded_time, 0.01 * n * (n + 1) / 2, rtol=1e-13)
-    np.testing.assert_array_equal(punched.time, n * 0.01)
-    mended = compiled.run(scene, corrected("four-term"))
-    np.testing.assert_array_equal(mended.recorded_time, np.cumsum(np.full(100, 0.01)))
+    np.testing.assert_allclose(before.recorded_time, 0.01 * n * (n + 1) / 2, rtol=1e-13)
+    np.testing.assert_array_equal(before.time, n * 0.01)
+    after = compiled.run(scene, corrected("four-term"))
+    np.testing.assert_array_equal(after.recorded_time, np.cumsum(np.full(100, 0.01)))
 
 
 def test_lipschitz_constant_and_no_stop() -> None:
@@ -269,7 +269,7 @@ def test_velocity_that_no_one_asked_for_changes_no_bit_of_the_rest() -> None:
 
 
 def test_stop_test_that_reads_the_velocity_keeps_it() -> None:
-    """As punched the velocity ends Case 2 at step 25, whether it is asked for or not."""
+    """In the original the velocity ends Case 2 at step 25, whether it is asked for or not."""
     run = compiled.run(case_scene(2), original("runge-kutta"), velocity=False)
     assert run.stop is not None
     assert (run.stop.step, run.stop.variable) == (25, "V2")

@@ -59,7 +59,7 @@ def test_all_matrices_are_within_their_bounds() -> None:
 
 
 def test_programs_meet_the_singularity_that_was_foretold() -> None:
-    """As punched the points move out of danger; as mended every step prints 129."""
+    """In the original the points move out of danger; corrected every step prints 129."""
     checks = _checks("matrices/four-term/original", "matrices/four-term/corrected")
     assert checks["matrices/four-term/original/ier-1e-06"].note == "IER = 129 in 19 of 300 steps"
     assert checks["matrices/four-term/corrected/ier-1e-06"].note == "IER = 129 in 300 of 300 steps"
@@ -144,8 +144,8 @@ def test_polynomials_are_those_of_the_schemes() -> None:
             for step in (1, 10, 100):
                 (((*found,),),) = amplification(listing, step).coefficients
                 assert found == [1, 1, Fraction(1, 2), 0, 0], "moved points change no straight line"
-    punched = amplification(original("runge-kutta"))
-    assert punched.text() == "[1 + 1/2 z, 0; z + 5/6 z^2 + 7/24 z^3 + 1/24 z^4, 1]"
+    before = amplification(original("runge-kutta"))
+    assert before.text() == "[1 + 1/2 z, 0; z + 5/6 z^2 + 7/24 z^3 + 1/24 z^4, 1]"
 
 
 def test_boundaries_are_the_known_ones() -> None:
@@ -365,7 +365,7 @@ def test_too_much_rounding_moves_the_crossing(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_divergence_is_not_that_of_another_scheme() -> None:
-    """The mended Runge-Kutta held to the matrix of collocation, and to its own."""
+    """The corrected Runge-Kutta held to the matrix of collocation, and to its own."""
     scene = case_scene(4)
 
     def runner(each: Scene) -> Trajectory:
@@ -379,7 +379,7 @@ def test_divergence_is_not_that_of_another_scheme() -> None:
 
 
 def test_linear_theory_does_not_see_the_moved_points() -> None:
-    """The two-term program as punched leaves with every step; mended it is as theory has it."""
+    """The original two-term program leaves with every step; corrected it is as theory has it."""
     id = "step-size/two-term/case-4/{}/diverges"
     checks = _checks(id.format("original"), id.format("corrected"))
     assert checks[id.format("original")].value == 0.0

@@ -105,7 +105,7 @@ FORTRAN_PLANTS = {
                                    corrected("four-term")),
     "half a step": ("runge_kutta", "U1(I) = UU1 + (DT/6.0_dp)", "U1(I) = UU1 + (DT/12.0_dp)",
                     corrected("runge-kutta")),
-    "a wrong card mended": ("listing", "btest(bits, 3)", "btest(bits, 4)",
+    "a wrong card corrected": ("listing", "btest(bits, 3)", "btest(bits, 4)",
                             Listing("runge-kutta", frozenset(["stage-base"]))),
     "the time label": ("runge_kutta", "rows(2, L) = TIME", "rows(2, L) = TIME - 0.5_dp*DT",
                        original("runge-kutta")),

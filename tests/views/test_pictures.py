@@ -79,7 +79,7 @@ def test_end_of_a_program_is_marked(drawn: "list[Figure]") -> None:
 
 
 def test_end_out_of_view_is_marked_at_the_edge(drawn: "list[Figure]") -> None:
-    """Case 6: two-term as punched overflows at step 57, at 1e111."""
+    """Case 6: two-term original overflows at step 57, at 1e111."""
     assert main(["compare", "--case", "6", "--plot", "x.png", "--out", "x.txt"]) == 0
     ends = _ends(drawn[0])
     assert sorted(panel for panel, _, _ in ends) == [0, 2, 3, 5, 6, 8]

@@ -1,4 +1,4 @@
-"""`figures`: Figures 6 to 12 of the thesis, from the programs as punched and as mended."""
+"""`figures`: Figures 6 to 12 of the thesis, original and corrected."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""`limits`: what the programs as punched tend to as the step goes to zero."""
+"""`limits`: what the original programs tend to as the step goes to zero."""
 
 import argparse
 
@@ -19,7 +19,7 @@ def declare(parser: shared.Parser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Hold the programs as punched against their limits and against the truth."""
+    """Hold the original programs against their limits and against the truth."""
     scene = shared.chosen_scene(options)
     if options.program is not None and options.program not in PROGRAMS:
         raise unknown("program", options.program, PROGRAMS, "--program")

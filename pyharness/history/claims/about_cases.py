@@ -16,18 +16,18 @@ from pyharness.history.claims.laboratory import (
     largest,
     ranges,
 )
-from pyharness.history.claims.verdicts import FALSE, NOT_REPRODUCED, REPRODUCED, Outcome, graded
+from pyharness.history.claims.verdicts import FALSE, NOT_REPRODUCED, REPRODUCED, Judged, graded
 from pyharness.original.programs import PROGRAM_REGISTRY
 
 
-def constant_solution(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def constant_solution(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure how far the solution moves."""
     moved = float(ranges(lab.truth(given["case"])).max())
     verdict = FALSE if moved > 1e-12 else REPRODUCED
-    return Outcome(verdict, {"change over the run (rad/s)": moved})
+    return Judged(verdict, {"change over the run (rad/s)": moved})
 
 
-def known_solution(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def known_solution(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold the printed solution against the reference."""
     truth = lab.truth(given["case"])
     t = truth.time
@@ -35,22 +35,22 @@ def known_solution(lab: Laboratory, given: dict[str, Any]) -> Outcome:
     apart = distance(printed, truth.omega)
     # The phase 5 t is itself rounded.
     allowed = 1e-15 * (1.0 + 5.0 * float(t[-1]))
-    return Outcome(
+    return Judged(
         REPRODUCED if apart <= allowed else FALSE, {"distance from the reference (rad/s)": apart}
     )
 
 
-def no_deviation(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def no_deviation(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold all programs against the known solution, at the precision of the page."""
     numbers = {
         f"{name}: largest error (rad/s)": lab.error(name, given["case"])
         for name in PROGRAM_REGISTRY
     }
     close = max(numbers.values()) < given["limit"]
-    return Outcome(REPRODUCED if close else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if close else NOT_REPRODUCED, numbers)
 
 
-def coincident(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def coincident(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold collocation against the known solution, on the scale of the graph."""
     truth = lab.truth(given["case"])
     spread = ranges(truth)
@@ -61,10 +61,10 @@ def coincident(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         shares = np.abs(run.omega - truth.omega).max(axis=0)[moving] / spread[moving]
         numbers[f"{program}: largest share of a component's range"] = float(shares.max())
     close = max(numbers.values()) <= given["share"]
-    return Outcome(REPRODUCED if close else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if close else NOT_REPRODUCED, numbers)
 
 
-def error_size(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def error_size(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure the largest error as a part of the amplitude."""
     truth = lab.truth(given["case"])
     amplitude = float(ranges(truth).max()) / 2.0
@@ -74,10 +74,10 @@ def error_size(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         for program in COLLOCATION
     }
     inside = all(given["low"] <= each <= given["high"] for each in numbers.values())
-    return Outcome(REPRODUCED if inside else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if inside else NOT_REPRODUCED, numbers)
 
 
-def error_constant(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def error_constant(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold the error at the end of the run against that at its beginning."""
     truth = lab.truth(given["case"]).omega
     numbers = {}
@@ -86,18 +86,18 @@ def error_constant(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         fifth = len(errors) // 5
         growth = float(errors[-fifth:].max() / errors[:fifth].max())
         numbers[f"{program}: error of the last fifth over that of the first"] = growth
-    return Outcome(REPRODUCED if max(numbers.values()) <= 2.0 else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if max(numbers.values()) <= 2.0 else NOT_REPRODUCED, numbers)
 
 
-def stopped_at(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def stopped_at(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Find the step at which the stop test ended the run."""
     stop = lab.run("runge-kutta", given["case"]).stop
     step = math.nan if stop is None else float(stop.step)
     verdict = graded(step == given["step"], stop is not None)
-    return Outcome(verdict, {"stopped at step": step})
+    return Judged(verdict, {"stopped at step": step})
 
 
-def growing(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def growing(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold the first component at the end of the run against the solution there."""
     run = lab.run("runge-kutta", given["case"])
     value, solution = (
@@ -106,28 +106,28 @@ def growing(lab: Laboratory, given: dict[str, Any]) -> Outcome:
     )
     beyond = value > 1.0 and value > solution * 1.001
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
-    return Outcome(REPRODUCED if beyond else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if beyond else NOT_REPRODUCED, numbers)
 
 
-def no_error(lab: Laboratory, given: dict[str, Any]) -> Outcome:
-    """Measure what mending everything gains at the steps that were run."""
+def no_error(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Measure what correcting everything gains at the steps that were run."""
     case = given["case"]
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
     truth = lab.truth(case).omega[: run.steps]
     gain = distance(run.omega, truth) / distance(best.omega[: run.steps], truth)
     verdict = FALSE if gain > 10.0 else graded(gain <= 2.0, True)
-    return Outcome(verdict, {"error over that of the mended program": gain})
+    return Judged(verdict, {"error over that of the corrected program": gain})
 
 
-def omega3_varies(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def omega3_varies(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure how far the third component moves."""
     moved = float(ranges(lab.truth(given["case"]))[2])
     verdict = REPRODUCED if moved > given["limit"] else FALSE
-    return Outcome(verdict, {"range of omega3 (rad/s)": moved})
+    return Judged(verdict, {"range of omega3 (rad/s)": moved})
 
 
-def concur(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def concur(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold the two collocation programs against one another."""
     truth = lab.truth(given["case"])
     two, four = (lab.run(program, given["case"]) for program in COLLOCATION)
@@ -144,10 +144,10 @@ def concur(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         "four-term error (rad/s)": lab.error("four-term", given["case"]),
     }
     whole = share <= given["share"] and detail <= 0.1
-    return Outcome(graded(whole, share <= given["share"]), numbers)
+    return Judged(graded(whole, share <= given["share"]), numbers)
 
 
-def fails(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def fails(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """See how the Runge-Kutta program ended, and how far from the truth."""
     case = given["case"]
     run, truth = lab.run("runge-kutta", case), lab.truth(case)
@@ -157,42 +157,42 @@ def fails(lab: Laboratory, given: dict[str, Any]) -> Outcome:
     share = float((errors[moving] / spread[moving]).max(initial=0.0))
     ended, far = run.ended != "complete", share > given["share"]
     numbers = {"steps": float(run.steps), "error over the range of a component": share}
-    return Outcome(graded(ended and far, ended or far), numbers)
+    return Judged(graded(ended and far, ended or far), numbers)
 
 
-def differ(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def differ(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure the difference of the collocation programs over the largest omega."""
     two, four = (lab.run(program, given["case"]) for program in COLLOCATION)
     share = distance(two.omega, four.omega) / largest(lab.truth(given["case"]))
     verdict = REPRODUCED if share > given["share"] else NOT_REPRODUCED
-    return Outcome(verdict, {"difference over the largest omega": share})
+    return Judged(verdict, {"difference over the largest omega": share})
 
 
-def more_reliable(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def more_reliable(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure the four-term error over the two-term one."""
     ratio = lab.error("four-term", given["case"]) / lab.error("two-term", given["case"])
     verdict = graded(ratio <= 0.5, ratio <= 0.8)
-    return Outcome(verdict, {"four-term error over two-term error": ratio})
+    return Judged(verdict, {"four-term error over two-term error": ratio})
 
 
-def diverged(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def diverged(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """See whether the two-term run left its bounds."""
     run = lab.run("two-term", given["case"])
     error = lab.error("two-term", given["case"])
     gone = run.ended == "overflow" or error > largest(lab.truth(given["case"]))
     numbers = {"steps": float(run.steps), "largest error (rad/s)": error}
-    return Outcome(REPRODUCED if gone else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if gone else NOT_REPRODUCED, numbers)
 
 
-def too_fast(lab: Laboratory, given: dict[str, Any]) -> Outcome:
-    """See whether the motion or the program is to blame: run the mended model at the same step."""
+def too_fast(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """See whether motion or program is to blame: run the corrected model at the same step."""
     best = Laboratory(False, lab.assumptions)
     share = best.error("two-term", given["case"]) / largest(lab.truth(given["case"]))
     verdict = FALSE if share <= given["share"] else REPRODUCED
-    return Outcome(verdict, {"mended two-term error over the largest omega": share})
+    return Judged(verdict, {"corrected two-term error over the largest omega": share})
 
 
-def models_concur(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def models_concur(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold models of several numbers of terms against one another."""
     models = {n: lab.models(given["case"], n) for n in given["terms"]}
     scale = largest(lab.truth(given["case"]))
@@ -203,10 +203,10 @@ def models_concur(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         for n in others
     }
     close = max(numbers.values()) <= given["share"]
-    return Outcome(REPRODUCED if close else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if close else NOT_REPRODUCED, numbers)
 
 
-def dynamic(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def dynamic(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure the largest angular acceleration of the four-term run, case by case."""
     rates = {}
     for case in range(1, 8):
@@ -216,4 +216,4 @@ def dynamic(lab: Laboratory, given: dict[str, Any]) -> Outcome:
     others = max(rate for case, rate in rates.items() if case != given["case"])
     liveliest = rates[given["case"]] >= given["factor"] * others
     numbers = {f"case {case}: largest acceleration (rad/s2)": rate for case, rate in rates.items()}
-    return Outcome(REPRODUCED if liveliest else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if liveliest else NOT_REPRODUCED, numbers)

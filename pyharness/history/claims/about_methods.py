@@ -13,7 +13,7 @@ from pyharness.history.claims.verdicts import (
     NOT_REPRODUCED,
     NOT_TESTABLE,
     REPRODUCED,
-    Outcome,
+    Judged,
     graded,
 )
 from pyharness.history.family.members import Member, run
@@ -23,10 +23,10 @@ from pyharness.original.counting import operations_per_step
 _OTHERS = ("subdomain", "galerkin", "least-squares")
 
 
-def others_failed(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def others_failed(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Try the other weightings on the cases whose solution is known."""
-    if lab.punched:
-        return Outcome(NOT_TESTABLE, {})
+    if lab.is_original:
+        return Judged(NOT_TESTABLE, {})
     numbers, useless, worst = {}, False, 0.0
     for case in given["cases"]:
         truth = lab.truth(case)
@@ -39,14 +39,14 @@ def others_failed(lab: Laboratory, given: dict[str, Any]) -> Outcome:
                 # Errors of rounding are equally good.
                 worst = max(worst, error / max(best, 1e-12 * largest(truth)))
     if useless:
-        return Outcome(REPRODUCED, numbers)
-    return Outcome(NOT_REPRODUCED if worst <= 10.0 else IN_PART, numbers)
+        return Judged(REPRODUCED, numbers)
+    return Judged(NOT_REPRODUCED if worst <= 10.0 else IN_PART, numbers)
 
 
-def computer_error(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def computer_error(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure rounding alone: Case 1, which every member solves exactly, at ever smaller steps."""
-    if lab.punched:
-        return Outcome(NOT_TESTABLE, {})
+    if lab.is_original:
+        return Judged(NOT_TESTABLE, {})
     numbers = {}
     for parts in (1, 10, 100):
         scene = lab.scene(1)
@@ -56,13 +56,13 @@ def computer_error(lab: Laboratory, given: dict[str, Any]) -> Outcome:
             error = distance(found, lab.truth(1).omega)
             numbers[f"{weighting}, step {finer.step_size:g}: rounding error (rad/s)"] = error
     small = max(numbers.values()) < given["limit"]
-    return Outcome(FALSE if small else REPRODUCED, numbers)
+    return Judged(FALSE if small else REPRODUCED, numbers)
 
 
-def only_collocation(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def only_collocation(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure the error of every other weighting over that of collocation."""
-    if lab.punched:
-        return Outcome(NOT_TESTABLE, {})
+    if lab.is_original:
+        return Judged(NOT_TESTABLE, {})
     numbers = {}
     for weighting in _OTHERS:
         ratios = [
@@ -73,11 +73,11 @@ def only_collocation(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         ]
         numbers[f"{weighting}: largest error over that of collocation"] = max(ratios)
     worse = [each > 10.0 for each in numbers.values()]
-    return Outcome(graded(all(worse), any(worse), FALSE), numbers)
+    return Judged(graded(all(worse), any(worse), FALSE), numbers)
 
 
-def predict_correct(lab: Laboratory, given: dict[str, Any]) -> Outcome:
-    """Hold the mended programs against one prediction and one correction of the family."""
+def predict_correct(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Hold the corrected programs against one prediction and one correction of the family."""
     best = Laboratory(False, lab.assumptions)
     numbers, same = {}, True
     for case in given["cases"]:
@@ -90,10 +90,10 @@ def predict_correct(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         for corrections in (0, 1, 2, 3):
             error = _error(lab, case, Member("collocation", 4, corrections=corrections))
             numbers[f"case {case}, 4 terms, {corrections} corrections: error (rad/s)"] = error
-    return Outcome(FALSE if same else REPRODUCED, numbers)
+    return Judged(FALSE if same else REPRODUCED, numbers)
 
 
-def execution_time(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def execution_time(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Count the floating-point operations of a step in the twins."""
     counts = {
         program: operations_per_step(lab.listing(program))
@@ -105,25 +105,25 @@ def execution_time(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         ratio = counts[program] / counts["runge-kutta"]
         numbers[f"{program}: over Runge-Kutta"] = ratio
         inside.append(given["low"] <= ratio <= given["high"])
-    return Outcome(graded(all(inside), any(inside)), numbers)
+    return Judged(graded(all(inside), any(inside)), numbers)
 
 
-def seconds(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def seconds(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Count operations: nothing of today's machines tells of that one's seconds."""
     numbers = {
         f"{program}: operations in 100 steps": 100.0 * operations_per_step(lab.listing(program))
         for program in (*COLLOCATION, "runge-kutta")
     }
-    return Outcome(NOT_TESTABLE, numbers)
+    return Judged(NOT_TESTABLE, numbers)
 
 
-def complexity(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def complexity(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Count the cards of each deck."""
     cards = {program: float(n) for program, n in facts("cases")["cards"].items()}
     ratios = {program: cards[program] / cards["runge-kutta"] for program in COLLOCATION}
     near = [ratio <= given["factor"] for ratio in ratios.values()]
     numbers = {f"{program}: cards": n for program, n in cards.items()}
-    return Outcome(graded(all(near), any(near)), numbers)
+    return Judged(graded(all(near), any(near)), numbers)
 
 
 def _error(lab: Laboratory, case: int, member: Member) -> float:

@@ -12,13 +12,13 @@ from pyharness.history.claims.laboratory import (
     largest,
     required_constant,
 )
-from pyharness.history.claims.verdicts import FALSE, NOT_REPRODUCED, REPRODUCED, Outcome, graded
+from pyharness.history.claims.verdicts import FALSE, NOT_REPRODUCED, REPRODUCED, Judged, graded
 from pyharness.model.facts import facts
 from pyharness.model.scene import Scene
 from pyharness.original.programs import PROGRAM_REGISTRY
 
 
-def superior(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def superior(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold collocation against Runge-Kutta, at the steps that all of them ran."""
     numbers, wins = {}, 0
     for case in given["cases"]:
@@ -31,10 +31,10 @@ def superior(lab: Laboratory, given: dict[str, Any]) -> Outcome:
             max(two, four) / third
         )
     numbers["cases won by collocation"] = wins
-    return Outcome(graded(wins == len(given["cases"]), wins > 0, FALSE), numbers)
+    return Judged(graded(wins == len(given["cases"]), wins > 0, FALSE), numbers)
 
 
-def equation_19(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def equation_19(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Hold the program's quotient against the norm of the Jacobian, the most that eq. 19 allows."""
     numbers: dict[str, float] = {}
     for case in given["cases"]:
@@ -53,10 +53,10 @@ def equation_19(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         ratio = required_constant(lab, case) / norm
         numbers[f"case {case}: largest quotient over norm of the Jacobian"] = ratio
     worst = max(numbers.values())
-    return Outcome(graded(worst <= 1.05, worst <= 2.0, FALSE), numbers)
+    return Judged(graded(worst <= 1.05, worst <= 2.0, FALSE), numbers)
 
 
-def higher_powers(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def higher_powers(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure what four terms gain over two."""
     gains = {
         f"case {case}: error of two terms over that of four": lab.error("two-term", case)
@@ -64,20 +64,20 @@ def higher_powers(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         for case in given["cases"]
     }
     most = max(gains.values())
-    return Outcome(graded(most <= 2.0, most <= 10.0), gains)
+    return Judged(graded(most <= 2.0, most <= 10.0), gains)
 
 
-def larger_constant(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def larger_constant(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Find the constants that all steps need."""
     numbers = {
         f"case {case}: constant needed (1/s)": required_constant(lab, case)
         for case in given["cases"]
     }
     above = any(each > facts("cases")["deck"]["lipschitz"] for each in numbers.values())
-    return Outcome(REPRODUCED if above else NOT_REPRODUCED, numbers)
+    return Judged(REPRODUCED if above else NOT_REPRODUCED, numbers)
 
 
-def guard(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def guard(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Count the runs that the stop test ends: bounded ones, and one that is not."""
     alarms = 0
     for case in given["cases"]:
@@ -89,10 +89,10 @@ def guard(lab: Laboratory, given: dict[str, Any]) -> Outcome:
     run = PROGRAM_REGISTRY["runge-kutta"].run(unbounded, lab.listing("runge-kutta"))
     caught = run.stop is not None
     numbers = {"bounded runs stopped": float(alarms), "unbounded run stopped": float(caught)}
-    return Outcome(graded(caught and not alarms, caught, FALSE), numbers)
+    return Judged(graded(caught and not alarms, caught, FALSE), numbers)
 
 
-def small_step(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def small_step(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure what a tenth of the step gains the collocation programs."""
     numbers, improved, exception = {}, [], False
     for program in COLLOCATION:
@@ -105,10 +105,10 @@ def small_step(lab: Laboratory, given: dict[str, Any]) -> Outcome:
             else:
                 improved.append(gain >= 2.0)
     share = sum(improved) / len(improved)
-    return Outcome(graded(share >= 0.8 and exception, share >= 0.5), numbers)
+    return Judged(graded(share >= 0.8 and exception, share >= 0.5), numbers)
 
 
-def small_step_runge_kutta(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def small_step_runge_kutta(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Measure what a tenth of the step gains the Runge-Kutta program, without its stop test."""
     numbers = {
         f"case {case}: gain": lab.error("runge-kutta", case, may_stop=False)
@@ -116,19 +116,19 @@ def small_step_runge_kutta(lab: Laboratory, given: dict[str, Any]) -> Outcome:
         for case in given["cases"]
     }
     better = sum(gain >= 2.0 for gain in numbers.values())
-    return Outcome(graded(better == 0, 3 * better <= len(numbers)), numbers)
+    return Judged(graded(better == 0, 3 * better <= len(numbers)), numbers)
 
 
-def suffices(lab: Laboratory, given: dict[str, Any]) -> Outcome:
+def suffices(lab: Laboratory, given: dict[str, Any]) -> Judged:
     """Count the cases in which models of three and four terms stay near the truth."""
     numbers, good = {}, 0
     for case in given["cases"]:
         truth = lab.truth(case)
         errors = [lab.error("four-term", case)]
-        if not (lab.punched and lab.scene(case).torque.varies):
+        if not (lab.is_original and lab.scene(case).torque.varies):
             errors.append(distance(lab.models(case, 3), truth.omega))
         share = max(errors) / largest(truth)
         numbers[f"case {case}: error over the largest omega"] = share
         good += share <= given["share"]
     numbers["cases within it"] = float(good)
-    return Outcome(graded(good >= given["enough"], good >= 3), numbers)
+    return Judged(graded(good >= given["enough"], good >= 3), numbers)

@@ -45,21 +45,21 @@ class Laboratory:
 
     Attributes
     ----------
-    punched : bool
-        As punched, or as mended.
+    is_original : bool
+        Whether the original programs are run, or the corrected ones.
     assumptions : Assumptions
         Under which they run.
-    mended : frozenset of str
-        Defects that are mended even as punched: what would the verdict be without this one?
+    fixed : frozenset of str
+        Defects corrected even in the original programs: what would the verdict be without this one?
     """
 
-    punched: bool
+    is_original: bool
     assumptions: Assumptions = field(default_factory=Assumptions)
-    mended: frozenset[str] = frozenset()
+    fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
         """Return the program's listing in this state."""
-        defects = set(names_of("defect", program)) - self.mended if self.punched else set()
+        defects = set(names_of("defect", program)) - self.fixed if self.is_original else set()
         readings = self.assumptions.readings & set(names_of("reading", program))
         return Listing(program, frozenset(defects), readings)
 
@@ -85,10 +85,10 @@ class Laboratory:
     def models(self, case: int, terms: int) -> Array:
         """Return omega of the collocation model of so many terms, at points k/(n+1).
 
-        As punched the points leave the interval, unless `dt-accumulates` is mended, and the
+        In the original the points leave the interval, unless `dt-accumulates` is corrected, and the
         torque must be constant; the thesis lists neither the three- nor the five-term model.
         """
-        accumulates = self.punched and "dt-accumulates" not in self.mended
+        accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates)
 
 

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import Any
 
 from pyharness.history.claims.laboratory import Assumptions, Laboratory
-from pyharness.history.claims.verdicts import REPRODUCED, Outcome, Test
+from pyharness.history.claims.verdicts import REPRODUCED, Judged, Test
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
 from pyharness.model.scene import Triple
@@ -21,15 +21,15 @@ class Survival:
     ----------
     assumption : str
         What was changed, and to what.
-    programs, methods : str
+    original, corrected : str
         The verdicts then.
     survives : bool
         Whether both are what they were.
     """
 
     assumption: str
-    programs: str
-    methods: str
+    original: str
+    corrected: str
     survives: bool
 
 
@@ -41,15 +41,15 @@ class Judgement:
     ----------
     claim : dict
         The entry of `data/claims.toml`.
-    programs, methods : Outcome
-        For the programs as punched, and for the methods as mended.
+    original, corrected : Judged
+        For the original programs, and for the corrected methods.
     survivals : tuple of Survival
         The verdicts without each assumption.
     """
 
     claim: dict[str, Any]
-    programs: Outcome
-    methods: Outcome
+    original: Judged
+    corrected: Judged
     survivals: tuple[Survival, ...]
 
 
@@ -67,19 +67,19 @@ def claim(identity: str) -> dict[str, Any]:
     raise unknown("claim", identity, [each["id"] for each in claims()])
 
 
-def judge(entry: dict[str, Any], mended: frozenset[str] = frozenset()) -> Judgement:
+def judge(entry: dict[str, Any], fixed: frozenset[str] = frozenset()) -> Judgement:
     """Test one claim.
 
     Parameters
     ----------
     entry : dict
         An entry of the ledger.
-    mended : frozenset of str
-        Defects to mend even in the programs as punched.
+    fixed : frozenset of str
+        Defects to correct even in the original programs.
     """
 
-    def verdicts(assumptions: Assumptions) -> tuple[Outcome, Outcome]:
-        programs = outcome(entry, Laboratory(True, assumptions, mended))
+    def verdicts(assumptions: Assumptions) -> tuple[Judged, Judged]:
+        programs = outcome(entry, Laboratory(True, assumptions, fixed))
         return programs, outcome(entry, Laboratory(False, assumptions))
 
     programs, methods = verdicts(Assumptions())
@@ -94,7 +94,7 @@ def judge(entry: dict[str, Any], mended: frozenset[str] = frozenset()) -> Judgem
     return Judgement(entry, programs, methods, tuple(survivals))
 
 
-def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Outcome:
+def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Run the test of a claim in one laboratory."""
     return _test(entry["test"])(laboratory, entry.get("parameters", {}))
 
@@ -139,7 +139,7 @@ class Assignment:
     start : Triple
         omega(0), rad/s.
     verdicts : dict
-        Verdict of every claim about this case alone, for the programs as punched.
+        Verdict of every claim about this case alone, for the original programs.
     holds : bool
         Whether all are reproduced, at least in part.
     """

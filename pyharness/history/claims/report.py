@@ -23,8 +23,8 @@ def _verdict(verdict: str) -> str:
 
 
 _LEDGER = (
-    *words("claim where"), Column("as punched", _verdict, left=True),
-    Column("as mended", _verdict, left=True), Column("hangs on", left=True),
+    *words("claim where"), Column("original", _verdict, left=True),
+    Column("corrected", _verdict, left=True), Column("hangs on", left=True),
 )  # fmt: skip
 
 
@@ -32,15 +32,15 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
     """Report the ledger, one line for each claim."""
     rows = [
         [
-            each.claim["id"], each.claim["where"], each.programs.verdict, each.methods.verdict,
+            each.claim["id"], each.claim["where"], each.original.verdict, each.corrected.verdict,
             ", ".join(_hangs_on(each)) or "-",
         ]
         for each in judgements
     ]  # fmt: skip
     told = []
     for verdict, (_, name) in _VERDICTS.items():
-        punched, mended = (sum(row[k] == verdict for row in rows) for k in (2, 3))
-        told.append(f"{name}: {punched} as punched, {mended} as mended")
+        before, after = (sum(row[k] == verdict for row in rows) for k in (2, 3))
+        told.append(f"{name}: {before} original, {after} corrected")
     note = "`claims --explain ID` tells the story with its numbers."
     table = Table(_LEDGER, rows)
     text: list[Section] = [[table], ["; ".join(told), note]]
@@ -54,27 +54,27 @@ def explanation(judgement: Judgement) -> Report:
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
         [Field("says  ", entry["statement"]), Field("rule  ", entry["rule"])],
     ]
-    for title, outcome in (("as punched", judgement.programs), ("as mended", judgement.methods)):
+    for title, outcome in (("original", judgement.original), ("corrected", judgement.corrected)):
         width = max(map(len, outcome.numbers), default=0)
         numbers = outcome.numbers.items()
         lines = [Line(f"  {name.ljust(width)}  {_number(x)}") for name, x in numbers]
         text.append([Line(f"{title}: {outcome.verdict}"), *lines])
     if judgement.survivals:
-        lines = [Line("without its assumptions (as punched, as mended):")]
+        lines = [Line("without its assumptions (original, corrected):")]
         for each in judgement.survivals:
             mark = "stands" if each.survives else "TURNS"
-            lines.append(Line(f"  {mark:7s}{each.assumption}: {each.programs}, {each.methods}"))
+            lines.append(Line(f"  {mark:7s}{each.assumption}: {each.original}, {each.corrected}"))
         text.append(lines)
     return claims_report([judgement])._replace(text=text)
 
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
-    """Report which starts let the claims of each case hold, for the programs as punched."""
+    """Report which starts let the claims of each case hold, for the original programs."""
     text: list[Section] = [
         [
             "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
             "shows,",
-            "the claims about that case alone, for the programs as punched:",
+            "the claims about that case alone, for the original programs:",
         ]
     ]
     holding = []
@@ -103,9 +103,9 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
             "id": each.claim["id"],
             "where": each.claim["where"],
             "quote": each.claim["quote"],
-            "programs": each.programs.verdict,
-            "methods": each.methods.verdict,
-            "numbers": {"programs": each.programs.numbers, "methods": each.methods.numbers},
+            "original": each.original.verdict,
+            "corrected": each.corrected.verdict,
+            "numbers": {"original": each.original.numbers, "corrected": each.corrected.numbers},
             "assumptions": list(map(asdict, each.survivals)),
         }
         for each in judgements

@@ -15,14 +15,14 @@ VERDICTS = (REPRODUCED, IN_PART, NOT_REPRODUCED, FALSE, NOT_TESTABLE)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Judged:
     """A verdict with the numbers that it rests on."""
 
     verdict: str
     numbers: dict[str, float]
 
 
-Test = Callable[[Laboratory, dict[str, Any]], Outcome]
+Test = Callable[[Laboratory, dict[str, Any]], Judged]
 
 
 def graded(whole: bool, part: bool, otherwise: str = NOT_REPRODUCED) -> str:

@@ -90,7 +90,7 @@ def _threshold(id: str, program: str) -> Check:
 
 
 def _counted(id: str, listing: Listing, step: float) -> Outcome:
-    """Count the steps of a run that print 129; as punched the points move out of danger."""
+    """Count the steps of a run that print 129; original the points move out of danger."""
     scene = replace(case_scene(5), step_size=step, steps=300)
     ier = compiled.run(scene, listing, velocity=False).ier
     assert ier is not None

@@ -42,7 +42,7 @@ _DIRECTIONS = {"real": -1.0 + 0.0j, "imaginary": 1.0j}
 
 
 def listings() -> dict[str, list[Listing]]:
-    """Return each program as punched and as mended; Runge-Kutta with either defect too."""
+    """Return each original program and corrected; Runge-Kutta with either defect too."""
     found = {program: [original(program), corrected(program)] for program in PROGRAMS}
     for name in ("stage-base", "base-not-restored"):
         found["runge-kutta"].append(subset("runge-kutta", keep=[name]))

@@ -61,11 +61,11 @@ def _steps(
     prefix: str, name: str, case: int, listing: Listing | None, only: Sequence[str]
 ) -> Iterator[Outcome]:
     """Hold the error at the end against its bound, for every step; then where it is least."""
-    punched = listing is not None and listing.label == "original"
+    before = listing is not None and listing.label == "original"
     errors = {}
     crosses = f"{prefix}/crossing"
     wants_crossing = (
-        not punched
+        not before
         and SCHEMES[name].order in _CROSSING_ORDERS
         and not name.startswith(_COMPENSATED)
         and selected(crosses, only)
@@ -79,7 +79,7 @@ def _steps(
         errors[count] = error
         if not selected(id, only):
             continue
-        if punched:
+        if before:
             yield Outcome(described(id, error, replay(id), note), scene)
             continue
         forecast = _forecaster(case, name).at(count)

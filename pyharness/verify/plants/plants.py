@@ -304,7 +304,8 @@ PLANTS = (
     Plant("axis-in-method", "two axes of the closed form change places",
           lambda: _method("closed-form", lambda scene, times, solve:
                           _swapped(solve(scene, times)))),
-    Plant("wrong-card", "the compiled programs mend another card than the one named", _wrong_card),
+    Plant("wrong-card", "the compiled programs correct another card than the one named",
+          _wrong_card),
     Plant("half-step-in-fortran", "the compiled programs take half a step",
           lambda: _compiled_scene(_half_step)),
     Plant("half-step-in-both", "half a step in both languages, labelled as a whole one",

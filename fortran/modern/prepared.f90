@@ -157,7 +157,8 @@ contains
         tolerance_left = AUTO_SHARE*tolerance_left
         call quick_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), t_end, &
                          merge(1, 0, code == QUICK_OR_TAYLOR), omega, ended, quick_steps)
-        count = quick_steps
+        ! Whoever let the kernel choose learns by the sign what it chose.
+        count = merge(-quick_steps, quick_steps, code == QUICK_OR_TAYLOR)
       end if
       if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
         call taylor_solve(problem, omega0, tolerance_left, packed(EFFORT), 1, times, omega, &

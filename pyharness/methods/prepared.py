@@ -120,7 +120,20 @@ class Solver(BoundKernel):
 
         0 of a closed form.
         """
-        return self._ending[1]
+        return abs(self._ending[1])
+
+    @property
+    def method(self) -> str:
+        """The method that solved this thread's last call, where the kernel had a choice.
+
+        Else, and before a call, that of the plan.
+        """
+        steps = self._ending[1]
+        if not steps:
+            return self.plan.method
+        if self.plan.method == EITHER:
+            return "quick" if steps < 0 else "taylor"
+        return self.plan.fallback or self.plan.method
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return rows at `times` from another start.

@@ -140,3 +140,30 @@ def test_properties_of_the_registry_are_those_of_its_methods() -> None:
     with pytest.raises(Exception, match="gives the end alone"):
         REGISTRY["quick"].solve(FREE, [1.0], 1e-6)
     assert plan(PUSHED, tolerance=1e-6).method == EITHER
+
+
+def test_what_the_kernel_chose_comes_back() -> None:
+    solver = prepare(PUSHED, tolerance=1e-3)
+    start = np.array(PUSHED.omega)
+    assert solver.method == solver.plan.method == EITHER
+    solver(start, 1.0)
+    assert (solver.method, solver.steps > 0) == ("quick", True)
+    quick = prepare(PUSHED, "quick", 1e-3)
+    quick(start, 1.0)
+    assert (quick.method, quick.steps) == ("quick", solver.steps)
+    # For six digits the series takes fewer operations; one product alone, and quick refuses.
+    solver = prepare(PUSHED, tolerance=1e-6)
+    solver(start, 1.0)
+    assert (solver.plan.method, solver.method) == (EITHER, "taylor")
+    lone = Scene("", PUSHED.omega, coefficients=(0.0, 0.0, 1.0), torque=PUSHED.torque)
+    solver = prepare(lone, tolerance=1e-3)
+    solver(start, 1.0)
+    assert (solver.plan.method, solver.method) == (EITHER, "taylor")
+    solver = prepare(FREE, tolerance=1e-6)
+    solver(np.array(FREE.omega), 1.0)
+    assert (solver.method, solver.steps) == ("closed-form", 0)
+    # A disturbance of the middle axis whose square is no number.
+    faint = Scene("", (1e-200, 1.0, 0.0), moments=(6.0, 5.0, 2.0))
+    solver = prepare(faint, tolerance=1e-6)
+    solver(np.array(faint.omega), 1.0)
+    assert (solver.plan.method, solver.method) == ("closed-form", "taylor")

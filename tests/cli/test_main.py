@@ -378,7 +378,7 @@ def test_what_ends_a_run_has_an_exit_code(
     def raises(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("pyharness.cli.verbs.run.solve", raises)
+    monkeypatch.setattr("pyharness.methods.solve.solve", raises)
     assert main([*RUN, "--method", "taylor"]) == code
     assert capsys.readouterr().err == f"pyharness: {words}\n"
 

@@ -4,9 +4,7 @@ import argparse
 import sys
 
 from pyharness.cli import options as shared
-from pyharness.methods.registry import METHODS
 from pyharness.methods.report import trajectory_report
-from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
@@ -39,6 +37,8 @@ def run(options: argparse.Namespace) -> int:
     """Run and show."""
     scene = shared.chosen_scene(options)
     if (options.program is None) == (options.method is None):
+        from pyharness.methods.registry import METHODS
+
         raise InputError(
             f"run: give either --program ({', '.join(PROGRAMS)}) or --method ({', '.join(METHODS)})"
         )
@@ -107,6 +107,10 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
 
 
 def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
+    # A program needs neither.
+    from pyharness.methods.registry import METHODS
+    from pyharness.methods.solve import solve
+
     listing_options = ("implementation", "listing", "fix", "keep", "reading", "lipschitz")
     shared.refuse(options, "--method", (*listing_options, "no_stop"))
     name = options.method

@@ -26,7 +26,7 @@ def limits_report(
     for each in found:
         rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]
         data += [[each.program, *row] for row in rows]
-        title = f"{each.program} original tends to {each.tends_to}"
+        title = f"original {each.program}: tends to {each.tends_to}"
         text.append([title, Table(_COLUMNS, rows), f"order {each.order:.2f} toward the limit"])
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
     text.append(["defects that change no omega here, corrected alone:", "; ".join(hidden)])

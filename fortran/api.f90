@@ -222,7 +222,7 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps)
   real(8), intent(out) :: omega(3)   ! rad/s; NaN unless the status is 0
   integer(4), intent(out) :: status
   integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation; below 0 of quick,
-                                     ! where the kernel chose it
+  ! where the kernel chose it
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps)
 end subroutine solve_packed

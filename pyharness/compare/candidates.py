@@ -11,6 +11,7 @@ import numpy as np
 from pyharness.methods.prepared import Solver, prepare
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import solve
+from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, STOPPED, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
@@ -18,6 +19,7 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array, Trajectory
 from pyharness.original.compiled import program_arguments
 from pyharness.original.programs import PROGRAM_REGISTRY
 
+_SAME = 1e-9  # of a time, but for the rounding of its steps
 NOWHERE = (math.nan, math.nan, math.nan)
 
 
@@ -65,10 +67,11 @@ class Candidate:
     name : str
         What it is called.
     ready : callable
-        From a scene and a time (s) to a `Ready`; InputError where it can't take them.
+        From a scene and a time (s) to a `Ready`; InputError where it can't take them, as a program
+        whose steps end elsewhere.
     rows : callable
         From a scene to its trajectory at the scene's own times; of methods also at other ones,
-        given as second argument.
+        given as second argument; a prepared solver has none.
     """
 
     name: str
@@ -105,11 +108,11 @@ def called(name: str, tolerance: float, primed: bool = False) -> Candidate:
             solver(start[::-1].copy(), 0.5 * time)
         return Ready(partial(solver, start, time), partial(_answered, solver))
 
-    def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
-        times = scene.times() if times is None else times
-        return prepare(scene, name, tolerance).trajectory(scene.omega, times)
+    return Candidate(name, ready, _no_rows)
 
-    return Candidate(name, ready, rows)
+
+def _no_rows(scene: Scene) -> Trajectory:
+    raise InputError("a prepared solver gives the end alone")
 
 
 def listed(
@@ -124,6 +127,11 @@ def listed(
     options = lipschitz, may_stop, velocity
 
     def ready(scene: Scene, time: float) -> Ready:
+        last = scene.step_size * scene.steps
+        if abs(last - time) > _SAME * abs(time):
+            raise InputError(f"{listing.program}: its steps end at {last:g} s, not at {time:g} s")
+        if implementation != "fortran":
+            return Ready(partial(rows, scene), _last)
         given = program_arguments(scene, listing, *options)
         return Ready(partial(extension().run_program, *given), _printed)
 

@@ -77,20 +77,16 @@ class Solver(BoundKernel):
     # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
     # Python between, which would cost as much as an easy solve.
     plan: Plan
-    _scene: Scene
     _tolerance: float
     _effort: float
     _asked: str
 
-    def __new__(
-        cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0
-    ) -> Self:
+    def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
         kernel = extension().solve_packed
-        packed = _pack(scene, _code(chosen), tolerance, effort)
+        packed = _pack(chosen.scene, _code(chosen), tolerance, effort)
         solver = super().__new__(cls, kernel, packed, _check)
         solver.plan = chosen
-        solver._scene = scene
         solver._tolerance = tolerance
         solver._effort = effort
         solver._asked = asked
@@ -98,12 +94,12 @@ class Solver(BoundKernel):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Let a copy, in this process or another, be prepared as this one was."""
-        given = (self._scene, self.plan, self._tolerance, self._asked, self._effort)
+        given = (self.plan, self._tolerance, self._asked, self._effort)
         return type(self), given
 
     def __repr__(self) -> str:
         """Say the scene and the method."""
-        return f"<Solver of '{self._scene.name}' by {self.plan.method}>"
+        return f"<Solver of '{self.plan.scene.name}' by {self.plan.method}>"
 
     @property
     def status(self) -> str:
@@ -155,7 +151,7 @@ class Solver(BoundKernel):
         from pyharness.methods.registry import METHODS
         from pyharness.methods.solve import solve
 
-        scene = replace(self._scene, omega=three("omega0", omega0))
+        scene = replace(self.plan.scene, omega=three("omega0", omega0))
         method = "taylor" if self._asked == "quick" else self._asked
         # What was prepared in the scene's steps has no tolerance of its own.
         tolerance = max(self._tolerance, METHODS[method].finest)
@@ -206,7 +202,7 @@ def prepare(
         raise unknown("method", method, PREPARED)
     tolerance = tolerance_of(tolerance, FINEST)
     effort = checked_effort(effort)
-    return Solver(scene, plan(scene, method, tolerance), tolerance, method, effort)
+    return Solver(plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:

@@ -2,6 +2,7 @@
 
 import importlib
 from dataclasses import dataclass
+from typing import Any
 
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
@@ -78,8 +79,17 @@ class Program:
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
             raise unknown("implementation", implementation, IMPLEMENTATIONS)
         check_steps(scene, self.name, implementation, effort)
+        return self._computed(scene, listing, implementation, lipschitz, may_stop, velocity)
+
+    def _computed(
+        self, scene: Scene, listing: Listing, implementation: str, *options: Any
+    ) -> Trajectory:
+        """Compute what was checked; the options are those of `run`, but for the effort."""
+        from pyharness.original import compiled
+
         if implementation == "fortran":
-            return compiled.run(scene, listing, lipschitz, may_stop, velocity)
+            return compiled.run(scene, listing, *options)
+        lipschitz, may_stop, _ = options
         twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")
         trajectory: Trajectory = twin.run(scene, listing, lipschitz, may_stop)
         return trajectory

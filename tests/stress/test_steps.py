@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -341,18 +342,11 @@ def test_a_wrong_weight_is_caught_by_small_steps(
 class _Coarse(Program):
     """A program whose results are rounded to fewer digits, as if at every step."""
 
-    def run(
-        self,
-        scene: Scene,
-        listing: Listing,
-        implementation: str = "fortran",
-        lipschitz: float = 500.0,
-        may_stop: bool = True,
-        velocity: bool = True,
-        effort: float = 1.0,
+    def _computed(
+        self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
         """Run, then spoil the last digits."""
-        run = super().run(scene, listing, implementation, lipschitz, may_stop, velocity, effort)
+        run = super()._computed(scene, listing, implementation, *options)
         return replace(run, omega=np.round(run.omega, 9))
 
 

@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from pyharness import original
 from pyharness.model.listing import Listing
@@ -24,21 +25,15 @@ class PlantedTwin(Program):
     module: ModuleType
     both: bool = True
 
-    def run(
-        self,
-        scene: Scene,
-        listing: Listing,
-        implementation: str = "fortran",
-        lipschitz: float = 500.0,
-        may_stop: bool = True,
-        velocity: bool = True,
-        effort: float = 1.0,
+    def _computed(
+        self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
         """Run the faulty twin, or the compiled program as it is."""
         if self.both or implementation == "python":
+            lipschitz, may_stop, _ = options
             trajectory: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
             return trajectory
-        return super().run(scene, listing, implementation, lipschitz, may_stop, velocity, effort)
+        return super()._computed(scene, listing, implementation, *options)
 
 
 def plant_in_twin(

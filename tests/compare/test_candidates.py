@@ -1,0 +1,38 @@
+"""Candidates: what is judged is what was asked for."""
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, case_scene
+from pyharness.compare.candidates import called, listed, solved, unstopped
+from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.original.programs import IMPLEMENTATIONS
+
+SCENE = case_scene(5)
+END = SCENE.step_size * SCENE.steps
+
+
+@pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_end_of_a_program_is_its_last_row(program: str, implementation: str) -> None:
+    candidate = listed(corrected(program), implementation, may_stop=False)
+    rows, end = candidate.rows(SCENE), candidate.end(SCENE, END)
+    np.testing.assert_array_equal(end.omega, rows.omega[-1])
+    assert (end.ended, end.steps, end.evaluations) == ("complete", rows.steps, rows.evaluations)
+
+
+def test_a_program_is_not_taken_for_one_at_another_time() -> None:
+    with pytest.raises(InputError, match=r"its steps end at 1 s, not at 2 s"):
+        unstopped(original("two-term")).end(SCENE, 2.0)
+
+
+def test_end_of_a_method_is_that_of_its_rows_and_a_prepared_solver_has_none() -> None:
+    method = solved("taylor", 1e-12)
+    np.testing.assert_array_equal(method.end(SCENE, END).omega, method.rows(SCENE, [END]).omega[-1])
+    with pytest.raises(InputError, match="the end alone"):
+        called("quick", 1e-3).rows(SCENE)
+
+
+def test_a_call_before_leaves_nothing_behind() -> None:
+    plain, primed = (called("auto", 1e-6, primed).end(SCENE, END) for primed in (False, True))
+    np.testing.assert_array_equal(plain.omega, primed.omega)

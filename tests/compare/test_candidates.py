@@ -21,6 +21,13 @@ def test_end_of_a_program_is_its_last_row(program: str, implementation: str) -> 
     assert (end.ended, end.steps, end.evaluations) == ("complete", rows.steps, rows.evaluations)
 
 
+def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bits are the same: only who made them tells the two apart."""
+    for room in ("compare.candidates", "original.compiled"):
+        monkeypatch.setattr(f"pyharness.{room}.extension", lambda: pytest.fail("compiled"))
+    assert listed(original("two-term"), "python").end(SCENE, END).ended == "complete"
+
+
 def test_a_program_is_not_taken_for_one_at_another_time() -> None:
     with pytest.raises(InputError, match=r"its steps end at 1 s, not at 2 s"):
         unstopped(original("two-term")).end(SCENE, 2.0)

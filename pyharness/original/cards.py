@@ -1,0 +1,352 @@
+"""The text of the edition: every card of the three decks, and what the scan shows of it.
+
+A line of the scan is a number, a dash and the text of a card; blanks do not count. The tables are
+in `data/cards`: the decks, the pages of the scan in its order, and where a card stands in the twins.
+"""
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pyharness.model.errors import InputError
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+
+HEADING = "APPENDIX AND PROGRAMS"
+_MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
+_SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
+_PACKAGE = Path(__file__).parent.parent
+# An installed package brings the sources of the port along; a checkout has them beside it.
+_PORTS = (_PACKAGE / "data" / "fortran", _PACKAGE.parent / "fortran" / "original")
+
+
+class Difference(NamedTuple):
+    """What the scan has in place of our characters, and the entry that says why."""
+
+    ours: str
+    scans: str
+    entry: str
+
+
+class Place(NamedTuple):
+    """A line of a source."""
+
+    file: str
+    line: int
+    text: str
+
+
+class Card(NamedTuple):
+    """A card.
+
+    Attributes
+    ----------
+    program : str
+        One of `PROGRAMS`.
+    number : int
+        100, 110, 120, ...
+    text : str
+        Columns 1 to 72 as we read them.
+    differences : tuple of Difference
+        From left to right, each at the first place after the one before; blanks do not count.
+    printed : tuple of (str, str) or None
+        The number that the scan shows, where it is another, and the entry.
+    lost : str or None
+        The entry of a card that the scan does not have.
+    """
+
+    program: str
+    number: int
+    text: str
+    differences: tuple[Difference, ...] = ()
+    printed: tuple[str, str] | None = None
+    lost: str | None = None
+
+    @property
+    def name(self) -> str:
+        """``two-term:1660``."""
+        return f"{self.program}:{self.number}"
+
+    @property
+    def statement(self) -> str:
+        """The text with single blanks."""
+        return " ".join(self.text.split())
+
+    @property
+    def is_comment(self) -> bool:
+        """Whether column 1 has a C."""
+        return self.text.startswith("C")
+
+    @property
+    def continues(self) -> bool:
+        """Whether column 6 has a character: the card goes on with the statement before it."""
+        return not self.is_comment and self.text[5:6].strip() != ""
+
+    @property
+    def scan(self) -> str | None:
+        """The line of the scan without blanks; None where it has no such line."""
+        if self.lost:
+            return None
+        number = self.printed[0] if self.printed else str(self.number)
+        return f"{number}-{applied(_tight(self.text), self.differences)}"
+
+    @property
+    def deviates(self) -> bool:
+        """Whether the scan's line is not the card."""
+        return bool(self.lost or self.printed or self.differences)
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """The entries of the apparatus that name the card."""
+        return tuple(
+            each["id"]
+            for each in facts("apparatus")["entry"]
+            if self.number in numbers(each["cards"].get(self.program, ""))
+        )
+
+
+class Deck:
+    """The cards of a program by number, and where they stand in its port and its twin."""
+
+    def __init__(self, program: str) -> None:
+        """Read the table."""
+        self.program = program
+        self._places = facts("cards/places")[program]
+        self.cards = {
+            int(number): Card(
+                program,
+                int(number),
+                row["text"],
+                tuple(Difference(*each) for each in row.get("scan", ())),
+                tuple(row["printed"]) if "printed" in row else None,
+                row.get("lost"),
+            )
+            for number, row in facts(f"cards/{program}")["cards"].items()
+        }
+
+    @cached_property
+    def executable(self) -> frozenset[int]:
+        """Cards of statements that compute, print or jump: neither comment nor specification."""
+        found, computes = set(), False
+        for card in self.cards.values():
+            if not card.continues:
+                computes = not (card.is_comment or _SPECIFICATION.match(card.text[6:]))
+            if computes:
+                found.add(card.number)
+        return frozenset(found)
+
+    @cached_property
+    def absent(self) -> dict[int, str]:
+        """Executable cards without a statement in the port, and the reason."""
+        return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
+
+    @cached_property
+    def port(self) -> dict[int, list[Place]]:
+        """The lines of the Fortran port by card, as its margin names them."""
+        return _by_card((cards, place) for place, cards in margin(self.program))
+
+    @cached_property
+    def twin(self) -> dict[int, list[Place]]:
+        """The lines of the Python twin by card."""
+        places = self._places["twin"]
+        return _by_card((cards, _line_of(file, text)) for cards, file, text in places)
+
+
+@cache
+def deck(program: str) -> Deck:
+    """Return the deck of a program; callers must not change it."""
+    return Deck(program)
+
+
+def numbers(ranges: str) -> list[int]:
+    """Return the cards of a text such as ``750-770, 800``."""
+    found: list[int] = []
+    for each in ranges.split(",") if ranges else ():
+        first, _, last = each.strip().partition("-")
+        found += range(int(first), int(last or first) + 1, 10)
+    return found
+
+
+def find(program: str, number: int) -> Card:
+    """Return a card; InputError, with its neighbours, where there is none."""
+    cards = deck(program).cards
+    if number not in cards:
+        near = sorted(cards, key=lambda each: abs(each - number))[:2]
+        told = " and ".join(str(each) for each in sorted(near))
+        raise InputError(f"card {number}: the {program} deck has none; the nearest are {told}")
+    return cards[number]
+
+
+def chosen(asked: Iterable[str]) -> list[Card]:
+    """Return the cards that are asked for; all where nothing is.
+
+    Parameters
+    ----------
+    asked : iterable of str
+        ``two-term``, ``1660``, ``1040-1090`` (of every deck that has them), ``two-term:1660``.
+
+    Raises
+    ------
+    InputError
+        Where one of them is no card, no range, or an empty one.
+    """
+    found: dict[Card, None] = {}
+    for each in list(asked) or PROGRAMS:
+        found.update(dict.fromkeys(_cards_of(each)))
+    return list(found)
+
+
+def _cards_of(asked: str) -> list[Card]:
+    program, colon, ranges = asked.rpartition(":")
+    if asked in PROGRAMS:
+        return list(deck(asked).cards.values())
+    if colon and program not in PROGRAMS:
+        raise InputError(f"cards {asked!r}: no program {program!r}; it is one of {', '.join(PROGRAMS)}")
+    programs = (program,) if colon else PROGRAMS
+    if not (match := re.fullmatch(r"(\d{1,6})(?:-(\d{1,6}))?", ranges)):
+        raise InputError(
+            f"cards {asked!r}: neither a program ({', '.join(PROGRAMS)}) nor a card or a range of "
+            "cards, as 1660, 1040-1090, two-term:1660"
+        )
+    first, last = int(match[1]), match[2]
+    if last is None:
+        having = [each for each in programs if first in deck(each).cards]
+        return [find(each, first) for each in having or programs]
+    found = [
+        card
+        for each in programs
+        for card in deck(each).cards.values()
+        if first <= card.number <= int(last)
+    ]
+    if not found:
+        ends = ", ".join(f"{each} {min(c)}-{max(c)}" for each in programs for c in [deck(each).cards])
+        raise InputError(f"cards {asked!r}: the range is empty; the decks have {ends}")
+    return found
+
+
+def margin(program: str) -> Iterator[tuple[Place, str]]:
+    """Give the lines of the port that name cards, and the cards that they name."""
+    file = f"{program.replace('-', '_')}.f90"
+    for number, text in enumerate(_lines(next(f for f in _PORTS if f.exists()) / file), 1):
+        if match := _MARGIN.match(text):
+            yield Place(file, number, match[1].strip()), match[2]
+
+
+def applied(text: str, differences: Iterable[Difference]) -> str:
+    """Return a text with the scan's characters in place of ours; ValueError where ours are not."""
+    scans, rest = "", text
+    for each in differences:
+        before, found, rest = rest.partition(each.ours)
+        if not found:
+            raise ValueError(f"{each.ours!r} does not stand in {text!r} where it should")
+        scans += before + each.scans
+    return scans + rest
+
+
+def expected_lines() -> list[tuple[str, str]]:
+    """Return all that the appendix should have: a line without blanks, and what it is."""
+    found = []
+    for page in facts("cards/scan")["page"]:
+        for item in page["lines"]:
+            if isinstance(item, str):
+                for card in (find(page["program"], number) for number in numbers(item)):
+                    assert card.scan is not None
+                    found.append((card.scan, card.name))
+            else:
+                kind = "furniture" if "furniture" in item else "phantom"
+                found.append((_tight(item[kind]), kind))
+    return found
+
+
+def unexplained(scan: str) -> list[str]:
+    """Return what the tables do not explain of a scan, a sentence each; none where they do.
+
+    Raises
+    ------
+    InputError
+        Where the text has no appendix with cards.
+    """
+    _, heading, appendix = scan.rpartition(HEADING)
+    if not heading or "100-" not in appendix:
+        raise InputError(f"the scan has no line {HEADING!r} with cards after it: not this thesis")
+    first = scan.count("\n", 0, len(scan) - len(appendix)) + 1
+    lines = [(n, _tight(text)) for n, text in enumerate(appendix.split("\n"), first)]
+    lines = [(n, text) for n, text in lines if text not in ("", "```")]
+    expected = expected_lines()
+    found, wanted = [text for _, text in lines], [text for text, _ in expected]
+    if len(found) == len(wanted):
+        pairs = zip(lines, expected, strict=True)
+        return [_differs(n, text, *want) for (n, text), want in pairs if text != want[0]]
+    faults = []
+    matcher = difflib.SequenceMatcher(None, wanted, found, autojunk=False)
+    for what, i, j, k, m in matcher.get_opcodes():
+        if what != "equal":
+            faults += [f"line {n}: {text!r} is in no table" for n, text in lines[k:m]]
+            faults += [f"{name}: {text!r} is not in the scan" for text, name in expected[i:j]]
+    return faults
+
+
+def undeclared() -> list[str]:
+    """Return what cards and entries say otherwise, a sentence each; none where they agree."""
+    used: set[tuple[Any, ...]] = set()
+    for card in chosen(()):
+        for each in card.differences:
+            used.add((each.entry, card.program, card.number, each.ours, each.scans))
+        if card.printed:
+            used.add((card.printed[1], card.program, card.number, str(card.number), card.printed[0]))
+    declared: set[tuple[Any, ...]] = set()
+    for entry in facts("apparatus")["entry"]:
+        for ours, scans, cards in entry.get("pairs", ()):
+            for program, ranges in cards.items():
+                declared |= {(entry["id"], program, n, ours, scans) for n in numbers(ranges)}
+        for program, ranges, first, step in entry.get("printed", ()):
+            for index, number in enumerate(numbers(ranges)):
+                shown = str(first + step * index)
+                declared.add((entry["id"], program, number, str(number), shown))
+    faults = [
+        f"{program}:{number} {ours!r} read {scans!r}: {entry} does not declare it"
+        for entry, program, number, ours, scans in sorted(used - declared)
+    ]
+    faults += [
+        f"{entry} declares {ours!r} read {scans!r} of {program}:{number}: the card does not have it"
+        for entry, program, number, ours, scans in sorted(declared - used)
+    ]
+    names = {each["id"]: each for each in facts("apparatus")["entry"]}
+    for card in chosen(()):
+        if card.lost and names.get(card.lost, {}).get("kind") != "missing text":
+            faults.append(f"{card.name} is lost by {card.lost}: no entry of missing text")
+        if not (card.lost or card.scan):
+            faults.append(f"{card.name}: neither in the scan nor lost")
+    return faults
+
+
+def _differs(line: int, text: str, wanted: str, name: str) -> str:
+    return f"line {line}, {name}: {text!r}, where the table has {wanted!r}"
+
+
+def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
+    found: dict[int, list[Place]] = {}
+    for cards, place in places:
+        for number in numbers(cards):
+            found.setdefault(number, []).append(place)
+    return found
+
+
+def _line_of(file: str, text: str) -> Place:
+    folder = _PACKAGE / ("history" if file == "printer.py" else "original")
+    where = [n for n, line in enumerate(_lines(folder / file), 1) if line.strip() == text]
+    if len(where) != 1:
+        raise ValueError(f"{text!r} stands {len(where)} times in {file}")
+    return Place(file, where[0], text)
+
+
+@cache
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8").splitlines()
+
+
+def _tight(text: str) -> str:
+    return "".join(text.split())

@@ -1,0 +1,275 @@
+"""Tests of the claims of sections I to IV that are not about a run: history, theory, orders.
+
+Each function is the `test` of entries in `data/claims.toml`, as in `about_cases`.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.history.claims.laboratory import Laboratory, distance, largest
+from pyharness.history.claims.verdicts import (
+    FALSE,
+    IN_PART,
+    NOT_REPRODUCED,
+    NOT_TESTABLE,
+    REPRODUCED,
+    Judged,
+    graded,
+)
+from pyharness.history.family.members import Member, run
+from pyharness.methods.solve import solve
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.trajectory import Array
+from pyharness.original.cards import deck
+from pyharness.truth.reference import reference
+
+Weights = Sequence[Callable[[Array], Array]]
+
+
+def known_in_closed_form(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Hold Jacobi's elliptic functions against the reference in cases said to have no solution."""
+    numbers = {}
+    for case in given["cases"]:
+        scene, truth = lab.scene(case), lab.truth(case)
+        found = solve(scene, truth.time, method="closed-form")
+        share = distance(found.omega, truth.omega) / largest(truth)
+        numbers[f"case {case}: closed form against the reference"] = share
+    known = max(numbers.values()) <= given["limit"]
+    return Judged(FALSE if known else REPRODUCED, numbers)
+
+
+def history_only(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Leave a statement of history to its sources."""
+    return Judged(NOT_TESTABLE, {})
+
+
+def hamilton_ordinary(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Integrate Hamilton's equations in Euler angles as six ordinary differential equations."""
+    from scipy.integrate import solve_ivp
+
+    scene, truth = lab.scene(given["case"]), lab.truth(given["case"])
+    assert scene.moments is not None
+    moments = scene.moments
+    # Any attitude will do, away from the singular one; angles 3-1-3.
+    begin = (0.3, 1.1, -0.4)
+    momenta = _angle_rates_to_omega(begin).T @ (np.array(moments) * scene.omega)
+    found = solve_ivp(
+        lambda t, y: _hamilton(moments, y), (0.0, float(truth.time[-1])), [*begin, *momenta],
+        method="DOP853", t_eval=truth.time, rtol=1e-12, atol=1e-12,
+    )  # fmt: skip
+    omega = np.array([_omega(moments, y) for y in found.y.T])
+    share = distance(omega, truth.omega) / largest(truth)
+    numbers = {"six ordinary equations against the reference": share}
+    return Judged(FALSE if share <= given["limit"] else REPRODUCED, numbers)
+
+
+def _angle_rates_to_omega(angles: Sequence[float]) -> Array:
+    """Return the matrix that turns rates of the angles 3-1-3 into omega in body axes."""
+    _, theta, psi = angles
+    return np.array(
+        [
+            [math.sin(theta) * math.sin(psi), math.cos(psi), 0.0],
+            [math.sin(theta) * math.cos(psi), -math.sin(psi), 0.0],
+            [math.cos(theta), 0.0, 1.0],
+        ]
+    )
+
+
+def _omega(moments: Triple, state: Array) -> Array:
+    """Return omega from angles and momenta."""
+    angular = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, state[3:])
+    rates: Array = angular / moments
+    return rates
+
+
+def _hamilton(moments: Triple, state: Array) -> Array:
+    """Return dH/dp and -dH/dq of H = sum I omega**2 / 2."""
+    theta, psi = float(state[1]), float(state[2])
+    omega = _omega(moments, state)
+    matrix = _angle_rates_to_omega(state[:3])
+    rates = np.linalg.solve(matrix, omega)
+    momentum = omega * moments
+    # dH/dq at constant p is -L . (d matrix/dq) rates.
+    by_theta = np.array(
+        [
+            [math.cos(theta) * math.sin(psi), 0.0, 0.0],
+            [math.cos(theta) * math.cos(psi), 0.0, 0.0],
+            [-math.sin(theta), 0.0, 0.0],
+        ]
+    )
+    by_psi = np.array(
+        [
+            [math.sin(theta) * math.cos(psi), -math.sin(psi), 0.0],
+            [-math.sin(theta) * math.sin(psi), -math.cos(psi), 0.0],
+            [0.0, 0.0, 0.0],
+        ]
+    )
+    forces = [0.0, momentum @ by_theta @ rates, momentum @ by_psi @ rates]
+    return np.array([*rates, *forces])
+
+
+def bounded_not_lipschitz(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Form quotients of a bounded function, the square root on (0, 1), ever nearer to 0."""
+    points = 10.0 ** -np.arange(2.0, given["decades"] + 1.0, 2.0)
+    quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
+    numbers = {"bound of the function": 1.0, "largest quotient": float(quotients.max())}
+    return Judged(FALSE if quotients.max() > given["above"] else REPRODUCED, numbers)
+
+
+def local_error(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Measure the power of the step with which the error of one step falls."""
+    numbers = {}
+    for case in given["cases"]:
+        numbers[f"case {case}: power of the step"] = _power(
+            lab.scene(case), lambda scene: _stepped(scene, given["method"])
+        )
+    near = [abs(each - given["power"]) <= given["within"] for each in numbers.values()]
+    return Judged(graded(all(near), any(near)), numbers)
+
+
+def same_as_taylor(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Hold one step of Runge-Kutta against the Taylor series with its terms to h**4."""
+    numbers, same, near = {}, True, True
+    for case in given["cases"]:
+        scene = lab.scene(case)
+        step = replace(scene, steps=1)
+        kutta = _stepped(step, "rk4")
+        series = _taylor_step(step, 4)
+        truth = reference(step, step.times()).omega[-1]
+        apart, error = float(np.abs(kutta - series).max()), float(np.abs(series - truth).max())
+        power = _power(scene, lambda each: _stepped(each, "rk4"), lambda s: _taylor_step(s, 4))
+        numbers[f"case {case}: distance over the error of the series"] = apart / error
+        numbers[f"case {case}: power of the step of the distance"] = power
+        same &= apart <= 1e-14 * float(np.abs(truth).max())
+        near &= abs(power - 5.0) <= given["within"]
+    return Judged(graded(same, near), numbers)
+
+
+def _stepped(scene: Scene, method: str) -> Array:
+    """Return omega at the end of a scene by a method of fixed steps, which takes no tolerance."""
+    return solve(scene, scene.times(), method, tolerance=1.0).omega[-1]
+
+
+def _power(
+    scene: Scene,
+    method: Callable[[Scene], Array],
+    truth: Callable[[Scene], Array] | None = None,
+) -> float:
+    """Return the power of the step with which one step of a method nears the truth."""
+    apart = []
+    for step_size in (scene.step_size, scene.step_size / 2.0):
+        short = replace(scene, step_size=step_size, steps=1)
+        exact = reference(short, short.times()).omega[-1] if truth is None else truth(short)
+        apart.append(float(np.linalg.norm(method(short) - exact)))
+    return math.log2(apart[0] / apart[1])
+
+
+def _taylor_step(scene: Scene, order: int) -> Array:
+    """Return omega after one step by its Taylor series; the torque is constant."""
+    coefficients = np.array(scene.euler_coefficients)
+    torque = np.array(scene.normalized_torque(0.0))
+    terms = [np.array(scene.omega)]
+    for n in range(order):
+        product = np.zeros(3)
+        for k in range(n + 1):
+            x, y = terms[k], terms[n - k]
+            product += [x[1] * y[2], x[0] * y[2], x[0] * y[1]]
+        terms.append((coefficients * product + (torque if n == 0 else 0.0)) / (n + 1))
+    total: Array = sum(term * scene.step_size**n for n, term in enumerate(terms))
+    return total
+
+
+def crandall_example(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Solve dx/dt = -x, x(0) = 1 on (0, 1) by 1 + c1 t + c2 t**2, weighted in four ways."""
+    t, weight = np.polynomial.legendre.leggauss(12)
+    t, weight = (t + 1.0) / 2.0, weight / 2.0
+    # The residual of c1 and of c2, and of neither: R = base + c1 r1 + c2 r2.
+    rows = {
+        "collocation": np.array([[1 + s, 2 * s + s**2, -1.0] for s in (1 / 3, 2 / 3)]),
+        "subdomain": _weighted(t, weight, (lambda s: s < 0.5, lambda s: s >= 0.5)),
+        "galerkin": _weighted(t, weight, (lambda s: s, lambda s: s**2)),
+        "least squares": _weighted(t, weight, (lambda s: 1 + s, lambda s: 2 * s + s**2)),
+    }
+    fine = np.linspace(0.0, 1.0, 201)
+    numbers = {}
+    for name, row in rows.items():
+        c1, c2 = np.linalg.solve(row[:, :2], row[:, 2])
+        numbers[f"{name}: largest error"] = float(
+            np.abs(1.0 + c1 * fine + c2 * fine**2 - np.exp(-fine)).max()
+        )
+    series = float(np.abs(1.0 - fine + fine**2 / 2.0 - np.exp(-fine)).max())
+    better = all(error < series / 2.0 for error in numbers.values())
+    best = {name.partition(":")[0] for name in sorted(numbers, key=lambda n: numbers[n])[:2]}
+    numbers["Taylor series: largest error"] = series
+    return Judged(graded(better and best == set(given["best"]), better), numbers)
+
+
+def _weighted(t: Array, weight: Array, by: Weights) -> Array:
+    """Return, a row for each weighting, the integrals that c1 and c2 have to balance."""
+    halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
+    rows = []
+    for function in by:
+        row = np.zeros(3)
+        for s, w in halves:
+            factor = w * function(s)
+            row += [(factor * (1 + s)).sum(), (factor * (2 * s + s**2)).sum(), -factor.sum()]
+        rows.append(row)
+    return np.array(rows)
+
+
+def one_term_suffices(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Run the linear trial function on a linear top."""
+    found = run(lab.scene(given["case"]), Member("collocation", 1))
+    truth = lab.truth(given["case"])
+    share = distance(found.omega, truth.omega) / largest(truth)
+    numbers = {"one-term error over the largest omega": share}
+    return Judged(REPRODUCED if share <= given["limit"] else FALSE, numbers)
+
+
+def symmetric_uncoupled(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Look for products that are left in symmetric bodies: the sphere, and the top."""
+    left = {
+        f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
+        for case in given["cases"]
+    }
+    none = [each == 0.0 for each in left.values()]
+    return Judged(IN_PART if any(none) and not all(none) else graded(all(none), False), left)
+
+
+def step_on_cards(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Read the step that each deck sets before its loop."""
+    numbers = {
+        f"{program}: DT (s)": float(card.statement.partition("=")[2])
+        for program in ("two-term", "four-term", "runge-kutta")
+        for card in deck(program).cards.values()
+        if card.statement.startswith("DT=.")
+    }
+    same = len(numbers) == 3 and set(numbers.values()) == {given["step"]}
+    return Judged(REPRODUCED if same else NOT_REPRODUCED, numbers)
+
+
+def points_inside(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Count the steps whose points of collocation all lie inside the interval."""
+    numbers, shares = {}, []
+    for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
+        run_of = lab.run(program, given["case"])
+        # TIME grows by DT in every step, so its increments are the DT that set the points.
+        lengths = np.diff(run_of.recorded_time, prepend=0.0)
+        inside = last * lengths < lab.scene(given["case"]).step_size
+        shares.append(float(inside.mean()))
+        numbers[f"{program}: share of steps with all points inside"] = shares[-1]
+    return Judged(graded(min(shares) == 1.0, min(shares) >= 0.5, FALSE), numbers)
+
+
+def possible_bodies(lab: Laboratory, given: dict[str, Any]) -> Judged:
+    """Hold the moments of every case against the triangle inequality of rigid bodies."""
+    excess = {}
+    for case in given["cases"]:
+        first, second, third = sorted(lab.scene(case).moments or (), reverse=True)
+        excess[f"case {case}: largest moment over the sum of the others"] = first / (second + third)
+    possible = [each <= 1.0 for each in excess.values()]
+    return Judged(graded(all(possible), False, FALSE), excess)

@@ -1,0 +1,164 @@
+"""The lost experiments of IV.2: how three weightings could have failed, mistake by mistake.
+
+The programs for subdomain, Galerkin and least squares are not printed; IV.2 says that they gave no
+meaningful results where the solution is known, in Cases 1 and 2. Each conjecture here is a mistake
+that such a program could have had, programmed as IV.2 describes the method: two terms, the products
+written out as polynomials, one solution for a constant right-hand side, one correction.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from pyharness.model.facts import facts
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array
+from pyharness.original.linear_solver import leqt1f
+from pyharness.truth.reference import reference
+
+WEIGHTINGS = ("subdomain", "galerkin", "least-squares")
+# The cases whose solution IV.2 could hold a program against.
+CASES = (1, 2)
+TERMS = 2
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A weighting with one mistake, on the cases of known solution.
+
+    `shares` has the largest error over the largest omega by case, infinite on overflow; `failed`
+    the cases in which that is more than the limit of `data/lost.toml`.
+    """
+
+    mistake: str
+    weighting: str
+    shares: dict[int, float]
+    failed: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A mistake with its attempts, and for how many weightings it fails as IV.2 says."""
+
+    mistake: str
+    summary: str
+    attempts: tuple[Attempt, ...]
+
+    @property
+    def in_both(self) -> int:
+        """Weightings that fail in both known cases."""
+        return sum(len(each.failed) == len(CASES) for each in self.attempts)
+
+    @property
+    def in_either(self) -> int:
+        """Weightings that fail in at least one."""
+        return sum(bool(each.failed) for each in self.attempts)
+
+
+def ranked() -> list[Ranked]:
+    """Return every conjectured mistake, the best explanation of IV.2 first."""
+    limit = facts("lost")["limit"]
+    found = []
+    for entry in facts("lost")["mistake"]:
+        attempts = []
+        for weighting in WEIGHTINGS:
+            shares = {case: _share(case_scene(case), weighting, entry["id"]) for case in CASES}
+            failed = tuple(case for case, share in shares.items() if not share <= limit)
+            attempts.append(Attempt(entry["id"], weighting, shares, failed))
+        found.append(Ranked(entry["id"], entry["summary"], tuple(attempts)))
+    return sorted(found, key=lambda each: (-each.in_both, -each.in_either))
+
+
+def _share(scene: Scene, weighting: str, mistake: str) -> float:
+    """Return the largest error over the largest omega, with a mistake or with `none`."""
+    omega = march(scene, weighting, mistake)
+    truth = reference(scene, scene.times()).omega
+    with np.errstate(all="ignore"):
+        error = np.abs(omega - truth).max()
+    return float(error / np.abs(truth).max()) if np.isfinite(error) else np.inf
+
+
+def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
+    """Return omega (rad/s), shape (steps, 3), of a weighting with one mistake; torque constant."""
+    h = scene.step_size
+    coefficients = scene.euler_coefficients
+    torque = np.array(scene.normalized_torque(0.0))
+    state = np.array(scene.omega)
+    rows = np.full((scene.steps, 3), np.nan)
+    with np.errstate(all="ignore"):
+        for step in range(scene.steps):
+            # Where the residual is weighted; the step is assembled at h all the same.
+            length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
+            c = np.zeros((TERMS, 3))
+            for correction in (False, True):
+                base = np.zeros(3) if mistake == "base-left-out" and correction else state
+                estimate = np.vstack([base, c])
+                rates = _rates(estimate, coefficients)
+                if mistake != "torque-omitted":
+                    rates[0] += torque
+                c = _solved(weighting, length, rates, mistake, correction)
+                if not np.isfinite(c).all():
+                    return rows
+            powers = h ** np.arange(1, TERMS + 1)
+            state = state + powers @ c
+            rows[step] = state
+    return rows
+
+
+def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
+    """Return A omega2 omega3 and so on as polynomials of t, a column for each component."""
+    columns = [
+        a * polynomial.polymul(estimate[:, j], estimate[:, k])
+        for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
+    ]
+    longest = 2 * len(estimate) - 1
+    return np.column_stack([np.pad(each, (0, longest - len(each))) for each in columns])
+
+
+def _solved(weighting: str, length: float, rates: Array, mistake: str, second: bool) -> Array:
+    """Return c1, c2 of all components: the weighted residuals over (0, length) vanish."""
+    matrix = np.array([_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]).T
+    right = np.array([_weighted(weighting, length, column) for column in rates.T])
+    if mistake == "transposed":
+        matrix = matrix.T
+    if mistake == "matrix-used-up" and second:
+        # LEQT1F leaves its factors in A; the second call takes them for the matrix.
+        matrix = _factors(matrix)
+    if mistake == "unscaled-solver":
+        return np.linalg.solve(matrix, right.T)
+    solutions, _ = leqt1f(matrix.tolist(), right.tolist())
+    return np.array(solutions).T
+
+
+def _power(exponent: int) -> Array:
+    return np.eye(exponent + 1)[exponent]
+
+
+def _weighted(weighting: str, length: float, residual: Array) -> list[float]:
+    """Return the integrals of a polynomial over (0, length), one for each weight."""
+    found = []
+    for k in range(TERMS):
+        if weighting == "subdomain":
+            low, high, weight = length * k / TERMS, length * (k + 1) / TERMS, _power(0)
+        else:
+            low, high = 0.0, length
+            weight = _power(k + 1) if weighting == "galerkin" else (k + 1) * _power(k)
+        integral = polynomial.polyint(polynomial.polymul(weight, residual))
+        found.append(
+            float(polynomial.polyval(high, integral) - polynomial.polyval(low, integral))
+        )
+    return found
+
+
+def _factors(matrix: Array) -> Array:
+    """Return what Crout's factorization leaves in the place of a 2 x 2 matrix."""
+    (a, b), (c, d) = matrix.tolist()
+    return np.array([[a, b], [c / a, d - c / a * b]])
+
+
+def halved(scene: Scene, weighting: str) -> float:
+    """Return by how much the error of a weighting without mistake falls as the step is halved."""
+    finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
+    return _share(scene, weighting, "none") / _share(finer, weighting, "none")

@@ -146,9 +146,7 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[float]:
             low, high = 0.0, length
             weight = _power(k + 1) if weighting == "galerkin" else (k + 1) * _power(k)
         integral = polynomial.polyint(polynomial.polymul(weight, residual))
-        found.append(
-            float(polynomial.polyval(high, integral) - polynomial.polyval(low, integral))
-        )
+        found.append(float(polynomial.polyval(high, integral) - polynomial.polyval(low, integral)))
     return found
 
 

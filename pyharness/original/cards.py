@@ -144,6 +144,11 @@ class Deck:
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
+    def otherwise(self) -> dict[int, str]:
+        """Cards whose statement in the port has other words, and the reason."""
+        return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
+
+    @cached_property
     def port(self) -> dict[int, list[Place]]:
         """The lines of the Fortran port by card, as its margin names them."""
         return _by_card((cards, place) for place, cards in margin(self.program))
@@ -204,7 +209,9 @@ def _cards_of(asked: str) -> list[Card]:
     if asked in PROGRAMS:
         return list(deck(asked).cards.values())
     if colon and program not in PROGRAMS:
-        raise InputError(f"cards {asked!r}: no program {program!r}; it is one of {', '.join(PROGRAMS)}")
+        raise InputError(
+            f"cards {asked!r}: no program {program!r}; it is one of {', '.join(PROGRAMS)}"
+        )
     programs = (program,) if colon else PROGRAMS
     if not (match := re.fullmatch(r"(\d{1,6})(?:-(\d{1,6}))?", ranges)):
         raise InputError(
@@ -222,7 +229,9 @@ def _cards_of(asked: str) -> list[Card]:
         if first <= card.number <= int(last)
     ]
     if not found:
-        ends = ", ".join(f"{each} {min(c)}-{max(c)}" for each in programs for c in [deck(each).cards])
+        ends = ", ".join(
+            f"{each} {min(c)}-{max(c)}" for each in programs for c in [deck(each).cards]
+        )
         raise InputError(f"cards {asked!r}: the range is empty; the decks have {ends}")
     return found
 
@@ -270,7 +279,7 @@ def unexplained(scan: str) -> list[str]:
         Where the text has no appendix with cards.
     """
     _, heading, appendix = scan.rpartition(HEADING)
-    if not heading or "100-" not in appendix:
+    if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
         raise InputError(f"the scan has no line {HEADING!r} with cards after it: not this thesis")
     first = scan.count("\n", 0, len(scan) - len(appendix)) + 1
     lines = [(n, _tight(text)) for n, text in enumerate(appendix.split("\n"), first)]
@@ -296,7 +305,9 @@ def undeclared() -> list[str]:
         for each in card.differences:
             used.add((each.entry, card.program, card.number, each.ours, each.scans))
         if card.printed:
-            used.add((card.printed[1], card.program, card.number, str(card.number), card.printed[0]))
+            used.add(
+                (card.printed[1], card.program, card.number, str(card.number), card.printed[0])
+            )
     declared: set[tuple[Any, ...]] = set()
     for entry in facts("apparatus")["entry"]:
         for ours, scans, cards in entry.get("pairs", ()):

@@ -78,13 +78,13 @@ def deck_text(
         if _is_made(each, listing, dialect, scene.case if scene else None):
             for number in numbers(each.get("delete", "")):
                 cards.pop(number, None)
-            new = {n: f"      {text}" for n, text in each.get("replace", []) + each.get("insert", [])}
+            new = {
+                n: f"      {text}" for n, text in each.get("replace", []) + each.get("insert", [])
+            }
             cards |= new
             if "dialect" in each:
                 marked |= set(new)
-    return "".join(
-        f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards)
-    )
+    return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
 
 
 def _is_made(

@@ -1,0 +1,181 @@
+"""The text of the edition: explained to the last character, and where port and twin have it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pyharness.model.errors import InputError
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.original import cards
+from pyharness.original.cards import (
+    chosen,
+    deck,
+    expected_lines,
+    numbers,
+    undeclared,
+    unexplained,
+)
+
+SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
+# What the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
+FORMS = (
+    (r"_dp|\s|&$", ""), (r"(?<=\d)\.0(?!\d)", "."), (r"(?<![\d.])0\.(?=\d)", "."),
+    (r"\b([MR][123])\(\w\)", r"\1"), (r"\bT([123])2\b", r"T\1**2"), (r"\bTL([234])\b", r"T(L)**\1"),
+    (r"\((T\d)\*\1\*\1\)", r"\1**3"), (r"\((T\d)\*\1\)", r"\1**2"),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def scan() -> str:
+    """A scan that the tables explain: made of them."""
+    lines = [text for text, _ in expected_lines()]
+    return "\n".join(["the thesis", cards.HEADING, "", *lines[:40], "```", "", *lines[40:]])
+
+
+def test_decks_are_whole() -> None:
+    assert {each: len(deck(each).cards) for each in PROGRAMS} == facts("cases")["cards"]
+    assert sum(card.scan is None for card in chosen(())) == 7
+    # Cards that deviate in more than their number: what an edition has to answer for.
+    assert sum(bool(card.differences or card.lost) for card in chosen(())) == 202
+
+
+def test_every_deviation_is_declared_by_an_entry_for_that_card() -> None:
+    assert undeclared() == []
+    names = {each["id"] for each in facts("apparatus")["entry"]}
+    phantoms = [i for page in facts("cards/scan")["page"] for i in page["lines"] if "entry" in i]
+    assert {each["entry"] for each in phantoms if isinstance(each, dict)} <= names
+
+
+@pytest.mark.parametrize("change", ["pair", "card", "printed"])
+def test_what_is_not_declared_is_found(change: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    entries = [dict(each) for each in facts("apparatus")["entry"]]
+    for entry in entries:
+        if entry["id"] == "noise-names" and change != "printed":
+            pairs = [list(each) for each in entry["pairs"]]
+            if change == "pair":
+                pairs = pairs[1:]
+            else:
+                pairs[0] = [*pairs[0][:2], {**pairs[0][2], "two-term": "450-480, 630-650"}]
+            entry["pairs"] = pairs
+        if entry["id"] == "noise-numbers" and change == "printed":
+            entry["printed"] = [[p, c, first + 10, step] for p, c, first, step in entry["printed"]]
+    real = cards.facts
+    monkeypatch.setattr(
+        cards, "facts", lambda name: {"entry": entries} if name == "apparatus" else real(name)
+    )
+    assert undeclared()
+
+
+def test_scan_of_the_tables_is_explained(scan: str) -> None:
+    assert unexplained(scan) == []
+
+
+@pytest.mark.parametrize("change", ["replaced", "removed", "added"])
+def test_a_character_changed_anywhere_is_found(scan: str, change: str) -> None:
+    """At every place of every line: the k-th characters of all lines at once, each line found."""
+    head, heading, appendix = scan.partition(cards.HEADING)
+    lines = appendix.split("\n")
+    kept = [n for n, line in enumerate(lines) if line not in ("", "```")]
+    for k in range(max(map(len, lines)) + 1):
+        changed = list(lines)
+        for n in kept:
+            line = lines[n]
+            if change == "added" and k <= len(line):
+                changed[n] = line[:k] + "7" + line[k:]
+            elif change == "replaced" and k < len(line):
+                changed[n] = line[:k] + ("8" if line[k] == "7" else "7") + line[k + 1 :]
+            elif change == "removed" and k < len(line) and len(line) > 1:
+                changed[n] = line[:k] + line[k + 1 :]
+        touched = {n for n in kept if changed[n] != lines[n]}
+        found = unexplained(head + heading + "\n".join(changed))
+        assert len(found) == len(touched), k
+    for n, line in enumerate(lines[1:], 1):  # blank lines and fences
+        if n not in kept:
+            changed = [*lines[:n], line + "7", *lines[n + 1 :]]
+            assert len(unexplained(head + heading + "\n".join(changed))) == 1
+
+
+@pytest.mark.parametrize("change", ["lost", "twice", "swapped", "joined"])
+def test_a_line_out_of_place_is_found(scan: str, change: str) -> None:
+    lines = scan.split("\n")
+    at = lines.index("300-U1(1)=0.")
+    new = {
+        "lost": [],
+        "twice": [lines[at]] * 2,
+        "swapped": [lines[at + 1], lines[at]],
+        "joined": [lines[at] + lines[at + 1]],
+    }[change]
+    rest = at + (2 if change in ("swapped", "joined") else 1)
+    assert unexplained("\n".join([*lines[:at], *new, *lines[rest:]]))
+
+
+@pytest.mark.skipif(not SCAN.exists(), reason="the text of the thesis is not beside the project")
+def test_scan_of_the_thesis_is_explained() -> None:
+    assert unexplained(SCAN.read_text()) == []
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_executable_card_has_its_place(program: str) -> None:
+    found = deck(program)
+    assert set(found.port) | set(found.absent) == found.executable
+    assert not set(found.port) & set(found.absent)
+    assert set(found.twin) <= found.executable
+    assert found.executable - set(found.twin) <= set(found.absent)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_statements_of_the_port_are_those_of_their_cards(program: str) -> None:
+    """In the card's own words, or for a reason; a defect's card stands beside its correction."""
+    found = deck(program)
+    for number, places in found.port.items():
+        card = "".join(found.cards[number].text[6:].split()).rstrip("+").replace("T5**", "T(L)**")
+        said = [_as_on_card(place.text) for place in places]
+        assert (card in said) != (number in found.otherwise), (number, card, said)
+
+
+def _as_on_card(statement: str) -> str:
+    for pattern, new in FORMS:
+        statement = re.sub(pattern, new, statement)
+    return {"endif": "", "enddo": ""}.get(statement, statement).upper().rstrip("+")
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (["1665"], "the nearest are 1660 and 1670"),
+        (["two-term:99"], "the nearest are 100 and 110"),
+        (["9000-9100"], "the range is empty; the decks have two-term 100-1680"),
+        (["1090-1040"], "the range is empty"),
+        (["three-term"], "neither a program"),
+        (["three-term:100"], "no program 'three-term'"),
+    ],
+)
+def test_cards_that_are_not_there(asked: list[str], told: str) -> None:
+    with pytest.raises(InputError, match=re.escape(told)):
+        chosen(asked)
+
+
+def test_cards_are_found() -> None:
+    assert [card.name for card in chosen(["1660"])] == [
+        "two-term:1660",
+        "four-term:1660",
+    ]
+    assert len(chosen(["two-term"])) == 159
+    assert [card.number for card in chosen(["runge-kutta:1010-1030"])] == [1010, 1020, 1030]
+    card = chosen(["two-term:1260"])[0]
+    assert card.statement == "X3=ACL2+V2(3)*U3(3)-V3(3)*U2(3)"
+    assert card.scan == "1260-X3=ACL2+U2(3)*U3(3)-U3(3)*U2(3)"
+    assert set(card.entries) >= {"x3-reads-acl2", "noise-u-for-v"}
+
+
+def test_ranges() -> None:
+    assert numbers("750-770, 800") == [750, 760, 770, 800]
+    assert numbers("") == []
+
+
+@pytest.mark.parametrize("text", ["", "no appendix", f"{cards.HEADING}\nno cards"])
+def test_a_scan_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="not this thesis"):
+        unexplained(text)

@@ -1,0 +1,123 @@
+"""Evidence in place of yes or no: every combination of what the thesis leaves open, scored.
+
+A combination chooses omega(0) where it is not given, the readings, the conjectures and the number of
+steps. It is scored by the claims about the original programs: one point for each that is
+reproduced, a half for one reproduced in part, none otherwise; claims that are not testable do not
+count. Nothing is weighted and nothing is tuned.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import Any
+
+from pyharness.history.claims.laboratory import Assumptions, Laboratory
+from pyharness.history.claims.ledger import claims, outcome, starts
+from pyharness.history.claims.verdicts import IN_PART, NOT_TESTABLE, REPRODUCED
+from pyharness.model.listing import PROGRAMS, names_of
+
+POINTS = {REPRODUCED: 1.0, IN_PART: 0.5}
+STEPS = (100, 300)
+
+
+@dataclass(frozen=True)
+class Combination:
+    """One choice of everything, the verdicts of all testable claims, and what they add up to."""
+
+    assumptions: Assumptions
+    verdicts: dict[str, str]
+
+    @property
+    def score(self) -> float:
+        """Points of all claims."""
+        return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
+
+    @property
+    def holding(self) -> int:
+        """Claims that are reproduced, at least in part."""
+        return sum(each in POINTS for each in self.verdicts.values())
+
+    def choices(self) -> dict[str, str]:
+        """Say what was chosen, axis by axis."""
+        given = self.assumptions
+        start = given.start or ()
+        return {
+            "omega(0)": ",".join(f"{x:g}" for x in start),
+            **{f"reading {name}": _said(name in given.readings) for name in _names("reading")},
+            **{
+                f"conjecture {name}": _said(name in (given.conjectures or ()))
+                for name in _names("conjecture")
+            },
+            "steps": str(given.steps),
+        }
+
+
+def evidence() -> Iterator[Combination]:
+    """Give every combination with its verdicts, as they are computed."""
+    for assumptions in combinations():
+        verdicts = {}
+        for entry in claims():
+            verdict = _verdict(entry["id"], _relevant(entry, assumptions))
+            if verdict != NOT_TESTABLE:
+                verdicts[entry["id"]] = verdict
+        yield Combination(assumptions, verdicts)
+
+
+def combinations() -> list[Assumptions]:
+    """Return every combination of starts, readings, conjectures and numbers of steps."""
+    return [
+        Assumptions(start, frozenset(readings), steps, frozenset(conjectures))
+        for start, readings, conjectures, steps in product(
+            starts(), _subsets(_names("reading")), _subsets(_names("conjecture")), STEPS
+        )
+    ]
+
+
+def discriminating(found: list[Combination]) -> list[str]:
+    """Return the claims whose verdict is not the same in all combinations."""
+    return [
+        name for name in found[0].verdicts if len({each.verdicts[name] for each in found}) > 1
+    ]
+
+
+def undecided(found: list[Combination]) -> dict[str, list[str]]:
+    """Return, by axis, the choices that occur among the combinations of the highest score."""
+    best = max(each.score for each in found)
+    choices = [each.choices() for each in found if each.score == best]
+    return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}
+
+
+def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
+    """Return the part of a combination on which a claim hangs; the rest is as adopted."""
+    hangs_on = entry["assumptions"]
+    readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
+    named = [each for each in hangs_on if each.startswith("conjecture ")]
+    return Assumptions(
+        chosen.start if "omega0" in hangs_on else None,
+        readings,
+        chosen.steps if "steps" in hangs_on else 100,
+        chosen.conjectures if named else None,
+    )
+
+
+@cache
+def _verdict(identity: str, assumptions: Assumptions) -> str:
+    entry = next(each for each in claims() if each["id"] == identity)
+    return outcome(entry, Laboratory(True, assumptions)).verdict
+
+
+@cache
+def _names(kind: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for each in PROGRAMS for name in names_of(kind, each)))
+
+
+def _subsets(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    return [
+        tuple(name for name, taken in zip(names, mask, strict=True) if taken)
+        for mask in product((False, True), repeat=len(names))
+    ]
+
+
+def _said(chosen: bool) -> str:
+    return "yes" if chosen else "no"

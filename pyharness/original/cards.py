@@ -204,6 +204,26 @@ def chosen(asked: Iterable[str]) -> list[Card]:
     return list(found)
 
 
+def parallels(card: Card) -> list[Card]:
+    """Return the cards of the other decks with the same text, where that is no common one."""
+    if card.is_comment or not card.text[6:].strip():
+        return []
+    return [
+        other
+        for program in PROGRAMS
+        if program != card.program
+        for other in _by_text(program).get(_tight(card.text), [])
+    ]
+
+
+@cache
+def _by_text(program: str) -> dict[str, list[Card]]:
+    found: dict[str, list[Card]] = {}
+    for card in deck(program).cards.values():
+        found.setdefault(_tight(card.text), []).append(card)
+    return found
+
+
 def _cards_of(asked: str) -> list[Card]:
     program, colon, ranges = asked.rpartition(":")
     if asked in PROGRAMS:

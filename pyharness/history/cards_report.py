@@ -1,0 +1,105 @@
+"""The reports of `cards`: the text of the edition, what the scan shows, where port and twin have it."""
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from itertools import zip_longest
+from typing import Any
+
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.report import Field, Line, Report, Section, counted, numbers
+from pyharness.original.cards import Card, Place, deck, parallels
+
+_HALF = 48  # columns of a text that stands beside another
+
+
+def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
+    """Report cards one by one: card and scan, port and twin, entries and what they do."""
+    rows = [
+        [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
+        for each in cards
+    ]
+    return Report(
+        title,
+        [_block(each) for each in cards],
+        record=lambda: {"cards": [card_record(each) for each in cards]},
+        data=numbers("program card statement scan entries", rows),
+    )
+
+
+def card_record(card: Card) -> dict[str, Any]:
+    """Return a card for JSON; `scan` is null where the scan has the card as it is."""
+    found = deck(card.program)
+    scan = (card.scan or "") if card.deviates else None
+    return {
+        "program": card.program,
+        "card": card.number,
+        "statement": card.statement,
+        "scan": scan,
+        "differences": [each._asdict() for each in card.differences],
+        "entries": list(card.entries),
+        "fortran": [each._asdict() for each in found.port.get(card.number, [])],
+        "twin": [each._asdict() for each in found.twin.get(card.number, [])],
+        "absent": found.absent.get(card.number),
+        "parallels": [each.name for each in parallels(card)],
+    }
+
+
+def scan_report(faults: Sequence[str], undeclared: Sequence[str], lines: int) -> Report:
+    """Report whether the tables explain a scan, with every line that they don't."""
+    cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
+    deviating = sum(bool(each.differences or each.lost) for each in cards)
+    pairs = sum(len(each.differences) for each in cards)
+    lost = sum(each.lost is not None for each in cards)
+    told = (
+        f"{counted(len(cards), 'card')}, {lost} of them lost; {deviating} deviate in their text, in "
+        f"{pairs} places, {sum(each.printed is not None for each in cards)} in their number; the "
+        f"scan has {counted(lines, 'line')}"
+    )
+    end = "nothing is unexplained" if not (faults or undeclared) else (
+        f"{len(faults) + len(undeclared)} unexplained"
+    )  # fmt: skip
+    return Report(
+        "cards",
+        [[told], [Line(each) for each in (*faults, *undeclared)], [end]],
+        record=lambda: {
+            "lines": lines, "cards": len(cards), "lost": lost, "deviating": deviating,
+            "differences": pairs, "unexplained": [*faults, *undeclared],
+        },
+        data=numbers("unexplained", [[each] for each in (*faults, *undeclared)]),
+    )  # fmt: skip
+
+
+def _block(card: Card) -> Section:
+    found = deck(card.program)
+    ours, scan = card.text[5 if card.continues else 0 :].strip(), card.scan
+    shown = "lost" if scan is None else scan if card.deviates else "as the card"
+    absent = found.absent.get(card.number)
+    missing = "-" if absent is None else f"none: {absent}"
+    left = [*_named("card", [ours]), *_named("scan", [shown])]
+    right = [
+        *_named("port", _told(found.port.get(card.number, [])) or [missing]),
+        *_named("twin", _told(found.twin.get(card.number, [])) or [missing]),
+    ]
+    pairs = zip_longest(left, right, fillvalue="")
+    lines = [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
+    entries = [each for each in facts("apparatus")["entry"] if each["id"] in card.entries]
+    told = [
+        Field(f"  {each['id']}: ", f"{each['kind']}, {each['certainty']}: {each['why']}")
+        for each in entries
+    ]
+    beside = ", ".join(each.name for each in parallels(card))
+    return [
+        Line(f"{card.program} {card.number}" + (f"   (parallel: {beside})" if beside else "")),
+        *lines,
+        *told,
+    ]
+
+
+def _told(places: Iterable[Place]) -> list[str]:
+    return [f"{each.file}:{each.line} {each.text}" for each in places]
+
+
+def _named(name: str, texts: Iterable[str]) -> list[str]:
+    lines = [line for text in texts for line in textwrap.wrap(text, _HALF - 6)]
+    return [f"{name if not k else '':6s}{line}" for k, line in enumerate(lines)]

@@ -1,0 +1,37 @@
+"""`cards`: the text of the edition, card by card, beside the scan, the port and the twin."""
+
+import argparse
+from pathlib import Path
+
+from pyharness.cli import options as shared
+from pyharness.history.cards_report import cards_report, scan_report
+from pyharness.model.errors import InputError
+from pyharness.original.cards import chosen, expected_lines, undeclared, unexplained
+
+OPTIONS = {
+    "cards CARDS": "two-term, 1660, 1040-1090, two-term:1660; all where nothing is named",
+    "--scan FILE": "hold the cards against a scan of the thesis, character by character",
+    **shared.outputs(plot=""),
+}
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show the cards; with a scan, what they do not explain, and 1 where there is any."""
+    if options.scan is None:
+        found = chosen(shared.names(options.cards))
+        shared.check_outputs(options)
+        shared.show(cards_report(found), options)
+        return 0
+    shared.refuse(options, "--scan", ("cards",))
+    faults, undeclared_ = unexplained(_text(options.scan)), undeclared()
+    shared.check_outputs(options)
+    shared.show(scan_report(faults, undeclared_, len(expected_lines())), options)
+    return 1 if faults or undeclared_ else 0
+
+
+def _text(path: str) -> str:
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "is no text"
+        raise InputError(f"--scan '{path}': {reason}; give the text of a scan") from None

@@ -1,0 +1,40 @@
+"""`deck`: a program as a deck of cards, in fixed-form FORTRAN."""
+
+import argparse
+
+from pyharness.cli import options as shared
+from pyharness.model.errors import InputError
+from pyharness.model.records import listing_record
+from pyharness.model.report import Line, Report
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.original.decks import DIALECTS, deck_text
+
+FORMATS = ("table", "json")
+OPTIONS = {
+    "--program P": "two-term, four-term or runge-kutta",
+    "--case N": "a case of Table 1, 1 to 7 (default: the case that was printed)",
+    **{each: shared.LISTING[each] for each in list(shared.LISTING)[:4]},
+    "--dialect D": f"{' or '.join(DIALECTS)} (default {DIALECTS[0]})",
+    **shared.outputs(FORMATS, plot=""),
+}
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the deck."""
+    if options.program is None:
+        raise InputError("give --program two-term, four-term or runge-kutta")
+    listing = shared.chosen_listing(options)
+    scene = None
+    if options.case is not None:
+        shared.check_known("case", options.case, [str(each) for each in case_numbers()])
+        scene = case_scene(int(options.case))
+    dialect = options.dialect or DIALECTS[0]
+    lines = deck_text(listing, scene, dialect).splitlines()
+    shared.check_outputs(options)
+    record = {
+        "program": listing.program, "case": scene and scene.case, "dialect": dialect,
+        "listing": listing_record(listing), "lines": lines,
+    }  # fmt: skip
+    report = Report("deck", [[Line(each) for each in lines]], record=lambda: {"deck": record})
+    shared.show(report, options)
+    return 0

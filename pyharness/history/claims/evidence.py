@@ -76,9 +76,7 @@ def combinations() -> list[Assumptions]:
 
 def discriminating(found: list[Combination]) -> list[str]:
     """Return the claims whose verdict is not the same in all combinations."""
-    return [
-        name for name in found[0].verdicts if len({each.verdicts[name] for each in found}) > 1
-    ]
+    return [name for name in found[0].verdicts if len({each.verdicts[name] for each in found}) > 1]
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:

@@ -1,12 +1,11 @@
 """Tests of the claims of sections I to IV that are not about a run: history, theory, orders.
 
-Each function is the `test` of entries in `data/claims.toml`, as in `about_cases`.
+Each function is the `test` of entries in `data/claims.toml`, as in `verdicts`.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -30,28 +29,28 @@ from pyharness.truth.reference import reference
 Weights = Sequence[Callable[[Array], Array]]
 
 
-def known_in_closed_form(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Hold Jacobi's elliptic functions against the reference in cases said to have no solution."""
     numbers = {}
-    for case in given["cases"]:
+    for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
         found = solve(scene, truth.time, method="closed-form")
         share = distance(found.omega, truth.omega) / largest(truth)
         numbers[f"case {case}: closed form against the reference"] = share
-    known = max(numbers.values()) <= given["limit"]
+    known = max(numbers.values()) <= limit
     return Judged(FALSE if known else REPRODUCED, numbers)
 
 
-def history_only(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def history_only(lab: Laboratory) -> Judged:
     """Leave a statement of history to its sources."""
     return Judged(NOT_TESTABLE, {})
 
 
-def hamilton_ordinary(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def hamilton_ordinary(lab: Laboratory, case: int, limit: float) -> Judged:
     """Integrate Hamilton's equations in Euler angles as six ordinary differential equations."""
     from scipy.integrate import solve_ivp
 
-    scene, truth = lab.scene(given["case"]), lab.truth(given["case"])
+    scene, truth = lab.scene(case), lab.truth(case)
     assert scene.moments is not None
     moments = scene.moments
     # Any attitude will do, away from the singular one; angles 3-1-3.
@@ -64,7 +63,7 @@ def hamilton_ordinary(lab: Laboratory, given: dict[str, Any]) -> Judged:
     omega = np.array([_omega(moments, y) for y in found.y.T])
     share = distance(omega, truth.omega) / largest(truth)
     numbers = {"six ordinary equations against the reference": share}
-    return Judged(FALSE if share <= given["limit"] else REPRODUCED, numbers)
+    return Judged(FALSE if share <= limit else REPRODUCED, numbers)
 
 
 def _angle_rates_to_omega(angles: Sequence[float]) -> Array:
@@ -112,29 +111,31 @@ def _hamilton(moments: Triple, state: Array) -> Array:
     return np.array([*rates, *forces])
 
 
-def bounded_not_lipschitz(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Form quotients of a bounded function, the square root on (0, 1), ever nearer to 0."""
-    points = 10.0 ** -np.arange(2.0, given["decades"] + 1.0, 2.0)
+    points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
     numbers = {"bound of the function": 1.0, "largest quotient": float(quotients.max())}
-    return Judged(FALSE if quotients.max() > given["above"] else REPRODUCED, numbers)
+    return Judged(FALSE if quotients.max() > above else REPRODUCED, numbers)
 
 
-def local_error(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def local_error(
+    lab: Laboratory, cases: list[int], method: str, power: float, within: float
+) -> Judged:
     """Measure the power of the step with which the error of one step falls."""
     numbers = {}
-    for case in given["cases"]:
+    for case in cases:
         numbers[f"case {case}: power of the step"] = _power(
-            lab.scene(case), lambda scene: _stepped(scene, given["method"])
+            lab.scene(case), lambda scene: _stepped(scene, method)
         )
-    near = [abs(each - given["power"]) <= given["within"] for each in numbers.values()]
+    near = [abs(each - power) <= within for each in numbers.values()]
     return Judged(graded(all(near), any(near)), numbers)
 
 
-def same_as_taylor(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Hold one step of Runge-Kutta against the Taylor series with its terms to h**4."""
     numbers, same, near = {}, True, True
-    for case in given["cases"]:
+    for case in cases:
         scene = lab.scene(case)
         step = replace(scene, steps=1)
         kutta = _stepped(step, "rk4")
@@ -145,7 +146,7 @@ def same_as_taylor(lab: Laboratory, given: dict[str, Any]) -> Judged:
         numbers[f"case {case}: distance over the error of the series"] = apart / error
         numbers[f"case {case}: power of the step of the distance"] = power
         same &= apart <= 1e-14 * float(np.abs(truth).max())
-        near &= abs(power - 5.0) <= given["within"]
+        near &= abs(power - 5.0) <= within
     return Judged(graded(same, near), numbers)
 
 
@@ -183,7 +184,7 @@ def _taylor_step(scene: Scene, order: int) -> Array:
     return total
 
 
-def crandall_example(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
     """Solve dx/dt = -x, x(0) = 1 on (0, 1) by 1 + c1 t + c2 t**2, weighted in four ways."""
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
@@ -203,9 +204,9 @@ def crandall_example(lab: Laboratory, given: dict[str, Any]) -> Judged:
         )
     series = float(np.abs(1.0 - fine + fine**2 / 2.0 - np.exp(-fine)).max())
     better = all(error < series / 2.0 for error in numbers.values())
-    best = {name.partition(":")[0] for name in sorted(numbers, key=lambda n: numbers[n])[:2]}
+    two = {name.partition(":")[0] for name in sorted(numbers, key=lambda n: numbers[n])[:2]}
     numbers["Taylor series: largest error"] = series
-    return Judged(graded(better and best == set(given["best"]), better), numbers)
+    return Judged(graded(better and two == set(best), better), numbers)
 
 
 def _weighted(t: Array, weight: Array, by: Weights) -> Array:
@@ -221,26 +222,26 @@ def _weighted(t: Array, weight: Array, by: Weights) -> Array:
     return np.array(rows)
 
 
-def one_term_suffices(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
     """Run the linear trial function on a linear top."""
-    found = run(lab.scene(given["case"]), Member("collocation", 1))
-    truth = lab.truth(given["case"])
+    found = run(lab.scene(case), Member("collocation", 1))
+    truth = lab.truth(case)
     share = distance(found.omega, truth.omega) / largest(truth)
     numbers = {"one-term error over the largest omega": share}
-    return Judged(REPRODUCED if share <= given["limit"] else FALSE, numbers)
+    return Judged(REPRODUCED if share <= limit else FALSE, numbers)
 
 
-def symmetric_uncoupled(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
     """Look for products that are left in symmetric bodies: the sphere, and the top."""
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
-        for case in given["cases"]
+        for case in cases
     }
     none = [each == 0.0 for each in left.values()]
     return Judged(IN_PART if any(none) and not all(none) else graded(all(none), False), left)
 
 
-def step_on_cards(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def step_on_cards(lab: Laboratory, step: float) -> Judged:
     """Read the step that each deck sets before its loop."""
     numbers = {
         f"{program}: DT (s)": float(card.statement.partition("=")[2])
@@ -248,27 +249,27 @@ def step_on_cards(lab: Laboratory, given: dict[str, Any]) -> Judged:
         for card in deck(program).cards.values()
         if card.statement.startswith("DT=.")
     }
-    same = len(numbers) == 3 and set(numbers.values()) == {given["step"]}
+    same = len(numbers) == 3 and set(numbers.values()) == {step}
     return Judged(REPRODUCED if same else NOT_REPRODUCED, numbers)
 
 
-def points_inside(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def points_inside(lab: Laboratory, case: int) -> Judged:
     """Count the steps whose points of collocation all lie inside the interval."""
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
-        run_of = lab.run(program, given["case"])
+        run_of = lab.run(program, case)
         # TIME grows by DT in every step, so its increments are the DT that set the points.
         lengths = np.diff(run_of.recorded_time, prepend=0.0)
-        inside = last * lengths < lab.scene(given["case"]).step_size
+        inside = last * lengths < lab.scene(case).step_size
         shares.append(float(inside.mean()))
         numbers[f"{program}: share of steps with all points inside"] = shares[-1]
     return Judged(graded(min(shares) == 1.0, min(shares) >= 0.5, FALSE), numbers)
 
 
-def possible_bodies(lab: Laboratory, given: dict[str, Any]) -> Judged:
+def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
     """Hold the moments of every case against the triangle inequality of rigid bodies."""
     excess = {}
-    for case in given["cases"]:
+    for case in cases:
         first, second, third = sorted(lab.scene(case).moments or (), reverse=True)
         excess[f"case {case}: largest moment over the sum of the others"] = first / (second + third)
     possible = [each <= 1.0 for each in excess.values()]

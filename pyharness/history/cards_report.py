@@ -7,9 +7,16 @@ from typing import Any
 
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.model.report import Field, Line, Report, Section, counted, numbers
+from pyharness.model.report import Column, Field, Line, Report, Section, Table, counted, words
+from pyharness.model.report import numbers as columns
 from pyharness.original.cards import Card, Place, deck, parallels
+from pyharness.original.cards import numbers as cards_named
 
+_CLASSES = (
+    *words("class"), Column("entries"), Column("flags"), Column("two-term"), Column("four-term"),
+    Column("runge-kutta"), Column("places"),
+)  # fmt: skip
+_CLASSES_NAMES = [each.head for each in _CLASSES]
 _HALF = 48  # columns of a text that stands beside another
 
 
@@ -23,7 +30,7 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
         title,
         [_block(each) for each in cards],
         record=lambda: {"cards": [card_record(each) for each in cards]},
-        data=numbers("program card statement scan entries", rows),
+        data=columns("program card statement scan entries", rows),
     )
 
 
@@ -66,7 +73,41 @@ def scan_report(faults: Sequence[str], undeclared: Sequence[str], lines: int) ->
             "lines": lines, "cards": len(cards), "lost": lost, "deviating": deviating,
             "differences": pairs, "unexplained": [*faults, *undeclared],
         },
-        data=numbers("unexplained", [[each] for each in (*faults, *undeclared)]),
+        data=columns("unexplained", [[each] for each in (*faults, *undeclared)]),
+    )  # fmt: skip
+
+
+def classes_report() -> Report:
+    """Report the alterations by class: entries, those behind a flag, and cards by program."""
+    entries = facts("apparatus")["entry"]
+    rows = []
+    for kind in dict.fromkeys(each["kind"] for each in entries):
+        of_kind = [each for each in entries if each["kind"] == kind]
+        named = [
+            len({n for each in of_kind for n in cards_named(each["cards"].get(program, ""))})
+            for program in PROGRAMS
+        ]
+        places = sum(
+            each.entry in {entry["id"] for entry in of_kind}
+            for program in PROGRAMS
+            for card in deck(program).cards.values()
+            for each in card.differences
+        )
+        rows.append([kind, len(of_kind), sum("flag" in each for each in of_kind), *named, places])
+    sure = [
+        [certainty, sum(each["certainty"] == certainty for each in entries)]
+        for certainty in dict.fromkeys(each["certainty"] for each in entries)
+    ]
+    table = Table(_CLASSES, rows)
+    told = ", ".join(f"{number} {certainty}" for certainty, number in sure)
+    return Report(
+        "cards",
+        [[table], [f"{len(entries)} entries: {told}"]],
+        record=lambda: {
+            "classes": [dict(zip(_CLASSES_NAMES, row, strict=True)) for row in rows],
+            "certainty": dict(sure),
+        },
+        data=table,
     )  # fmt: skip
 
 

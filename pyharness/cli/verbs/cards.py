@@ -4,12 +4,13 @@ import argparse
 from pathlib import Path
 
 from pyharness.cli import options as shared
-from pyharness.history.cards_report import cards_report, scan_report
+from pyharness.history.cards_report import cards_report, classes_report, scan_report
 from pyharness.model.errors import InputError
 from pyharness.original.cards import chosen, expected_lines, undeclared, unexplained
 
 OPTIONS = {
     "cards CARDS": "two-term, 1660, 1040-1090, two-term:1660; all where nothing is named",
+    "--classes": "count the alterations by class",
     "--scan FILE": "hold the cards against a scan of the thesis, character by character",
     **shared.outputs(plot=""),
 }
@@ -17,6 +18,11 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Show the cards; with a scan, what they do not explain, and 1 where there is any."""
+    if options.classes:
+        shared.refuse(options, "--classes", ("cards", "scan"))
+        shared.check_outputs(options)
+        shared.show(classes_report(), options)
+        return 0
     if options.scan is None:
         found = chosen(shared.names(options.cards))
         shared.check_outputs(options)

@@ -1,4 +1,4 @@
-"""The reports of `cards`: the text of the edition, what the scan shows, where port and twin have it."""
+"""The reports of `cards`: the text of the edition, the scan, and where port and twin have it."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -59,9 +59,9 @@ def scan_report(faults: Sequence[str], undeclared: Sequence[str], lines: int) ->
     pairs = sum(len(each.differences) for each in cards)
     lost = sum(each.lost is not None for each in cards)
     told = (
-        f"{counted(len(cards), 'card')}, {lost} of them lost; {deviating} deviate in their text, in "
-        f"{pairs} places, {sum(each.printed is not None for each in cards)} in their number; the "
-        f"scan has {counted(lines, 'line')}"
+        f"{counted(len(cards), 'card')}, {lost} of them lost; {deviating} deviate in their text, "
+        f"in {pairs} places, {sum(each.printed is not None for each in cards)} in their number; "
+        f"the scan has {counted(lines, 'line')}"
     )
     end = "nothing is unexplained" if not (faults or undeclared) else (
         f"{len(faults) + len(undeclared)} unexplained"

@@ -133,7 +133,8 @@ def _solved(weighting: str, length: float, rates: Array, mistake: str, second: b
 
 
 def _power(exponent: int) -> Array:
-    return np.eye(exponent + 1)[exponent]
+    row: Array = np.eye(exponent + 1)[exponent]
+    return row
 
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[float]:

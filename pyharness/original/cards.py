@@ -1,7 +1,7 @@
 """The text of the edition: every card of the three decks, and what the scan shows of it.
 
 A line of the scan is a number, a dash and the text of a card; blanks do not count. The tables are
-in `data/cards`: the decks, the pages of the scan in its order, and where a card stands in the twins.
+in `data/cards`: the decks, the pages of the scan in its order, and where a card is in the twins.
 """
 
 import difflib

@@ -61,7 +61,7 @@ def test_what_is_not_declared_is_found(change: str, monkeypatch: pytest.MonkeyPa
             entry["pairs"] = pairs
         if entry["id"] == "noise-numbers" and change == "printed":
             entry["printed"] = [[p, c, first + 10, step] for p, c, first, step in entry["printed"]]
-    real = cards.facts
+    real = facts
     monkeypatch.setattr(
         cards, "facts", lambda name: {"entry": entries} if name == "apparatus" else real(name)
     )

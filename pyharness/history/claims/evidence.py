@@ -1,7 +1,7 @@
 """Evidence in place of yes or no: every combination of what the thesis leaves open, scored.
 
-A combination chooses omega(0) where it is not given, the readings, the conjectures and the number of
-steps. It is scored by the claims about the original programs: one point for each that is
+A combination chooses omega(0) where it is not given, the readings, the conjectures and the number
+of steps. It is scored by the claims about the original programs: one point for each that is
 reproduced, a half for one reproduced in part, none otherwise; claims that are not testable do not
 count. Nothing is weighted and nothing is tuned.
 """

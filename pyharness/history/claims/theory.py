@@ -6,6 +6,7 @@ Each function is the `test` of entries in `data/claims.toml`, as in `verdicts`.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from pyharness.model.trajectory import Array
 from pyharness.original.cards import deck
 from pyharness.truth.reference import reference
 
-Weights = Sequence[Callable[[Array], Array]]
+Weights = Sequence[Callable[[Array], Any]]
 
 
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
@@ -66,7 +67,7 @@ def hamilton_ordinary(lab: Laboratory, case: int, limit: float) -> Judged:
     return Judged(FALSE if share <= limit else REPRODUCED, numbers)
 
 
-def _angle_rates_to_omega(angles: Sequence[float]) -> Array:
+def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
     """Return the matrix that turns rates of the angles 3-1-3 into omega in body axes."""
     _, theta, psi = angles
     return np.array(
@@ -80,8 +81,8 @@ def _angle_rates_to_omega(angles: Sequence[float]) -> Array:
 
 def _omega(moments: Triple, state: Array) -> Array:
     """Return omega from angles and momenta."""
-    angular = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, state[3:])
-    rates: Array = angular / moments
+    momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
+    rates: Array = momentum / np.array(moments)
     return rates
 
 
@@ -152,7 +153,8 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 def _stepped(scene: Scene, method: str) -> Array:
     """Return omega at the end of a scene by a method of fixed steps, which takes no tolerance."""
-    return solve(scene, scene.times(), method, tolerance=1.0).omega[-1]
+    omega: Array = solve(scene, scene.times(), method, tolerance=1.0).omega[-1]
+    return omega
 
 
 def _power(
@@ -180,7 +182,8 @@ def _taylor_step(scene: Scene, order: int) -> Array:
             x, y = terms[k], terms[n - k]
             product += [x[1] * y[2], x[0] * y[2], x[0] * y[1]]
         terms.append((coefficients * product + (torque if n == 0 else 0.0)) / (n + 1))
-    total: Array = sum(term * scene.step_size**n for n, term in enumerate(terms))
+    powers = scene.step_size ** np.arange(len(terms))
+    total: Array = powers @ np.array(terms)
     return total
 
 

@@ -1,0 +1,101 @@
+"""Decks: the text as it stands, what is altered, and a few of them compiled."""
+
+import pytest
+
+from pyharness.model.errors import InputError
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS, corrected, names_of, original, subset
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.original.cards import deck
+from pyharness.original.decks import compiler, deck_text
+from pyharness.verify.decks import decks
+from pyharness.verify.selection import Selection
+
+
+def _cards(text: str) -> dict[int, str]:
+    return {int(line[73:]): line[:72].rstrip() for line in text.splitlines()}
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_text_of_1982_is_that_of_the_cards(program: str) -> None:
+    text = deck_text(original(program))
+    assert all(len(line) == 80 for line in text.splitlines())
+    assert _cards(text) == {n: card.text.rstrip() for n, card in deck(program).cards.items()}
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
+    before, after = (_cards(deck_text(listing(program))) for listing in (original, corrected))
+    altered = [
+        each for each in facts("cards/alterations")["alteration"]
+        if each["program"] == program and "corrects" in each and "dialect" not in each
+    ]  # fmt: skip
+    assert {each["corrects"] for each in altered} == set(names_of("defect", program))
+    new = {n for each in altered if "keeps" not in each for key in ("replace", "insert")
+           for n, _ in each.get(key, ())}  # fmt: skip
+    assert {n for n, text in after.items() if before.get(n) != text} == new
+    for n in set(after) - set(before):
+        assert n % 10 != 0  # between its neighbours
+
+
+@pytest.mark.parametrize("case", [1, 5, 7])
+def test_case_stands_on_the_cards_of_the_deck(case: int) -> None:
+    cards = _cards(deck_text(original("two-term"), case_scene(case)))
+    scene = case_scene(case)
+    assert scene.moments is not None
+    shown = [float(cards[n].partition("=")[2]) for n in (200, 210, 220)]
+    assert shown == list(scene.moments)
+    assert [float(cards[n].partition("=")[2]) for n in (300, 310, 320)] == list(scene.omega)
+    assert cards[690].split() == ["DO", "100", "I=1,100,1"]
+    # Table 1 gives torques that hold initially in Case 7.
+    assert cards[250].strip() == ("N1=0." if case == 2 else "N1=100.")
+
+
+def test_dialect_of_today_adds_marked_lines_alone() -> None:
+    listing = original("runge-kutta")
+    old, new = (deck_text(listing, None, dialect).splitlines() for dialect in ("1982", "gfortran"))
+    marked = [line for line in new if line[72] == "+"]
+    assert [line for line in new if line[72] == " "] == old[1:]
+    assert [line[6:72].strip() for line in marked] == [
+        "PROGRAM RK", "OPEN(5,FILE='TAPE5',FORM='UNFORMATTED')", "OPEN(6,FILE='TAPE6')", "I=2",
+    ]  # fmt: skip
+    reading = subset("runge-kutta", readings=["do-variable"])
+    assert "I=2  " not in deck_text(reading, None, "gfortran")
+
+
+@pytest.mark.parametrize(
+    ("listing", "scene", "dialect", "told"),
+    [
+        (original("two-term"), None, "1966", "--dialect"),
+        (original("two-term"), Scene("own", (1.0, 1.0, 1.0), moments=(3.0, 2.0, 2.0)), "1982",
+         "one of the cases"),
+    ],
+)  # fmt: skip
+def test_what_no_deck_can_be_is_refused(
+    listing: object, scene: Scene | None, dialect: str, told: str
+) -> None:
+    with pytest.raises(InputError, match=told):
+        deck_text(listing, scene, dialect)  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = list(decks(Selection(thin=True)))
+    assert len(found) == 3
+    assert all(check.passed and check.value == 0.0 for check in found)
+    # One bit of one card, and a stop that comes too late, are seen.
+    for wrong in ("T3=.02", "T3=.010000000000000002"):
+        monkeypatch.setattr(
+            "pyharness.verify.decks.deck_text",
+            lambda *given, wrong=wrong: deck_text(*given).replace("T3=.01", wrong.ljust(6)),
+        )
+        failed = [check for check in decks(Selection(thin=True)) if not check.passed]
+        assert [check.id for check in failed] == ["decks/two-term/case-3/original"]
+
+
+def test_without_a_compiler_a_check_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pyharness.verify.decks.compiler", lambda: None)
+    (check,) = decks(Selection(only=["decks"]))
+    assert check.passed
+    assert "not run" in check.note

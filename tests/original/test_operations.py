@@ -1,0 +1,29 @@
+"""Operations of a step, counted by hand on the cards."""
+
+import pytest
+
+from pyharness.model.listing import corrected, original
+from pyharness.original.operations import operations_per_step
+
+
+def test_runge_kutta_is_counted_as_by_hand() -> None:
+    rates = 4 * (3 * 3 + 3 * 4)  # 800-850, 950-1000, 1120-1170
+    stages = 2 * 6 * 3 + 6 * 2  # 860-910 twice, 1040-1090
+    result = 6 * 7  # 1180-1230
+    tests = 6 + 6 + 6  # 1270-1320, 1330-1380, 1410-1460
+    found = operations_per_step(original("runge-kutta"))
+    assert found.written == 1 + rates + stages + result + tests
+    # .5*DT and DT/6. once, and the slopes of stage 2, which the program takes at J = 1 again.
+    assert found.once == found.written - 16
+
+
+def test_what_a_correction_takes_off() -> None:
+    two, four = (operations_per_step(original(p)) for p in ("two-term", "four-term"))
+    assert operations_per_step(corrected("two-term")).written == two.written - 1  # 1660
+    assert operations_per_step(corrected("four-term")).written == four.written - 1  # 2250
+
+
+@pytest.mark.parametrize("program", ["two-term", "four-term"])
+def test_the_matrix_is_built_and_factored_twice(program: str) -> None:
+    found = operations_per_step(original(program))
+    assert found.once < found.written

@@ -99,13 +99,17 @@ def classes_report() -> Report:
         for certainty in dict.fromkeys(each["certainty"] for each in entries)
     ]
     table = Table(_CLASSES, rows)
+    edition = facts("cards/scan")
+    head = [Field(f"{each['siglum']}  ", each["what"]) for each in edition["witness"]]
+    principles = [Field(f"{name:12s}", f"{text}") for name, text in edition["principles"].items()]
     told = ", ".join(f"{number} {certainty}" for certainty, number in sure)
     return Report(
         "cards",
-        [[table], [f"{len(entries)} entries: {told}"]],
+        [head, principles, [table], [f"{len(entries)} entries: {told}"]],
         record=lambda: {
             "classes": [dict(zip(_CLASSES_NAMES, row, strict=True)) for row in rows],
-            "certainty": dict(sure),
+            "certainty": dict(sure), "witnesses": edition["witness"],
+            "principles": edition["principles"],
         },
         data=table,
     )  # fmt: skip

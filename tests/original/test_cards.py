@@ -29,7 +29,7 @@ FORMS = (
 
 @pytest.fixture(scope="module")
 def scan() -> str:
-    """A scan that the tables explain: made of them."""
+    """Return a scan that the tables explain: made of them."""
     lines = [text for text, _ in expected_lines()]
     return "\n".join(["the thesis", cards.HEADING, "", *lines[:40], "```", "", *lines[40:]])
 

@@ -8,7 +8,6 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.history import figures
-from pyharness.history.figure_pictures import curve_numbers
 from pyharness.views.csv import csv_text
 
 ROOT = Path(__file__).parent.parent
@@ -51,7 +50,7 @@ def test_pictures_of_the_report_are_current() -> None:
     for found in figures.findings():
         if found.plan.stem in names:
             path = ROOT / "docs/figures" / f"{found.plan.stem}.csv"
-            assert csv_text(curve_numbers(found)) == path.read_text(), path.name
+            assert csv_text(figures.curve_numbers(found)) == path.read_text(), path.name
             assert path.with_suffix(".svg").exists()
 
 

@@ -14,27 +14,13 @@ from pyharness.model.listing import Listing, corrected, names_of, original, subs
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Stop
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What one listing makes of one scene.
-
-    Attributes
-    ----------
-    listing : Listing
-        The active defects and readings.
-    omega, velocity : float
-        Largest error of any component (rad/s, m/s) at the steps that were run.
-    steps : int
-        Steps that were run.
-    ended : str
-        As in a trajectory.
-    stop : Stop or None
-        What ended the run.
-    """
+    """What one listing makes of a scene: largest errors (rad/s, m/s) at the steps that were run."""
 
     listing: Listing
     omega: float
@@ -67,21 +53,15 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 def entry(name: str) -> dict[str, Any]:
     """Return an entry of the apparatus; InputError where there is none of that name."""
-    for each in entries():
-        if each["id"] == name:
-            return each
-    raise unknown("entry", name, [each["id"] for each in entries()])
+    by_name = {each["id"]: each for each in entries()}
+    if name not in by_name:
+        raise unknown("entry", name, list(by_name))
+    return by_name[name]
 
 
-def effect(
-    scene: Scene,
-    listing: Listing,
-    truth: Reference,
-    may_stop: bool = True,
-    effort: float = 1.0,
-) -> Effect:
+def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
     """Run a listing and hold it against the truth (with velocity) at the scene's times."""
-    run = PROGRAM_REGISTRY[listing.program].run(scene, listing, may_stop=may_stop, effort=effort)
+    run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
     velocity = math.nan if found.velocity is None else found.velocity
     return Effect(listing, max(found.omega), velocity, run.steps, run.ended, run.stop)
@@ -102,25 +82,15 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
     """
     known = entry(name)
     for program in known["programs"]:
+        first, last = original(program), corrected(program)
         if known["kind"] == "reading":
-            listings = (
-                original(program, [name]),
-                original(program),
-                corrected(program, [name]),
-                corrected(program),
-            )
+            listings = original(program, [name]), first, corrected(program, [name]), last
         else:
-            listings = (
-                original(program),
-                subset(program, "original", fix=[name]),
-                subset(program, "corrected", keep=[name]),
-                corrected(program),
-            )
+            fixed = subset(program, "original", fix=[name])
+            listings = first, fixed, subset(program, "corrected", keep=[name]), last
         for case in case_numbers():
             scene, truth = case_scene(case), case_truth(case)
-            yield CaseEffects(
-                program, case, *(effect(scene, listing, truth) for listing in listings)
-            )
+            yield CaseEffects(program, case, *(effect(scene, each, truth) for each in listings))
 
 
 def lattice(
@@ -132,9 +102,8 @@ def lattice(
     names = names_of("defect", program)
     found = []
     for bits in range(2 ** len(names)):
-        active = frozenset(name for i, name in enumerate(names) if bits >> i & 1)
-        listing = Listing(program, active, frozenset(readings))
-        found.append(effect(scene, listing, truth, effort=effort))
+        active = [name for i, name in enumerate(names) if bits >> i & 1]
+        found.append(effect(scene, Listing(program, active, readings), truth, effort=effort))
     return sorted(found, key=_size, reverse=True)
 
 

@@ -45,48 +45,33 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
         for each in entries
     ]
     note = "`defects NAME` shows the statements, the evidence and the effect."
-    return Report(
-        "defects", text=[[Table(_ENTRIES, rows)], [note]], record=lambda: {"entries": entries}
-    )
+    return Report("defects", [[Table(_ENTRIES, rows)], [note]], lambda: {"entries": entries})
 
 
 def entry_report(entry: dict[str, Any], effects: Sequence[CaseEffects]) -> Report:
     """Report one entry whole, with its effect by program and case."""
-    fields = []
-    for name in _FIELDS:
-        value = entry.get(name)
-        if name == "cards":
-            value = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
-        if value:
-            fields.append(Field(f"{name:10s} ", value))
+    cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
+    values = {**entry, "cards": cards}
+    fields = [Field(f"{name:10s} ", values[name]) for name in _FIELDS if values.get(name)]
     text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
     if "original" in entry:
-        text.append(_beside("original", entry["original"], "corrected", entry["corrected"]))
+        text.append(_beside(entry, "original", "corrected"))
     if effects:
         text += _effects(effects, entry["kind"] == "reading")
-    return Report(
-        "defects",
-        text,
-        record=lambda: {
-            "entry": entry,
-            "effects": [
-                {
-                    "program": each.program,
-                    "case": each.case,
-                    **{name: _effect_record(getattr(each, name)) for name in _LISTINGS},
-                }
-                for each in effects
-            ],
-        },
-    )
+
+    def record() -> dict[str, Any]:
+        found = []
+        for each in effects:
+            under = {name: _effect_record(getattr(each, name)) for name in _LISTINGS}
+            found.append({"program": each.program, "case": each.case, **under})
+        return {"entry": entry, "effects": found}
+
+    return Report("defects", text, record)
 
 
-def _beside(left_head: str, left: str, right_head: str, right: str) -> list[str]:
+def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
     """Return two texts side by side under their heads."""
-    columns = [
-        [head, "-" * _HALF, *textwrap.wrap(text, _HALF)]
-        for head, text in ((left_head, left), (right_head, right))
-    ]
+    columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
     pairs = zip_longest(*columns, fillvalue="")
     return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
 
@@ -104,12 +89,11 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
     ]
     for program in dict.fromkeys(each.program for each in effects):
         rows = []
-        for each in effects:
-            if each.program == program:
-                row: list[Any] = [each.case]
-                for found in (getattr(each, name) for name in _LISTINGS):
-                    row += [found.omega, found.velocity, _stop(found)]
-                rows.append(row)
+        for each in (each for each in effects if each.program == program):
+            row: list[Any] = [each.case]
+            for found in (getattr(each, name) for name in _LISTINGS):
+                row += [found.omega, found.velocity, _stop(found)]
+            rows.append(row)
         told.append([program, Table(_EFFECTS, rows)])
     return told
 

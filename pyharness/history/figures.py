@@ -1,37 +1,48 @@
-"""Figures 6 to 12 of the thesis as findings: curves, reference, caption; nothing is drawn here."""
+"""Figures 6 to 12 of the thesis: curves over the reference, their pictures and their report."""
 
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.records import build_record
+from pyharness.model.report import Picture, Report, Table, numbers, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 SETS = {"original": original, "corrected": corrected}
 ENDINGS = ("svg", "png", "csv")
+# Told apart without colour: by dash, width and marker, and by where the markers stand.
+_REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
+_STYLES = {
+    "two-term": ("#1040a0", (0, (6, 2)), 1.3, "o", (2, 15)),
+    "four-term": ("#000000", (0, (1, 1.3)), 1.9, "s", (7, 15)),
+    "runge-kutta": ("#b02018", "-", 0.9, "^", (12, 15)),
+}
+_STYLE = ("color", "linestyle", "linewidth", "marker", "markevery")
+_MARKERS: dict[str, Any] = {"markersize": 5.5, "markerfacecolor": "white", "markeredgewidth": 1.1}
+_END: dict[str, Any] = {
+    "color": "black", "marker": "X", "markersize": 9, "markeredgecolor": "white",
+    "linestyle": "none", "zorder": 5, "clip_on": False,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """One figure of one set, before anything is computed for it.
+    """One figure of one of `SETS`, before anything is computed for it.
 
-    Attributes
-    ----------
-    number, part : int, str
-        As the thesis numbers it; the part is `A`, `B` or empty.
-    set : str
-        A name in `SETS`.
-    case : int
-        The case that it shows.
-    programs : tuple of str
-        The programs whose curves it holds.
-    caption, source : str
-        What it shows, in our words, and where the thesis says so.
+    Number and part as the thesis has them, the part `A`, `B` or empty; the caption is in our
+    words, and the source is where the thesis says so.
     """
 
     number: int
@@ -45,9 +56,8 @@ class FigurePlan:
     @property
     def stem(self) -> str:
         """The name of its files without their endings."""
-        return f"figure-{self.number:02d}{self.part.lower()}" + (
-            "-corrected" if self.set == "corrected" else ""
-        )
+        of_set = "-corrected" if self.set == "corrected" else ""
+        return f"figure-{self.number:02d}{self.part.lower()}{of_set}"
 
     @property
     def files(self) -> list[str]:
@@ -67,10 +77,23 @@ class Curve:
     listing: Listing
     trajectory: Trajectory
 
+    @property
+    def ending(self) -> str:
+        """Where it ends before the last step, in a few words; empty where it does not."""
+        run = self.trajectory
+        if run.stop is not None:
+            return f"stopped at step {run.stop.step} by {run.stop.variable}"
+        return f"overflow after step {run.steps}" if run.ended != "complete" else ""
+
+    @property
+    def label(self) -> str:
+        """Its program, and where it ends."""
+        return self.listing.program + (f" ({self.ending})" if self.ending else "")
+
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A figure with its numbers."""
+    """A figure with its numbers; its curves end where the program ended."""
 
     plan: FigurePlan
     scene: Scene
@@ -80,41 +103,131 @@ class FigureFinding:
 
 def plans() -> list[FigurePlan]:
     """Return all figures, those from the original programs first."""
-    return [_plan(entry, each) for each in SETS for entry in facts("figures")["figure"]]
+    return [
+        FigurePlan(
+            entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
+            entry["caption"], entry["source"],
+        )
+        for each in SETS
+        for entry in facts("figures")["figure"]
+    ]  # fmt: skip
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Compute figure after figure, in the order of `plans`.
-
-    Yields
-    ------
-    FigureFinding
-        Its curves end where the program ended.
-
-    Raises
-    ------
-    NotBuiltError
-        Where the extension is not built.
-    """
+    """Compute figure after figure, in the order of `plans`."""
     truths: dict[int, Reference] = {}
     for plan in plans():
         scene = case_scene(plan.case)
         if plan.case not in truths:
             truths[plan.case] = reference(scene, scene.times())
-        curves = []
-        for program in plan.programs:
-            listing = SETS[plan.set](program)
-            curves.append(Curve(listing, PROGRAM_REGISTRY[program].run(scene, listing)))
-        yield FigureFinding(plan, scene, truths[plan.case], tuple(curves))
+        listings = map(SETS[plan.set], plan.programs)
+        curves = tuple(Curve(listing, run_program(scene, listing)) for listing in listings)
+        yield FigureFinding(plan, scene, truths[plan.case], curves)
 
 
-def _plan(entry: dict[str, Any], which: str) -> FigurePlan:
-    return FigurePlan(
-        number=entry["number"],
-        part=entry.get("part", ""),
-        set=which,
-        case=entry["case"],
-        programs=tuple(entry[which]),
-        caption=entry["caption"],
-        source=entry["source"],
+def figures_report(findings: Sequence[FigureFinding]) -> Report:
+    """Report the files that were drawn, a line for each figure."""
+    rows = []
+    for each in findings:
+        curves = ", ".join(curve.label for curve in each.curves)
+        rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", each.plan.case, curves])
+    return Report(
+        "figures",
+        text=[[Table(words("files case curves"), rows)]],
+        record=lambda: {"figures": list(map(_record, findings)), "build": build_record()},
     )
+
+
+def _record(finding: FigureFinding) -> dict[str, Any]:
+    plan = finding.plan
+    return {
+        "figure": plan.title,
+        **{name: getattr(plan, name) for name in ("case", "set", "caption", "source", "files")},
+        "curves": [
+            {
+                "program": each.listing.program,
+                "listing": each.listing.label,
+                "steps": each.trajectory.steps,
+                "ended": each.trajectory.ended,
+            }
+            for each in finding.curves
+        ],
+    }
+
+
+def curve_numbers(finding: FigureFinding) -> Table:
+    """Return the plotted numbers: omega (rad/s) by curve and time (s)."""
+    truth = finding.reference
+    rows = [
+        ["reference", "", t, None, *omega]
+        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
+    ]
+    for curve in finding.curves:
+        run, name = curve.trajectory, [curve.listing.program, curve.listing.label]
+        table = np.column_stack([run.time, run.recorded_time, run.omega])
+        rows += [[*name, *row] for row in table.tolist()]
+    return numbers("curve listing time recorded_time omega1 omega2 omega3", rows)
+
+
+def figure_picture(finding: FigureFinding) -> Picture:
+    """Draw a figure: its curves over the reference."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
+    axes = figure.subplots(3, 1, sharex=True)
+    truth = finding.reference
+    for row in range(3):
+        axes[row].plot(truth.time, truth.omega[:, row], label="reference", **_REFERENCE)
+        bottom, top = _frame(finding, row)
+        axes[row].set_ylim(bottom, top)
+        for curve in finding.curves:
+            _draw(axes[row], curve, row, bottom, top)
+        axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        axes[row].grid(visible=True, linewidth=0.3)
+        axes[row].ticklabel_format(useOffset=False)
+    axes[2].set_xlabel("time (s)")
+    axes[2].set_xlim(0.0, finding.scene.steps * finding.scene.step_size)
+    figure.align_ylabels()
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=2, handlelength=5.0, frameon=False
+    )
+    figure.suptitle(_heading(finding), fontsize=10)
+    return Picture(figure, curve_numbers(finding))
+
+
+def _heading(finding: FigureFinding) -> str:
+    plan, scene = finding.plan, finding.scene
+    title = f"{plan.title}. Case {scene.case}: {scene.name}; {plan.set} programs"
+    note = f"Reference: {finding.reference.source}."
+    if any(curve.ending for curve in finding.curves):
+        note += " Cross: the program ends."
+    return "\n".join([title, *textwrap.wrap(plan.caption, 98), note])
+
+
+def _draw(axes: "Axes", curve: Curve, row: int, bottom: float, top: float) -> None:
+    run = curve.trajectory
+    style: dict[str, Any] = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
+    height = top - bottom
+    # Far outside the frame a renderer loses its way: there the curve may be anywhere.
+    shown = np.clip(run.omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
+    axes.plot(run.time, shown, label=curve.label, zorder=3, **style, **_MARKERS)
+    if curve.ending and len(run.time):
+        axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
+
+
+def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
+    """Return the frame: all of what stays near the reference; what diverges leaves it."""
+    truth = finding.reference.omega
+    least, largest = float(truth[:, row].min()), float(truth[:, row].max())
+    # A curve further off than the fastest turn of the body is on its way out of every picture.
+    far = float(np.abs(truth).max())
+    near = max(0.6 * (largest - least), 0.01 * far)
+    low, high = least, largest
+    for curve in finding.curves:
+        omega = curve.trajectory.omega[:, row]
+        bottom, top = float(omega.min(initial=least)), float(omega.max(initial=largest))
+        low = min(low, bottom if bottom > least - far else least - near)
+        high = max(high, top if top < largest + far else largest + near)
+    margin = max(0.06 * (high - low), 0.001 * far, 1e-12)
+    return low - margin, high + margin

@@ -6,17 +6,20 @@ programs, and the programs are held against it while their step is halved.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, names_of, original, subset
+from pyharness.model.records import scene_record
+from pyharness.model.report import Column, Report, Section, Table, digits, short
 from pyharness.model.scene import Scene
+from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import Array
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 _TOLERANCE = 1e-11
@@ -27,21 +30,22 @@ TENDS_TO = {
     "four-term": "the true solution",
     "runge-kutta": "2 y(t/2) - y(0), y the true solution",
 }
+SLOW_SLOPES = "w' = F(p, t) with p' = F(p, t) / 2, p(0) = w(0)"
 NOTHING = "nothing: TIME = t^2/(2h) + t/2 leaves every bound"
+
+_STEP = digits("g")
+_COLUMNS = (
+    Column("step", _STEP, unit="s", full=_STEP),
+    Column("from the limit", short, unit="rad/s"),
+    Column("from the truth", short, unit="rad/s"),
+)
+
+Rate = Callable[[float, Sequence[float]], list[float]]
 
 
 @dataclass(frozen=True)
 class Halving:
-    """A original program at one step size.
-
-    Attributes
-    ----------
-    step_size : float
-        s.
-    from_limit, from_truth : float
-        Largest distance of any component of omega (rad/s) at the times of the largest step;
-        infinite where the run overflowed.
-    """
+    """Largest distances of any omega (rad/s) at one step size (s); infinite after an overflow."""
 
     step_size: float
     from_limit: float
@@ -50,19 +54,7 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a original program tends to, and how it comes near.
-
-    Attributes
-    ----------
-    program : str
-        Which.
-    tends_to : str
-        The limit in words.
-    halvings : tuple of Halving
-        From the scene's own step downward.
-    order : float
-        Power of the step with which the distance from the limit falls, at the last halving.
-    """
+    """What a original program tends to, how it comes near, and with which power of the step."""
 
     program: str
     tends_to: str
@@ -73,22 +65,9 @@ class Limit:
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
     """Hold a original program, without its stop test, against its limit.
 
-    Parameters
-    ----------
-    program : str
-        One of the three.
-    scene : Scene
-        Where the torque varies with time, the collocation programs have no limit, and the
-        Runge-Kutta program's is found from its limit equations.
-    halvings : int
-        How often the step is halved.
-    effort : float
-        Factor on the work that is done before giving up.
-
-    Raises
-    ------
-    InputError
-        Where that is not enough.
+    Where the torque varies with time, the collocation programs have no limit, and the Runge-Kutta
+    program's is found from its limit equations. InputError where the work is more than `effort`
+    allows.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -96,14 +75,13 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
     found = []
     for parts in (2**k for k in range(halvings + 1)):
         finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
-        run = PROGRAM_REGISTRY[program].run(
-            finer, original(program), may_stop=False, velocity=False, effort=effort
-        )
+        run = run_program(finer, original(program), may_stop=False, velocity=False, effort=effort)
         omega = run.omega[parts - 1 :: parts]
-        distances = []
-        for goal in (wanted, truth.omega):
-            complete = run.ended == "complete" and len(goal) == len(omega)
-            distances.append(float(np.abs(omega - goal).max()) if complete else math.inf)
+        complete = run.ended == "complete"
+        distances = (
+            float(np.abs(omega - goal).max()) if complete and len(goal) == len(omega) else math.inf
+            for goal in (wanted, truth.omega)
+        )
         found.append(Halving(finer.step_size, *distances))
     last, before = found[-1].from_limit, found[-2].from_limit
     finite = math.isfinite(before) and math.isfinite(last) and min(before, last) > 0.0
@@ -115,22 +93,22 @@ def _limit_solution(
 ) -> tuple[Array, str]:
     """Return the limit at `times`, NaN where there is none, and its name."""
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
+    start = list(scene.omega)
     if program == "runge-kutta":
         if not scene.torque.varies:
             half = reference(scene, [t / 2.0 for t in times], effort=effort)
             return 2.0 * half.omega - np.array(scene.omega), TENDS_TO[program]
-        return _slow_slopes(
-            scene, times, scale, effort
-        ), "w' = F(p, t) with p' = F(p, t) / 2, p(0) = w(0)"
+        rows = _solved(_slow_slopes(scene), start + start, times, scale, effort)
+        return rows[:, 3:], SLOW_SLOPES
     if scene.torque.varies:
         return np.full((len(times), 3), math.nan), NOTHING
     if program == "four-term":
         return truth.omega, TENDS_TO[program]
-    return _extrapolated(scene, times, scale, effort), TENDS_TO[program]
+    return _solved(_extrapolated(scene), start, times, scale, effort), TENDS_TO[program]
 
 
-def _extrapolated(scene: Scene, times: Sequence[float], scale: float, effort: float) -> Array:
-    """Solve the limit equation of the two-term program.
+def _extrapolated(scene: Scene) -> Rate:
+    """Return the limit equation of the two-term program.
 
     In step n the points are t/3 and 2t/3, t = n h, beyond the step's beginning. The slope there
     along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F); the line through its
@@ -144,11 +122,11 @@ def _extrapolated(scene: Scene, times: Sequence[float], scale: float, effort: fl
         quadratic = (a * f[1] * f[2], b * f[0] * f[2], c * f[0] * f[1])
         return [x - 2.0 / 9.0 * t * t * q for x, q in zip(f, quadratic, strict=True)]
 
-    return _solved(rate, list(scene.omega), times, scale, effort)
+    return rate
 
 
-def _slow_slopes(scene: Scene, times: Sequence[float], scale: float, effort: float) -> Array:
-    """Solve the limit equations of the Runge-Kutta program where the torque varies.
+def _slow_slopes(scene: Scene) -> Rate:
+    """Return the limit equations of the Runge-Kutta program where the torque varies.
 
     U(1) = p gains h/2 F(p) a step, and the result gains h F(p): slopes are taken at a point that
     moves at half speed.
@@ -159,15 +137,11 @@ def _slow_slopes(scene: Scene, times: Sequence[float], scale: float, effort: flo
         f = right_hand_side(t, state[:3])
         return [x / 2.0 for x in f] + f
 
-    return _solved(rate, [*scene.omega, *scene.omega], times, scale, effort)[:, 3:]
+    return rate
 
 
 def _solved(
-    rate: Callable[[float, Sequence[float]], list[float]],
-    start: list[float],
-    times: Sequence[float],
-    scale: float,
-    effort: float,
+    rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> Array:
     """Return the solution at `times`; NaN from where it leaves every bound."""
     from scipy.integrate import solve_ivp
@@ -192,15 +166,9 @@ def _solved(
     bounded.terminal = True  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):
         result = solve_ivp(
-            counted,
-            (0.0, times[-1]),
-            start,
-            method="DOP853",
-            t_eval=times,
-            events=bounded,
-            rtol=_TOLERANCE,
-            atol=_TOLERANCE * scale,
-        )
+            counted, (0.0, times[-1]), start, method="DOP853", t_eval=times, events=bounded,
+            rtol=_TOLERANCE, atol=_TOLERANCE * scale,
+        )  # fmt: skip
     rows = np.full((len(times), len(start)), math.nan)
     if len(result.t):  # else y is an empty list
         rows[: len(result.t)] = result.y.T
@@ -215,11 +183,10 @@ def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
     """
     found = {}
     for program in PROGRAMS:
-        run = PROGRAM_REGISTRY[program].run
-        before = run(scene, original(program))
+        before = run_program(scene, original(program))
         names = []
         for name in names_of("defect", program):
-            after = run(scene, subset(program, "original", fix=[name]))
+            after = run_program(scene, subset(program, "original", fix=[name]))
             same_end = (after.steps, after.ended) == (before.steps, before.ended)
             if same_end and _same(before.omega, after.omega):
                 names.append(name)
@@ -232,8 +199,26 @@ def _same(first: Array, second: Array) -> bool:
     return bool(np.abs(first - second).max(initial=0.0) <= 1e-11 * scale)
 
 
-def tends_elsewhere(found: Limit) -> bool:
-    """Whether the program comes near its limit while its distance from the truth stays."""
-    nearer = found.halvings[-1].from_limit < found.halvings[0].from_limit / 8.0
-    first, last = found.halvings[0].from_truth, found.halvings[-1].from_truth
-    return nearer and last > first / 2.0
+def limits_report(
+    scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
+) -> Report:
+    """Report what each program tends to, and the defects that change nothing, by program."""
+    text: list[Section] = [heading(scene)]
+    data = []
+    for each in found:
+        rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]
+        data += [[each.program, *row] for row in rows]
+        title = f"original {each.program}: tends to {each.tends_to}"
+        text.append([title, Table(_COLUMNS, rows), f"order {each.order:.2f} toward the limit"])
+    hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
+    text.append(["defects that change no omega here, corrected alone:", "; ".join(hidden)])
+    return Report(
+        "limits",
+        text,
+        record=lambda: {
+            "scene": scene_record(scene),
+            "limits": [asdict(each) for each in found],
+            "invisible": {name: list(each) for name, each in invisible.items()},
+        },
+        data=Table((Column("program"), *_COLUMNS), data),
+    )

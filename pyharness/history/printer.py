@@ -2,32 +2,30 @@
 
 The page is what paper showed: the first character of each record, the carriage control, is
 taken off. It is always a blank (`data/printer.toml` has the FORMATs and what is conjecture).
+FORMATs are written by a library; FORTRAN 77 and the paper of 1982 have two words of their own.
 """
 
+import math
+import re
+from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
-from pyharness.history.fortran_format import write
 from pyharness.model.facts import facts
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
+# Zero has no minus sign (FORTRAN 77, 13.5.9).
+_MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
+# What is not finite does not fit: the machine printed R or I there, and asterisks say no less.
+_TOO_WIDE = 1e300
+
 
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
-    """Return the page of a program.
+    """Return the page of a program, by its FORMATs, without blanks at the ends of lines.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its moments and torques are the header; it must have moments.
-    program : str
-        The program whose FORMATs are taken.
-    trajectory : Trajectory
-        One line for each of its rows; that of a stop is the last.
-
-    Returns
-    -------
-    str
-        Lines without blanks at their ends.
+    The scene's moments, which it must have, and torques are the header; then one line for each
+    row, that of a stop the last.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -35,9 +33,8 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     records = write(formats["header"], [value for pair in pairs for value in pair])
     records += write(formats["heads"], [])
     assert trajectory.velocity is not None
-    for index, (omega, velocity) in enumerate(
-        zip(trajectory.omega.tolist(), trajectory.velocity.tolist(), strict=True)
-    ):
+    rows = zip(trajectory.omega.tolist(), trajectory.velocity.tolist(), strict=True)
+    for index, (omega, velocity) in enumerate(rows):
         numbers = [index + 1]
         if trajectory.ier is not None:
             numbers.append(int(trajectory.ier[index]))
@@ -47,17 +44,27 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 
 def formats_of(program: str) -> dict[str, Any]:
     """Return the FORMATs of a program, with what is certain about them."""
-    for entry in facts("printer")["program"]:
-        if entry["name"] == program:
-            formats: dict[str, Any] = entry
-            return formats
-    raise KeyError(program)
+    formats: dict[str, dict[str, Any]] = {
+        each["name"]: each for each in facts("printer")["program"]
+    }
+    return formats[program]
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
     """Return the torques that the cards of the deck set: a law of time stands on none."""
-    for entry in facts("printer")["initial_torque"]:
-        if entry["case"] == scene.case:
-            first, second, third = entry["torque"]
-            return first, second, third
-    return scene.torque.constant
+    cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
+    first, second, third = cards.get(scene.case, scene.torque.constant)
+    return first, second, third
+
+
+def write(text: str, values: Sequence[float]) -> list[str]:
+    """Return the records of one WRITE by a FORMAT, the carriage control included."""
+    printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
+    return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
+
+
+@cache
+def _writer(text: str) -> Any:
+    from fortranformat import FortranRecordWriter
+
+    return FortranRecordWriter(text)

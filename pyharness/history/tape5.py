@@ -9,8 +9,7 @@ import numpy as np
 
 from pyharness.model.trajectory import Trajectory
 
-_ITEMS = 7
-_RECORD = np.dtype([("head", "<i4"), ("items", "<f8", (_ITEMS,)), ("tail", "<i4")])
+_RECORD = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
 
 
 def records(trajectory: Trajectory) -> bytes:

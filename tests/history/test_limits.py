@@ -1,6 +1,6 @@
 """What the listings compute: each comes near its own limit, and stays away from the truth."""
 
-import itertools
+import json
 import math
 from dataclasses import replace
 
@@ -9,40 +9,47 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.cli.main import main
-from pyharness.history.limits import NOTHING, invisible, limit, tends_elsewhere
+from pyharness.history.limits import NOTHING, Limit, invisible, limit
 from pyharness.model.listing import original
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.original import compiled
 
 
-@pytest.mark.parametrize("case", [3, 4, 5])
-@pytest.mark.parametrize("program", ["two-term", "runge-kutta"])
+def _tends_elsewhere(found: Limit) -> bool:
+    """Whether the program comes near its limit while its distance from the truth stays."""
+    first, last = found.halvings[0], found.halvings[-1]
+    return last.from_limit < first.from_limit / 8.0 and last.from_truth > first.from_truth / 2.0
+
+
+@pytest.mark.parametrize(
+    ("program", "case"),
+    [*((name, case) for name in ("two-term", "runge-kutta") for case in (3, 4, 5)),
+     ("runge-kutta", 7)],
+)  # fmt: skip
 def test_program_tends_elsewhere_with_first_order(program: str, case: int) -> None:
     found = limit(program, case_scene(case))
-    assert tends_elsewhere(found)
+    assert _tends_elsewhere(found)
     assert found.order == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("case", [2, 3, 4, 5, 6])
 def test_four_term_tends_to_the_truth(case: int) -> None:
     found = limit("four-term", case_scene(case))
-    assert not tends_elsewhere(found)
+    assert not _tends_elsewhere(found)
     assert found.order == pytest.approx(2.0, abs=0.1)
 
 
 def test_runge_kutta_in_case_2_is_twice_a_slow_sine() -> None:
     """2 y(t/2) - y(0) = (2 sin 2.5 t, 2 cos 2.5 t - 1, 10): beyond the sine, as V.2 saw."""
-    scene = replace(case_scene(2), step_size=1e-5, steps=100_000)
-    program = PROGRAM_REGISTRY["runge-kutta"]
-    run = program.run(scene, original("runge-kutta"), may_stop=False)
+    scene = replace(case_scene(2), step_size=1e-4, steps=10_000)
+    run = compiled.run(scene, original("runge-kutta"), may_stop=False)
     t = run.time
     wanted = np.column_stack([2 * np.sin(2.5 * t), 2 * np.cos(2.5 * t) - 1, np.full_like(t, 10.0)])
-    assert np.abs(run.omega - wanted).max() < 2e-4
+    assert np.abs(run.omega - wanted).max() < 2e-3
 
 
 def test_two_term_in_case_6_follows_its_limit_into_the_blow_up() -> None:
     """The limit equation leaves every bound before t = 1; before that the program follows it."""
-    scene = replace(case_scene(6), steps=30)
-    assert tends_elsewhere(limit("two-term", scene))
+    assert _tends_elsewhere(limit("two-term", replace(case_scene(6), steps=30)))
     assert math.isinf(limit("two-term", case_scene(6), 2).halvings[0].from_limit)
 
 
@@ -51,36 +58,8 @@ def test_collocation_in_case_7_tends_to_nothing(program: str) -> None:
     """The distance from the truth doubles with every halving of the step."""
     found = limit(program, case_scene(7), 3)
     assert found.tends_to == NOTHING
-    distances = [h.from_truth for h in found.halvings]
-    for before, after in itertools.pairwise(distances):
-        assert after == pytest.approx(2.0 * before, rel=0.05)
-
-
-def test_runge_kutta_with_a_varying_torque_has_its_own_limit() -> None:
-    found = limit("runge-kutta", case_scene(7))
-    assert tends_elsewhere(found)
-    assert found.order == pytest.approx(1.0, abs=0.05)
-
-
-def test_wrong_limit_is_not_taken_for_the_right_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The plant: 1/9 in place of 2/9 in the limit equation; y(t/2) left undoubled."""
-    import pyharness.history.limits as room
-
-    real = room._limit_solution
-
-    def wrong(*args: object) -> tuple[np.ndarray, str]:
-        goal, name = real(*args)  # type: ignore[arg-type]
-        return goal * 1.01, name
-
-    monkeypatch.setattr(room, "_limit_solution", wrong)
-    for program in ("two-term", "runge-kutta"):
-        assert not tends_elsewhere(limit(program, case_scene(5)))
-
-
-def test_names_stay_whole(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["limits", "--case", "4", "--halvings", "1"]) == 0
-    out = capsys.readouterr().out
-    assert not [line for line in out.splitlines() if line.endswith("-")]
+    distances = np.array([each.from_truth for each in found.halvings])
+    np.testing.assert_allclose(distances[1:] / distances[:-1], 2.0, rtol=0.05)
 
 
 def test_defects_that_the_known_solutions_hide() -> None:
@@ -93,4 +72,21 @@ def test_defects_that_the_known_solutions_hide() -> None:
     hidden = invisible(case_scene(1))
     assert hidden["two-term"] == ("dt-accumulates", "x3-reads-acl2", "torque-held")
     assert "stage-base" not in hidden["runge-kutta"]
-    assert "dt-accumulates" not in invisible(case_scene(5))["two-term"]
+    for case in (3, 4, 5, 6):  # four terms follow f from anywhere, two do not
+        hidden = invisible(case_scene(case))
+        assert "dt-accumulates" in hidden["four-term"]
+        assert "dt-accumulates" not in hidden["two-term"]
+
+
+def test_limits_in_every_form(capsys: pytest.CaptureFixture[str]) -> None:
+    def told(*options: str) -> str:
+        assert main(["limits", "--case", "5", "--halvings", "2", *options]) == 0
+        return capsys.readouterr().out
+
+    text = told()
+    assert "2 y(t/2) - y(0)" in text
+    assert all(len(line) <= 100 and not line.endswith("-") for line in text.splitlines())
+    record = json.loads(told("--program", "two-term", "--format", "json"))
+    distances = [each["from_limit"] for each in record["limits"][0]["halvings"]]
+    assert np.all(np.diff(distances) < 0)
+    assert told("--format", "csv").count("\n") == 1 + 3 * 3

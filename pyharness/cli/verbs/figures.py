@@ -17,8 +17,6 @@ def declare(parser: shared.Parser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Compute and draw everything, then write everything."""
     from pyharness.cli.output import check_folder, write_folder
-    from pyharness.history.figure_pictures import figure_picture
-    from pyharness.history.figures_report import figures_report
     from pyharness.views.pictures import check_matplotlib, saved
     from pyharness.views.render import render
 
@@ -33,10 +31,10 @@ def run(options: argparse.Namespace) -> int:
     for number, finding in enumerate(room.findings(), 1):
         shared.progress(f"figures: {number} of {len(plans)}")
         svg, png, _ = finding.plan.files
-        content |= saved(figure_picture(finding), svg, png)
+        content |= saved(room.figure_picture(finding), svg, png)
         drawn.append(finding)
     shared.progress("")
     write_folder(options.out, content, "--out")
     # The folder takes the files; what was drawn is told here.
-    shared.emit(render(figures_report(drawn), options.format or "table"), None)
+    shared.emit(render(room.figures_report(drawn), options.format or "table"), None)
     return 0

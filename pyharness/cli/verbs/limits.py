@@ -3,8 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.limits import invisible, limit
-from pyharness.history.limits_report import limits_report
+from pyharness.history.limits import invisible, limit, limits_report
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS
 

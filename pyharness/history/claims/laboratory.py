@@ -7,13 +7,14 @@ from functools import cache
 
 import numpy as np
 
+from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.collocation import interval
 from pyharness.original.equations import Vector, omega_rate
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 COLLOCATION = ("two-term", "four-term")
@@ -23,15 +24,8 @@ COLLOCATION = ("two-term", "four-term")
 class Assumptions:
     """What the thesis does not say.
 
-    Attributes
-    ----------
-    start : Triple or None
-        omega(0) of the cases whose start is not given (rad/s); None for those of Table 1 as
-        `cases.toml` has them.
-    readings : frozenset of str
-        Readings that are not the adopted ones.
-    steps : int
-        Steps of a run.
+    `start` is omega(0) of the cases whose start is not given (rad/s), None for those of
+    `cases.toml`; `readings` are those selected that are not the adopted ones.
     """
 
     start: Triple | None = None
@@ -41,17 +35,7 @@ class Assumptions:
 
 @dataclass(frozen=True)
 class Laboratory:
-    """The three programs with their defects, or without.
-
-    Attributes
-    ----------
-    is_original : bool
-        Whether the original programs are run, or the corrected ones.
-    assumptions : Assumptions
-        Under which they run.
-    fixed : frozenset of str
-        Defects corrected even in the original programs: what would the verdict be without this one?
-    """
+    """The three programs with their defects, but for those `fixed`, or corrected altogether."""
 
     is_original: bool
     assumptions: Assumptions = field(default_factory=Assumptions)
@@ -63,13 +47,14 @@ class Laboratory:
         readings = self.assumptions.readings & set(names_of("reading", program))
         return Listing(program, frozenset(defects), readings)
 
-    def scene(self, case: int) -> Scene:
-        """Return a case under the assumptions."""
-        return _scene(case, self.assumptions.start, self.assumptions.steps)
+    def scene(self, case: int, parts: int = 1) -> Scene:
+        """Return a case under the assumptions, with `parts` in steps so much smaller."""
+        scene = _scene(case, self.assumptions.start, self.assumptions.steps)
+        return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
-        """Run a program on a case; with `parts`, in steps so much smaller over the same time."""
-        return _run(self.listing(program), self.scene(case), may_stop, parts)
+        """Run a program on a case."""
+        return _run(self.listing(program), self.scene(case, parts), may_stop)
 
     def truth(self, case: int) -> Reference:
         """Return the true solution of a case at its steps."""
@@ -85,11 +70,23 @@ class Laboratory:
     def models(self, case: int, terms: int) -> Array:
         """Return omega of the collocation model of so many terms, at points k/(n+1).
 
-        In the original the points leave the interval, unless `dt-accumulates` is corrected, and the
-        torque must be constant; the thesis lists neither the three- nor the five-term model.
+        In the original they leave the interval, and the torque must be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates)
+
+    def required_constant(self, case: int) -> float:
+        """Return the Lipschitz constant (1/s) that lets the Runge-Kutta program run all steps."""
+        scene, listing = self.scene(case), self.listing("runge-kutta")
+        constant = 0.0
+        for _ in range(6 * scene.steps):
+            stop = run_program(scene, listing, lipschitz=constant or 1e-300).stop
+            if stop is None:
+                break
+            constant = stop.quotient * (1.0 + 1e-12)
+            if math.isinf(constant):
+                break
+        return constant
 
 
 def distance(first: Array, second: Array) -> float:
@@ -101,8 +98,7 @@ def distance(first: Array, second: Array) -> float:
 
 def ranges(truth: Reference) -> Array:
     """Return how far each component moves (rad/s)."""
-    spread: Array = truth.omega.max(axis=0) - truth.omega.min(axis=0)
-    return spread
+    return np.asarray(np.ptp(truth.omega, axis=0))
 
 
 def largest(truth: Reference) -> float:
@@ -112,18 +108,15 @@ def largest(truth: Reference) -> float:
 
 @cache
 def _scene(case: int, start: Triple | None, steps: int) -> Scene:
-    from pyharness.model.facts import facts
-
     scene = replace(case_scene(case), steps=steps)
-    if start is not None and case in facts("claims")["assumed"]["cases"]:
-        scene = replace(scene, omega=start)
-    return scene
+    if start is None or case not in facts("claims")["assumed"]["cases"]:
+        return scene
+    return replace(scene, omega=start)
 
 
 @cache
-def _run(listing: Listing, scene: Scene, may_stop: bool, parts: int) -> Trajectory:
-    finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
-    return PROGRAM_REGISTRY[listing.program].run(finer, listing, may_stop=may_stop)
+def _run(listing: Listing, scene: Scene, may_stop: bool) -> Trajectory:
+    return run_program(scene, listing, may_stop=may_stop)
 
 
 @cache
@@ -148,19 +141,3 @@ def _model(scene: Scene, terms: int, accumulates: bool) -> Array:
         state, _ = interval(state, points, h, rates)
         rows.append(state)
     return np.array(rows)
-
-
-def required_constant(laboratory: Laboratory, case: int) -> float:
-    """Return the Lipschitz constant (1/s) that lets the Runge-Kutta program run all its steps."""
-    scene = laboratory.scene(case)
-    listing = laboratory.listing("runge-kutta")
-    program = PROGRAM_REGISTRY["runge-kutta"]
-    constant = 0.0
-    for _ in range(6 * scene.steps):
-        run = program.run(scene, listing, lipschitz=constant or 1e-300)
-        if run.stop is None:
-            return constant
-        constant = run.stop.quotient * (1.0 + 1e-12)
-        if math.isinf(constant):
-            return constant
-    return constant

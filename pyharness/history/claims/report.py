@@ -100,9 +100,7 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
 def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
     entries = [
         {
-            "id": each.claim["id"],
-            "where": each.claim["where"],
-            "quote": each.claim["quote"],
+            **{name: each.claim[name] for name in ("id", "where", "quote")},
             "original": each.original.verdict,
             "corrected": each.corrected.verdict,
             "numbers": {"original": each.original.numbers, "corrected": each.corrected.numbers},
@@ -115,11 +113,8 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 def _hangs_on(judgement: Judgement) -> list[str]:
     """Return the assumptions without which a verdict turns, each once."""
-    names = []
-    for each in judgement.survivals:
-        if not each.survives:
-            names.append("omega(0)" if each.assumption.startswith("omega") else each.assumption)
-    return list(dict.fromkeys(names))
+    turning = (each.assumption for each in judgement.survivals if not each.survives)
+    return list(dict.fromkeys("omega(0)" if x.startswith("omega") else x for x in turning))
 
 
 def _number(x: float) -> str:

@@ -30,25 +30,12 @@ _WORST_CONDITION = 1e8
 
 @dataclass(frozen=True)
 class Member:
-    """One method of the family.
+    """One method of the family; InputError where there is no such method.
 
-    Attributes
-    ----------
-    weighting : str
-        One of `WEIGHTINGS`. Least squares is that of f held (eq. 25 with dR/dc_i = i t**(i-1)).
-    terms : int
-        Powers of t in the trial function, n.
-    points : {"thesis", "gauss"} or tuple of float, or None
-        Where collocation makes the residual vanish, in parts of the step: k/(n+1), those of
-        Gauss and Legendre, or n different numbers from 0 to 1. None for the other weightings,
-        and "thesis" for collocation where nothing is given.
-    corrections : int
-        Corrections of the first estimate, k; the thesis's programs do one.
-
-    Raises
-    ------
-    InputError
-        Where there is no such method.
+    The weighting of least squares is that of f held (eq. 25 with dR/dc_i = i t**(i-1)); there are n
+    terms, the powers of t in the trial function, and k corrections of the first estimate. Points
+    are where collocation, and it alone, makes the residual vanish, in parts of the step: k/(n+1),
+    those of Gauss and Legendre, or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -66,9 +53,8 @@ class Member:
             raise InputError(f"corrections is {self.corrections}; allowed: 0 to {MOST_CORRECTIONS}")
         if self.weighting != "collocation":
             if self.points is not None:
-                raise InputError(
-                    f"points have no meaning with {self.weighting}; allowed: with collocation"
-                )
+                text = f"points have no meaning with {self.weighting}; allowed: with collocation"
+                raise InputError(text)
         elif self.points is None:
             object.__setattr__(self, "points", "thesis")
         elif isinstance(self.points, str):
@@ -79,9 +65,8 @@ class Member:
 
     def _check_points(self, points: Sequence[float]) -> None:
         if len(points) != self.terms:
-            raise InputError(
-                f"points: {len(points)} given; allowed: as many as there are terms, {self.terms}"
-            )
+            text = f"points: {len(points)} given; allowed: as many as there are terms, {self.terms}"
+            raise InputError(text)
         for point in points:
             if not 0.0 <= point <= 1.0:
                 raise InputError(f"points: {point:g}; allowed: 0 to 1, in parts of the step")
@@ -110,13 +95,11 @@ def converged_order(member: Member) -> int:
     if member.weighting == "subdomain":
         return n + 1 + (n % 2 == 0)
     nodal = Polynomial.fromroots(grid(member.points, n))
-    order = n
-    while order < 2 * n:
-        moment = (nodal * Polynomial([0.0] * (order - n) + [1.0])).integ()
+    for power in range(n):
+        moment = (nodal * Polynomial.basis(power)).integ()
         if abs(moment(1.0) - moment(0.0)) > 1e-12:
-            break
-        order += 1
-    return order
+            return n + power
+    return 2 * n
 
 
 def predicted_order(member: Member) -> int:
@@ -128,29 +111,14 @@ def predicted_order(member: Member) -> int:
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
-    """Integrate a scene with one member.
+    """Integrate a scene with one member (Jacobs 1982, III.1, eq. 20-27, and IV.2); no velocity.
 
-    Parameters
-    ----------
-    scene : Scene
-        What to integrate.
-    member : Member
-        With what.
-
-    Returns
-    -------
-    Trajectory
-        Without velocity. The first estimate takes the torque at the beginning of the step, the
-        corrections take it at the true times. Error: the power `predicted_order` of the step,
-        and about a unit in the last place a step.
-
-    Notes
-    -----
-    Source: Jacobs 1982, III.1 (eq. 20-27) and IV.2.
+    The first estimate takes the torque at the beginning of the step, the corrections take it at
+    the true times. Error: the power `predicted_order` of the step, and about a unit in the last
+    place a step.
     """
     omega = march(scene, [member])[0]
-    finite = np.isfinite(omega).all(axis=1)
-    rows = len(omega) if finite.all() else int(np.argmin(finite))
+    rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
     time = np.array(scene.times()[:rows])
     scheme = tableau(member.weighting, member.terms, member.points)
     overflow = rows < scene.steps
@@ -168,10 +136,7 @@ def run(scene: Scene, member: Member) -> Trajectory:
 def march(scene: Scene, members: Sequence[Member]) -> Array:
     """Integrate a scene with several members side by side, which costs hardly more than one.
 
-    Returns
-    -------
-    ndarray, shape (members, steps, 3)
-        omega (rad/s); from an overflow on, what is not finite.
+    Returns omega (rad/s), shape (members, steps, 3); from an overflow on, what is not finite.
     """
     schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
     width = max(len(scheme.nodes) for scheme in schemes)
@@ -181,29 +146,25 @@ def march(scene: Scene, members: Sequence[Member]) -> Array:
     weights = np.zeros((len(members), 1, width))
     for i, scheme in enumerate(schemes):
         m = len(scheme.nodes)
-        nodes[i, :m], matrix[i, :m, :m], weights[i, 0, :m] = (
-            scheme.nodes, scheme.matrix, scheme.weights,
-        )  # fmt: skip
+        nodes[i, :m], weights[i, 0, :m] = scheme.nodes, scheme.weights
+        matrix[i, :m, :m] = scheme.matrix
     corrections = np.array([m.corrections for m in members])
-    last = [np.flatnonzero(corrections == k) for k in range(corrections.max() + 1)]
-
+    most = corrections.max()
     h = scene.step_size
     result = np.full((len(members), scene.steps, 3), math.nan)
     start = np.tile(np.array(scene.omega), (len(members), 1, 1))
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
             begin = step * h
-            torque = _torque(scene, np.array([begin]))
-            rates = _rates(scene, torque, start)
+            rates = _rates(scene, _torque(scene, np.array([begin])), start)
             end = start + h * rates
             estimate = start + h * nodes[:, :, None] * rates
             torque = _torque(scene, begin + h * nodes)
-            for k in range(1, len(last)):
+            for k in range(1, most + 1):
                 rates = _rates(scene, torque, estimate)
-                done = last[k]
-                if len(done):
-                    end[done] = start[done] + h * (weights[done] @ rates[done])
-                if k < len(last) - 1:
+                done = corrections == k
+                end[done] = start[done] + h * (weights[done] @ rates[done])
+                if k < most:
                     estimate = start + h * (matrix @ rates)
             start = end
             result[:, step] = end[:, 0]
@@ -213,12 +174,9 @@ def march(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
-    a, b, c = scene.euler_coefficients
-    first, second, third = omega[..., 0], omega[..., 1], omega[..., 2]
-    rates = np.empty(omega.shape)
-    rates[..., 0] = torque[..., 0] + a * second * third
-    rates[..., 1] = torque[..., 1] + b * first * third
-    rates[..., 2] = torque[..., 2] + c * first * second
+    rates = np.empty(omega.shape)  # rows as they are in memory decide how matmul rounds
+    for i, (a, j, k) in enumerate(zip(scene.euler_coefficients, (1, 0, 0), (2, 2, 1), strict=True)):
+        rates[..., i] = torque[..., i] + a * omega[..., j] * omega[..., k]
     return rates
 
 
@@ -229,8 +187,7 @@ def _torque(scene: Scene, times: Array) -> Array:
     if law.varies:
         t = times[..., None]
         torque = torque + np.array(law.rate) * t
-        for amplitude, frequency in law.sines:
-            torque = torque + np.array(amplitude) * np.sin(frequency * t)
-        for amplitude, frequency in law.cosines:
-            torque = torque + np.array(amplitude) * np.cos(frequency * t)
+        for waves, function in ((law.sines, np.sin), (law.cosines, np.cos)):
+            for amplitude, frequency in waves:
+                torque = torque + np.array(amplitude) * function(frequency * t)
     return torque if scene.moments is None else torque / np.array(scene.moments)

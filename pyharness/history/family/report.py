@@ -6,28 +6,19 @@ from dataclasses import asdict
 
 from pyharness.history.family.orders import SLACK, OrderFinding
 from pyharness.model.records import build_record, scene_record
-from pyharness.model.report import (
-    Column,
-    Report,
-    Section,
-    Table,
-    numbers,
-    short,
-    words,
-)
+from pyharness.model.report import Column, Report, Section, Table, numbers, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
     """Report orders and errors, a row for each weighting and n."""
+    names = ("predicted", "measured", "settled", "error")
+    measures = [{name: getattr(each, name) for name in names} for each in found]
     data = [
-        [
-            each.member.weighting, each.member.points_label, each.member.terms,
-            each.member.corrections, each.predicted, each.measured, each.settled, each.error,
-        ]
-        for each in found
-    ]  # fmt: skip
+        [member.weighting, member.points_label, member.terms, member.corrections, *measure.values()]
+        for member, measure in zip((each.member for each in found), measures, strict=True)
+    ]
     page = [heading(scene), *_tables(found), verdict(found)]
     return Report(
         "family",
@@ -35,14 +26,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
         record=lambda: {
             "scene": scene_record(scene),
             "members": [
-                {
-                    **asdict(each.member),
-                    "predicted": each.predicted,
-                    "measured": each.measured,
-                    "settled": each.settled,
-                    "error": each.error,
-                }
-                for each in found
+                asdict(each.member) | measure for each, measure in zip(found, measures, strict=True)
             ],
             "unexpected": _unexpected(found),
             "build": build_record(),

@@ -367,7 +367,7 @@ def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
 
 
 def _line_of(file: str, text: str) -> Place:
-    folder = _PACKAGE / ("history" if file == "printer.py" else "original")
+    folder = _PACKAGE / "original"
     where = [n for n, line in enumerate(_lines(folder / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} stands {len(where)} times in {file}")

@@ -125,6 +125,11 @@ def _literal(value: float) -> str:
     return f"{value!r}".removesuffix("0") if value == int(value) else repr(value)
 
 
+def solver_cards() -> int:
+    """Return the cards of our LEQT1F, comments apart."""
+    return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
+
+
 def compiler() -> str | None:
     """Return the path of the compiler; None where there is none."""
     return shutil.which(COMPILER)

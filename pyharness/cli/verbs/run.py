@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
         name, title, trajectory = _method(options, scene)
 
     def page() -> str:
-        from pyharness.history.printer import page
+        from pyharness.original.printer import page
 
         return page(scene, name, trajectory)
 

@@ -89,6 +89,13 @@ class Laboratory:
         return constant
 
 
+def starts() -> list[Triple]:
+    """Return the initial angular velocities that the thesis shows, and our own (rad/s)."""
+    return [
+        (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
+    ]
+
+
 def distance(first: Array, second: Array) -> float:
     """Return the largest difference of any component at the rows that both have (rad/s)."""
     n = min(len(first), len(second))

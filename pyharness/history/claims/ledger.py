@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from pyharness.history.claims import theory
 from pyharness.history.claims import verdicts as tests
-from pyharness.history.claims.laboratory import Assumptions, Laboratory
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.verdicts import REPRODUCED, Judged
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
@@ -77,15 +78,9 @@ def judge(entry: dict[str, Any]) -> Judgement:
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Run the test of a claim in one laboratory."""
-    judged: Judged = getattr(tests, entry["test"])(laboratory, **entry.get("parameters", {}))
+    test = getattr(tests, entry["test"], None) or getattr(theory, entry["test"])
+    judged: Judged = test(laboratory, **entry.get("parameters", {}))
     return judged
-
-
-def starts() -> list[Triple]:
-    """Return the initial angular velocities that the thesis shows, and our own (rad/s)."""
-    return [
-        (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
-    ]
 
 
 def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:

@@ -15,6 +15,7 @@ _VERDICTS = {
     "not reproduced": ("no", "not reproduced (no)"),
     "false": ("FALSE", "false"),
     "not testable": ("n/t", "not testable (n/t)"),
+    "undecided": ("?", "undecided (?)"),
 }
 
 

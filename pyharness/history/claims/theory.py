@@ -11,15 +11,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
-from pyharness.history.claims.verdicts import (
-    FALSE,
-    IN_PART,
-    NOT_REPRODUCED,
-    NOT_TESTABLE,
-    REPRODUCED,
-    Judged,
-    graded,
-)
+from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, Judged, graded
 from pyharness.history.family.members import Member, run
 from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene, Triple
@@ -39,7 +31,7 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
         share = distance(found.omega, truth.omega) / largest(truth)
         numbers[f"case {case}: closed form against the reference"] = share
     known = max(numbers.values()) <= limit
-    return Judged(FALSE if known else REPRODUCED, numbers)
+    return graded(numbers, not known, otherwise=FALSE)
 
 
 def history_only(lab: Laboratory) -> Judged:
@@ -64,7 +56,7 @@ def hamilton_ordinary(lab: Laboratory, case: int, limit: float) -> Judged:
     omega = np.array([_omega(moments, y) for y in found.y.T])
     share = distance(omega, truth.omega) / largest(truth)
     numbers = {"six ordinary equations against the reference": share}
-    return Judged(FALSE if share <= limit else REPRODUCED, numbers)
+    return graded(numbers, share > limit, otherwise=FALSE)
 
 
 def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
@@ -117,7 +109,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
     numbers = {"bound of the function": 1.0, "largest quotient": float(quotients.max())}
-    return Judged(FALSE if quotients.max() > above else REPRODUCED, numbers)
+    return graded(numbers, bool(quotients.max() <= above), otherwise=FALSE)
 
 
 def local_error(
@@ -130,7 +122,7 @@ def local_error(
             lab.scene(case), lambda scene: _stepped(scene, method)
         )
     near = [abs(each - power) <= within for each in numbers.values()]
-    return Judged(graded(all(near), any(near)), numbers)
+    return graded(numbers, all(near), any(near))
 
 
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
@@ -148,7 +140,7 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
         numbers[f"case {case}: power of the step of the distance"] = power
         same &= apart <= 1e-14 * float(np.abs(truth).max())
         near &= abs(power - 5.0) <= within
-    return Judged(graded(same, near), numbers)
+    return graded(numbers, same, near)
 
 
 def _stepped(scene: Scene, method: str) -> Array:
@@ -209,7 +201,7 @@ def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
     better = all(error < series / 2.0 for error in numbers.values())
     two = {name.partition(":")[0] for name in sorted(numbers, key=lambda n: numbers[n])[:2]}
     numbers["Taylor series: largest error"] = series
-    return Judged(graded(better and two == set(best), better), numbers)
+    return graded(numbers, better and two == set(best), better)
 
 
 def _weighted(t: Array, weight: Array, by: Weights) -> Array:
@@ -231,7 +223,7 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
     truth = lab.truth(case)
     share = distance(found.omega, truth.omega) / largest(truth)
     numbers = {"one-term error over the largest omega": share}
-    return Judged(REPRODUCED if share <= limit else FALSE, numbers)
+    return graded(numbers, share <= limit, otherwise=FALSE)
 
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
@@ -241,7 +233,7 @@ def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
         for case in cases
     }
     none = [each == 0.0 for each in left.values()]
-    return Judged(IN_PART if any(none) and not all(none) else graded(all(none), False), left)
+    return graded(left, all(none), any(none))
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
@@ -253,7 +245,7 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
         if card.statement.startswith("DT=.")
     }
     same = len(numbers) == 3 and set(numbers.values()) == {step}
-    return Judged(REPRODUCED if same else NOT_REPRODUCED, numbers)
+    return graded(numbers, same)
 
 
 def points_inside(lab: Laboratory, case: int) -> Judged:
@@ -266,7 +258,7 @@ def points_inside(lab: Laboratory, case: int) -> Judged:
         inside = last * lengths < lab.scene(case).step_size
         shares.append(float(inside.mean()))
         numbers[f"{program}: share of steps with all points inside"] = shares[-1]
-    return Judged(graded(min(shares) == 1.0, min(shares) >= 0.5, FALSE), numbers)
+    return graded(numbers, min(shares) == 1.0, min(shares) >= 0.5, FALSE)
 
 
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
@@ -276,4 +268,4 @@ def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
         first, second, third = sorted(lab.scene(case).moments or (), reverse=True)
         excess[f"case {case}: largest moment over the sum of the others"] = first / (second + third)
     possible = [each <= 1.0 for each in excess.values()]
-    return Judged(graded(all(possible), False, FALSE), excess)
+    return graded(excess, all(possible), otherwise=FALSE)

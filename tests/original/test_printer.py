@@ -13,12 +13,12 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.cli.main import main
-from pyharness.history.printer import formats_of, page, write
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, original
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled
+from pyharness.original.printer import formats_of, page, write
 
 Capture = pytest.CaptureFixture[str]
 # Only gfortran can be told that zero has no sign and that a tie goes away from it.

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.compare.comparison import Comparison
-from pyharness.methods.picture import mark_end
+from pyharness.methods.report import mark_end
 from pyharness.model.report import Picture, Table, numbers
 from pyharness.model.scene_report import heading
 

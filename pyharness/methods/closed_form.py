@@ -15,15 +15,7 @@ from pyharness.model.trajectory import Trajectory
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene that has a closed form; the tolerance plays no part.
-
-    Raises
-    ------
-    InputError
-        Where the scene has none: torque on a body that is no sphere, or coefficients all of
-        one sign; and where the phase is so large that it has no digit left, or the times and
-        waves are too many.
-    """
+    """Solve a scene that has a closed form; the tolerance plays no part."""
     work = np.array([effort, 0.0])
     if not any(scene.euler_coefficients):
         rows, n_rows, status = extension().sphere_solution(

@@ -1,6 +1,5 @@
 """Gauss collocation, steps halved until two solutions agree."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,41 +34,33 @@ def gauss(stages: int) -> Integrator:
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
     ) -> Trajectory:
-        torque = normalized(scene)[1:]
+        given = normalized(scene)
         if times[-1] == 0.0:
             return trajectory_of(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
         scale = max(map(abs, scene.omega))
-        start = max(scale, _driven(torque, times[-1]))
-        step, spent, reached = _first_step(scene, times), 0, 0.0
+        start = max(scale, _driven(given[1:], times[-1]))
+        lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
+        lengths = lengths[lengths > 0.0]
+        step, spent, reached = _first_step(scene, float(lengths.min())), 0, 0.0
         most = effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
         more = 1.0  # times the steps of the next try that will be needed, as far as known
         pace = 2.0 * stages  # right-hand sides of a step
         before: _Solution | None = None
-        counts = previous = _counts(times, step)
+        counts = previous = _counts(lengths, step)
         while True:
             # Each step takes two iterations at the least.
             steps = float(counts.sum())
             if not step or spent + 2.0 * stages * steps > most:
                 needed = spent + steps * (pace * (more - 1.0) + 2.0 * stages * more)
+                enough = effort * max(needed, 0.5 * pace * more * steps) / most
+                remedies = "take a shorter time, a larger tolerance or more stages"
                 raise TimedError(
                     f"gauss-{stages} gave up at t = {{time}} s after {spent} right-hand sides; "
-                    + advice(
-                        "take a shorter time, a larger tolerance or more stages",
-                        effort,
-                        effort * max(needed, 0.5 * pace * more * steps) / most,
-                    ),
+                    + advice(remedies, effort, enough),
                     reached,
                 )
             found = _Solution(
-                *extension().gauss_solution(
-                    scene.euler_coefficients,
-                    *torque,
-                    scene.omega,
-                    times,
-                    stages,
-                    step,
-                    effort=effort,
-                )
+                *extension().gauss_solution(*given, scene.omega, times, stages, step, effort=effort)
             )
             spent += found.evaluations
             pace = max(pace, found.evaluations / steps)
@@ -91,7 +82,7 @@ def gauss(stages: int) -> Integrator:
                     return trajectory_of(times, found.rows, n, found.status, count, spent)
             before, previous = found, counts
             step *= 0.5
-            counts = _counts(times, step)
+            counts = _counts(lengths, step)
 
     return solve
 
@@ -120,21 +111,17 @@ class _Solution:
         return largest > 1.5 * before > 1e3 * so_far or min(largest, before) > _NEAR_THE_END
 
 
-def _counts(times: Sequence[float], step: float) -> Array:
-    """Return the steps that the kernel takes to each time but 0: equal, `step` at the most."""
-    lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
-    lengths = lengths[lengths > 0.0]
+def _counts(lengths: Array, step: float) -> Array:
+    """Return the steps that the kernel takes in each interval: equal, `step` at the most."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
-def _first_step(scene: Scene, times: Sequence[float]) -> float:
+def _first_step(scene: Scene, shortest: float) -> float:
     """Return a step in which the phase grows by about a half, a whole part of the shortest way.
 
     Equal intervals have then twice as many steps when it is halved.
     """
-    lengths = [abs(t1 - t0) for t0, t1 in itertools.pairwise((0.0, *times)) if t1 != t0]
-    shortest = min(lengths, default=1.0)
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
     for amplitude, frequency in scene.torque.sines + scene.torque.cosines:
         if any(amplitude):

@@ -11,14 +11,7 @@ _HUGE = 1e100  # a factor beyond which none says more
 def propagators(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the derivative of omega at the last time by omega at each time, shape (n, 3, 3).
 
-    Parameters
-    ----------
-    scene : Scene
-        Its coefficients.
-    times : ndarray, shape (n,)
-        s; omega turns by a small angle from each to the next.
-    omega : ndarray, shape (n, 3)
-        The solution there, rad/s.
+    Omega (rad/s, shape (n, 3)) solves the scene, and turns little from each time (s) to the next.
     """
     middle = 0.5 * (omega[1:] + omega[:-1])
     # Between nodes the Jacobian hardly changes: its exponential is the propagator.

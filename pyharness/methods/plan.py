@@ -17,17 +17,7 @@ _WAVES_DIGITS = 1e-9
 
 @dataclass(frozen=True)
 class Decision:
-    """One thing that could be computed.
-
-    Attributes
-    ----------
-    part : str
-        What it is.
-    kept : bool
-        Whether it is computed.
-    why : str
-        On what grounds.
-    """
+    """One thing that could be computed; whether it is, and on what grounds."""
 
     part: str
     kept: bool
@@ -36,28 +26,14 @@ class Decision:
 
 @dataclass(frozen=True)
 class Plan:
-    """What will be computed for a scene.
-
-    Attributes
-    ----------
-    scene : Scene
-        What is to be solved.
-    method : str
-        The method that was chosen, or asked for.
-    closed_form : {"sphere", "symmetric", "elliptic"} or None
-        Which closed form solves the scene, where one does.
-    fallback : str or None
-        The method that takes over where the one chosen finds, at run time, that it can't.
-    velocity, rows : bool
-        What is asked for.
-    """
+    """What will be computed for a scene."""
 
     scene: Scene
-    method: str
-    closed_form: str | None
-    fallback: str | None
-    velocity: bool
-    rows: bool
+    method: str  # the one chosen, or asked for
+    closed_form: str | None  # sphere, symmetric or elliptic, where one solves the scene
+    fallback: str | None  # the method that takes over where the one chosen finds that it can't
+    velocity: bool  # is asked for
+    rows: bool  # are asked for
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
@@ -77,25 +53,9 @@ def plan(
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
-    """Decide what a scene needs.
+    """Decide what a scene needs; `rows` are results between the beginning and the end.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is to be solved.
-    method : str
-        `auto` for the fastest that meets the tolerance, or a name.
-    tolerance : float
-        Relative, from 1e-15 to 1.
-    velocity : bool
-        Whether the translational velocity is asked for.
-    rows : bool
-        Whether results are asked for between the beginning and the end.
-
-    Raises
-    ------
-    InputError
-        Where the method can't take the scene, or the tolerance is out of range.
+    InputError where the method can't take the scene, or the tolerance is out of range.
     """
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST
     if not finest <= tolerance <= 1.0:
@@ -142,19 +102,14 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
         yield Decision(name, acts, f"{len(waves)} in the law" if acts else "none act")
     varies = "the law varies" if law.varies else "constant: read once"
     yield Decision("torque of time", law.varies, varies)
-    for part, wanted in (
-        ("velocity", chosen.velocity),
-        ("dense output", chosen.rows),
-        ("reference", chosen.method == "reference"),
-    ):
-        why = "asked for" if wanted else "not asked for"
-        if part == "dense output":
-            why = "rows asked for" if wanted else "only the end"
-            if wanted and closed:
-                wanted, why = False, "closed form"
-        yield Decision(part, wanted, why)
-    scipy = chosen.method in REGISTRY and bool(REGISTRY[chosen.method].scipy)
-    yield Decision("SciPy", scipy, "the method is SciPy's" if scipy else "ours")
+    yield Decision("velocity", chosen.velocity, "asked for" if chosen.velocity else "not asked for")
+    wanted, why = chosen.rows, "rows asked for" if chosen.rows else "only the end"
+    if wanted and closed:
+        wanted, why = False, "closed form"
+    yield Decision("dense output", wanted, why)
+    # No solver that can be prepared needs either.
+    yield Decision("reference", False, "not asked for")
+    yield Decision("SciPy", False, "ours")
 
 
 def closed_form(scene: Scene) -> str | None:
@@ -172,6 +127,6 @@ def closed_form(scene: Scene) -> str | None:
 
 
 def _why_no_form(scene: Scene) -> str:
-    if not scene.torque.is_zero:
-        return "it has torque and is no sphere"
-    return "its coefficients let it grow without bound"
+    if scene.torque.is_zero:
+        return "its coefficients let it grow without bound"
+    return "it has torque and is no sphere"

@@ -38,19 +38,15 @@ else:
 _CODES = {
     "closed-form": Methods.CLOSED_FORM,
     "sphere": Methods.SPHERE,
+    EITHER: Methods.QUICK_OR_TAYLOR,
     "taylor": Methods.TAYLOR,
     "improved-euler": Methods.IMPROVED_EULER,
     "taylor-3": Methods.TAYLOR_3,
     "rk4": Methods.RK4,
     "quick": Methods.QUICK,
-    EITHER: Methods.QUICK_OR_TAYLOR,
     **{f"gauss-{stages}": Methods.GAUSS + stages for stages in range(1, 9)},
 }
-PREPARED = (
-    "auto",
-    "closed-form",
-    *(name for name in _CODES if name not in ("closed-form", "sphere", EITHER)),
-)
+PREPARED = ("auto", *(name for name in _CODES if name not in ("sphere", EITHER)))
 
 
 class Solver(BoundKernel):
@@ -77,9 +73,7 @@ class Solver(BoundKernel):
     # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
     # Python between, which would cost as much as an easy solve.
     plan: Plan
-    _tolerance: float
-    _effort: float
-    _asked: str
+    _given: tuple[float, str, float]  # tolerance, method and effort as asked for
 
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
@@ -87,15 +81,12 @@ class Solver(BoundKernel):
         packed = _pack(chosen.scene, _code(chosen), tolerance, effort)
         solver = super().__new__(cls, kernel, packed, _check)
         solver.plan = chosen
-        solver._tolerance = tolerance
-        solver._effort = effort
-        solver._asked = asked
+        solver._given = tolerance, asked, effort
         return solver
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Let a copy, in this process or another, be prepared as this one was."""
-        given = (self.plan, self._tolerance, self._asked, self._effort)
-        return type(self), given
+        return type(self), (self.plan, *self._given)
 
     def __repr__(self) -> str:
         """Say the scene and the method."""
@@ -105,25 +96,18 @@ class Solver(BoundKernel):
     def status(self) -> str:
         """How this thread's last call ended: complete, overflow, refused or gave up.
 
-        ``complete``, in 0 steps, where this thread has made none. A call that was refused at the
-        door, or interrupted, is not counted.
+        ``complete``, in 0 steps, before one. What was refused at the door, or interrupted, is none.
         """
         return ENDS[self._ending[0]]
 
     @property
     def steps(self) -> int:
-        """Steps of this thread's last call (right-hand sides of Gauss collocation).
-
-        0 of a closed form.
-        """
+        """Steps of this thread's last call; right-hand sides of Gauss, 0 of a closed form."""
         return abs(self._ending[1])
 
     @property
     def method(self) -> str:
-        """The method that solved this thread's last call, where the kernel had a choice.
-
-        Else, and before a call, that of the plan.
-        """
+        """The method of this thread's last call, where the kernel chose; else that of the plan."""
         steps = self._ending[1]
         if not steps:
             return self.plan.method
@@ -132,19 +116,9 @@ class Solver(BoundKernel):
         return self.plan.fallback or self.plan.method
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return rows at `times` from another start.
+        """Return rows from another start (rad/s) at `times` (s), strictly monotonic, on any side.
 
-        Parameters
-        ----------
-        omega0 : sequence of three floats
-            rad/s.
-        times : float or iterable of float, shape (n,)
-            s; strictly monotonic, also on both sides of 0.
-
-        Raises
-        ------
-        InputError
-            For a start that is not three finite numbers, or times out of order.
+        InputError for a start that is not three finite numbers, or times out of order.
         """
         from dataclasses import replace
 
@@ -152,21 +126,22 @@ class Solver(BoundKernel):
         from pyharness.methods.solve import solve
 
         scene = replace(self.plan.scene, omega=three("omega0", omega0))
-        method = "taylor" if self._asked == "quick" else self._asked
+        tolerance, asked, effort = self._given
+        method = "taylor" if asked == "quick" else asked
         # What was prepared in the scene's steps has no tolerance of its own.
-        tolerance = max(self._tolerance, METHODS[method].finest)
-        return solve(scene, times, method, tolerance, self._effort)
+        tolerance = max(tolerance, METHODS[method].finest)
+        return solve(scene, times, method, tolerance, effort)
 
 
 def prepare(
     scene: Scene, method: str = "auto", tolerance: Number = 1e-12, effort: float = 1.0
 ) -> Solver:
-    """Prepare a solver.
+    """Prepare a solver of a scene.
 
     Parameters
     ----------
     scene : Scene
-        What to solve. Its step size is that of the methods with a fixed step.
+        Its step size is that of the methods with a fixed step.
     method : str
         A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
     tolerance : float
@@ -175,11 +150,6 @@ def prepare(
         method keeps less than some 1e-15 K.
     effort : float
         Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
-
-    Returns
-    -------
-    Solver
-        Ready to be called.
 
     Raises
     ------
@@ -206,45 +176,33 @@ def prepare(
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Convert what a call was given and can't read at once.
-
-    Raises
-    ------
-    InputError
-        For what is no start, no time or no buffer.
-    """
+    """Convert what a call was given and can't read at once; InputError for what is none."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
-    if out is not None:
-        _check_buffer(out)
+    if out is not None and (found := _no_buffer(out)):
+        raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")
     return start, time
 
 
-def _check_buffer(out: Any) -> None:
-    allowed = "a writable array of three float64 side by side"
+def _no_buffer(out: object) -> str:
+    """Say what keeps `out` from being written to; nothing where nothing does."""
     if not isinstance(out, np.ndarray):
-        raise _refused("out", out, allowed)
+        try:
+            return reprlib.repr(out)
+        except ValueError:  # Python writes no whole number of many digits
+            return "a number of too many digits to be shown"
     flags = out.flags
     if out.dtype.char != "d" or not out.dtype.isnative or out.shape != (3,):
-        raise InputError(f"out: {out.dtype} of shape {out.shape}; allowed: {allowed}")
+        return f"{out.dtype} of shape {out.shape}"
     if not flags.writeable:
-        raise InputError(f"out: an array that is read-only; allowed: {allowed}")
-    if not (flags.c_contiguous and flags.aligned):
-        raise InputError(f"out: an array with strides {out.strides}; allowed: {allowed}")
-
-
-def _refused(where: str, value: object, allowed: str) -> InputError:
-    try:
-        shown = reprlib.repr(value)
-    except ValueError:  # Python writes no whole number of many digits
-        shown = "a number of too many digits to be shown"
-    return InputError(f"{where}: {shown}; allowed: {allowed}")
+        return "an array that is read-only"
+    return "" if flags.c_contiguous and flags.aligned else f"an array with strides {out.strides}"
 
 
 def _code(chosen: Plan) -> int:
     """Return the number by which the kernel knows what was decided."""
+    if chosen.closed_form == "sphere":
+        return _CODES["sphere"]
     if chosen.method == "closed-form":
-        if chosen.closed_form == "sphere":
-            return _CODES["sphere"]
         # A disturbance too faint to square: then the series, if that is not against the order.
         return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else _CODES["closed-form"]
     return _CODES[chosen.method]
@@ -252,19 +210,14 @@ def _code(chosen: Plan) -> int:
 
 def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     coefficients, constant, rate, sines, cosines = normalized(scene)
-    packed = np.zeros(Places.WAVES + sines.size + cosines.size)
+    packed = np.zeros(Places.WAVES)
     packed[Places.METHOD] = code
     packed[Places.TOLERANCE] = tolerance
     packed[Places.STEP] = scene.step_size
     packed[Places.N_SINES] = sines.shape[1]
     packed[Places.N_COSINES] = cosines.shape[1]
+    packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
+    packed[Places.CONSTANT : Places.RATE] = constant
+    packed[Places.RATE : Places.EFFORT] = rate
     packed[Places.EFFORT] = effort
-    for place, values in (
-        (Places.COEFFICIENTS, coefficients),
-        (Places.CONSTANT, constant),
-        (Places.RATE, rate),
-        (Places.WAVES, sines.T.ravel()),
-        (Places.WAVES + sines.size, cosines.T.ravel()),
-    ):
-        packed[place : place + values.size] = values
-    return packed
+    return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])

@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pyharness.methods.problem import rows_trajectory
 from pyharness.methods.scipy_ivp import FINEST, scipy_method
@@ -17,40 +18,20 @@ _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
 
 @dataclass(frozen=True)
 class Method:
-    """What turns a scene into a trajectory, and is no program of the appendix.
-
-    Attributes
-    ----------
-    name, title, source : str
-        What it is called, what it is, where it comes from.
-    finest : float
-        The smallest tolerance that it claims to meet; 1 where it takes none.
-    solve : callable or None
-        ``solve(scene, times, tolerance, effort)``; times are checked, of one side, and run away
-        from 0.
-    gives_rows : bool
-        Whether it does; else it gives omega at the end alone, as a prepared solver.
-    order : int
-        The power of the step size with which its global error falls, where a step size can be
-        given; else 0.
-    evaluations : int
-        Right-hand sides of such a step, where they are always as many; else 0.
-    any_scale : bool
-        Whether it brings the scene near 1 itself, or forms no products in binary64.
-    scipy : str
-        The name that SciPy has for it; empty where it is ours.
-    """
+    """What turns a scene into a trajectory, and is no program of the appendix."""
 
     name: str
     title: str
     source: str
-    finest: float
-    solve: Integrator
-    gives_rows: bool = True
+    finest: float  # the smallest tolerance that it claims to meet; 1 where it takes none
+    solve: Integrator  # called with checked times, of one side, that run away from 0
+    gives_rows: bool = True  # else omega at the end alone, as a prepared solver
+    # The power of the step size with which its global error falls, where one can be given; and
+    # right-hand sides of such a step, where they are always as many.
     order: int = 0
     evaluations: int = 0
-    any_scale: bool = False
-    scipy: str = ""
+    any_scale: bool = False  # brings the scene near 1 itself, or forms no products in binary64
+    scipy: str = ""  # the name that SciPy has for it; empty where it is ours
 
     @property
     def is_fixed_step(self) -> bool:
@@ -68,22 +49,16 @@ def _reference(
     return rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
 
 
-def _no_rows(
-    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
-) -> Trajectory:
+def _no_rows(*given: object) -> Trajectory:
     raise InputError("method 'quick' gives the end alone; prepare it, or take auto")
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
     """Return a solver of a room of `pyharness.methods`, which is imported when it is first used."""
 
-    def solve(
-        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
-    ) -> Trajectory:
+    def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.methods.{room}"), name)
-        if arguments:
-            solver = solver(*arguments)
-        trajectory: Trajectory = solver(scene, times, tolerance, effort)
+        trajectory: Trajectory = (solver(*arguments) if arguments else solver)(*given)
         return trajectory
 
     return solve

@@ -1,14 +1,20 @@
-"""The report of `run`."""
+"""The reports of `run` and `plan`, and the picture of one trajectory."""
 
-from typing import Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.model.listing import Listing
-from pyharness.model.report import Column, Picture, Report, Table, digits
+from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import ending, heading
 from pyharness.model.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from pyharness.methods.plan import Plan
 
 _NUMBER = digits(".6g")
 _TIMES = (
@@ -17,6 +23,9 @@ _TIMES = (
 )
 _OMEGA = tuple(Column(f"U{i}", _NUMBER, unit="rad/s", name=f"omega{i}") for i in (1, 2, 3))
 _VELOCITY = tuple(Column(f"V{i}", _NUMBER, unit="m/s", name=f"velocity{i}") for i in (1, 2, 3))
+_END: dict[str, Any] = {
+    "color": "black", "marker": "x", "linestyle": "none", "clip_on": False, "zorder": 5,
+}  # fmt: skip
 
 
 def trajectory_report(
@@ -25,46 +34,80 @@ def trajectory_report(
     """Report one trajectory; `listing` is None for a method that is no program."""
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
-    if trajectory.velocity is not None:
+    velocity = trajectory.velocity
+    if velocity is not None:
         columns += _VELOCITY
-        parts.append(trajectory.velocity)
+        parts.append(velocity)
     rows = np.column_stack(parts)
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
     counted = Table([Column("step", digits(".0f")), *columns], np.column_stack([steps, rows]))
 
     def record() -> dict[str, Any]:
-        from pyharness.model.records import (
-            build_record,
-            ending_record,
-            listing_record,
-            scene_record,
-        )
+        from pyharness.model import records
 
-        velocity = trajectory.velocity
         return {
-            "scene": scene_record(scene),
+            "scene": records.scene_record(scene),
             "method": method,
-            "listing": None if listing is None else listing_record(listing),
+            "listing": None if listing is None else records.listing_record(listing),
             "trajectory": {
                 "time": trajectory.time.tolist(),
                 "recorded_time": trajectory.recorded_time.tolist(),
                 "omega": trajectory.omega.tolist(),
                 "velocity": None if velocity is None else velocity.tolist(),
             },
-            **ending_record(trajectory),
-            "build": build_record(),
+            **records.ending_record(trajectory),
+            "build": records.build_record(),
         }
-
-    def draw() -> Picture:
-        from pyharness.methods.picture import trajectory_picture
-
-        return trajectory_picture(f"{scene.name}: {title}", trajectory, numbers)
 
     return Report(
         "run",
         text=[[*heading(scene), title], [counted], [ending(trajectory)]],
         record=record,
         data=numbers,
-        pictures={"omega": draw},
+        pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
     )
+
+
+def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
+    """Draw the components over time; say where they end, if not with the last step."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 7.0), dpi=110, layout="constrained")
+    marker = "o" if len(trajectory.time) == 1 else ""
+    style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "marker": marker}
+    note = f"x: {ending(trajectory)}" if trajectory.ended != "complete" else ""
+    axes = figure.subplots(3, 1, sharex=True)
+    for row in range(3):
+        axes[row].plot(trajectory.time, trajectory.omega[:, row], **style)
+        if note:
+            mark_end(axes[row], trajectory, row)
+        axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        axes[row].grid(visible=True, linewidth=0.3)
+    axes[2].set_xlabel("time (s)")
+    return Picture(figure, numbers, (title, note))
+
+
+def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
+    """Mark where a program ended, at the edge where it has left the frame."""
+    bottom, top = axes.get_ylim()
+    axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
+    axes.set_ylim(bottom, top)
+
+
+def plan_report(scene: Scene, plan: "Plan") -> Report:
+    """Report what is decided for a scene."""
+    table = Table(
+        words("part computed why"),
+        [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],
+    )
+
+    def record() -> dict[str, Any]:
+        from pyharness.model.records import scene_record
+
+        decisions = [asdict(each) for each in plan.decisions]
+        found = {"method": plan.method, "closed_form": plan.closed_form, "decisions": decisions}
+        return {"scene": scene_record(scene), "plan": found}
+
+    head = [*heading(scene), f"method: {plan.method}"]
+    return Report("plan", text=[head, [table]], record=record, data=table)

@@ -7,7 +7,7 @@ how far the motion goes, over which errors of steps add up; and how it multiplie
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,9 +17,7 @@ from pyharness.methods.problem import rows_trajectory
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
-
-RightHandSide = Callable[[float, Sequence[float]], list[float]]
+from pyharness.model.trajectory import Trajectory
 
 # What errors of steps add up to until the end, in those of one step, at the most: so much in a
 # motion of a few radians, and so much more for each radian times the factor by which a difference
@@ -57,27 +55,14 @@ _RADAU_SHARE = 2
 _SHORTEST_SPAN = 2.0**-300
 
 
-class Ahead(NamedTuple):
-    """What a scene makes of the errors of steps, as a coarse run sees it.
+class _Ahead(NamedTuple):
+    """What a scene makes of the errors of steps, as a coarse run sees it."""
 
-    Attributes
-    ----------
-    largest : float
-        Largest abs(omega) of any component from 0 to the end, rad/s.
-    radians : float
-        How far the motion goes: the largest coefficient times omega, summed over the time; and the
-        waves of the torque, as far as they move it.
-    growth : float
-        Largest factor by which a small difference on the way reaches the end, at least 1.
-    """
-
-    largest: float
+    largest: float  # abs(omega) of any component from 0 to the end, rad/s
+    # The largest coefficient times omega, summed over the time; and the waves of the torque, as far
+    # as they move it.
     radians: float
-    growth: float
-
-    def finest(self, name: str) -> float:
-        """Return the smallest tolerance that a method of SciPy can meet."""
-        return _FINEST_STEP * steps_sum(name, self.radians, self.growth)
+    growth: float  # the most by which a small difference on the way reaches the end, at least 1
 
 
 def steps_sum(name: str, radians: float, growth: float) -> float:
@@ -87,7 +72,8 @@ def steps_sum(name: str, radians: float, growth: float) -> float:
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of SciPy can meet from 0 to `time` (s)."""
-    return _Run(scene, time, name).ahead().finest(name)
+    ahead = _Run(scene, time, name).ahead()
+    return _FINEST_STEP * steps_sum(name, ahead.radians, ahead.growth)
 
 
 def scipy_method(name: str) -> Integrator:
@@ -105,7 +91,8 @@ def scipy_method(name: str) -> Integrator:
                 # At rest, and nothing that would move it.
                 rest = np.zeros((len(times), 3))
                 return rows_trajectory(times, rest, run.evaluations, len(times), "complete")
-            finest = ahead.finest(name)
+            total = steps_sum(name, ahead.radians, ahead.growth)
+            finest = _FINEST_STEP * total
             if tolerance < finest * (1.0 - 1e-9):
                 raise InputError(
                     f"tolerance is {tolerance:g}; {run.label} can't meet it over "
@@ -113,13 +100,17 @@ def scipy_method(name: str) -> Integrator:
                     f"{ahead.growth:.3g} times; allowed for this motion: {finest * 1.06:.2g} to 1, "
                     "or a shorter time"
                 )
-            total = steps_sum(name, ahead.radians, ahead.growth)
             if len(times) > 1:
                 total *= _ROWS
             step = max(_FINEST_STEP, tolerance / total)
-            longest = _longest_step(scene, times[-1], step * ahead.largest)
-            result = run.solved(name, step, step * ahead.largest, times, longest)
-            if result.status == 1 and not _may_run_away(scene):
+            allowed = step * ahead.largest
+            # No step is longer than that of a wave which over the whole time would count.
+            waves_that_count = (f for push, f in _pushes(scene) if push * abs(times[-1]) > allowed)
+            fastest = max(waves_that_count, default=0.0)
+            longest = _WAVE_STEP / fastest if fastest > 0.0 else math.inf
+            result = run.solved(name, step, allowed, times, longest)
+            low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
+            if result.status == 1 and low <= 0.0 <= high:
                 # It is not on its way to infinity: it turns, and no one can tell how far.
                 raise TimedError(
                     f"{run.label} gave up at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
@@ -147,15 +138,14 @@ class _Run:
     """Calls of `solve_ivp` for one scene and time; all their right-hand sides are counted."""
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
-        self.scene = scene
-        self.end = end
+        self.scene, self.end, self.effort = scene, end, effort
         self.label = name.lower()
-        self.effort = effort
         self.evaluations = 0
-        self.unit = _unit(self.end)
-        self.rate = max(map(abs, self.scene.euler_coefficients))
-        self.slopes = _in_units(self.scene.right_hand_side(), self.unit)
-        self.most = int(self.effort * _MOST_EVALUATIONS * 8 / (8 + waves(self.scene)))
+        # A power of 2 in which a span is no tiny number; 1 for most.
+        self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
+        self.rate = max(map(abs, scene.euler_coefficients))
+        self.slopes = scene.right_hand_side()
+        self.most = int(effort * _MOST_EVALUATIONS * 8 / (8 + waves(scene)))
         if name == "Radau":
             self.most //= _RADAU_SHARE
 
@@ -212,26 +202,29 @@ class _Run:
                 ),
                 time * self.unit,
             )
-        return self.slopes(time, omega)
+        if self.unit == 1.0:
+            return self.slopes(time, omega)
+        return [self.unit * slope for slope in self.slopes(self.unit * time, omega)]
 
-    def ahead(self) -> Ahead:
+    def ahead(self) -> _Ahead:
         """Look ahead in a coarse run, whose own scale is found on the way.
 
         Where omega leaves every bound, what start or torque alone would give is the scale, and
         nothing is known of the rest.
         """
-        scale = max(map(abs, self.scene.omega)) or driven(self.scene, self.end)
+        scale = max(map(abs, self.scene.omega)) or _driven(self.scene, self.end)
         if scale == 0.0:
-            return Ahead(0.0, 0.0, 1.0)
+            return _Ahead(0.0, 0.0, 1.0)
         for _ in range(_MOST_GUESSES):
             coarse = self.solved("RK45", _COARSE, _COARSE * scale)
-            largest = _largest(coarse.y)
+            sizes = np.nan_to_num(np.abs(coarse.y), nan=0.0, posinf=0.0)
+            largest = float(sizes.max(initial=0.0))
             if not 0.0 < largest < scale / _FAR:
                 break
             scale = largest
-        if coarse.status != 0 or not math.isfinite(largest):
+        if coarse.status != 0:
             # It leaves every bound, or loses its phase: no tolerance is met to the end.
-            return Ahead(max(scale, driven(self.scene, self.end)), 0.0, 1.0)
+            return _Ahead(max(scale, _driven(self.scene, self.end)), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
         times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))
@@ -241,19 +234,10 @@ class _Run:
         radians = self.rate * length * float(np.mean(sizes)) + _turned(self.scene, length, largest)
         with np.errstate(all="ignore"):
             flow = propagators(self.scene, times * self.unit, omega)
-        return Ahead(largest, radians, growth(np.nan_to_num(flow)))
+        return _Ahead(largest, radians, growth(np.nan_to_num(flow)))
 
 
-def _may_run_away(scene: Scene) -> bool:
-    """Whether omega may leave every bound in finite time: its coefficients are of one sign."""
-    return min(scene.euler_coefficients) > 0.0 or max(scene.euler_coefficients) < 0.0
-
-
-def _largest(omega: Array) -> float:
-    return float(np.nan_to_num(np.abs(omega), nan=0.0, posinf=0.0).max(initial=0.0))
-
-
-def driven(scene: Scene, time: float) -> float:
+def _driven(scene: Scene, time: float) -> float:
     """Return the largest omega that torque alone may give a body at rest until `time`."""
     law, span = scene.torque, abs(time)
     found = 0.0
@@ -268,35 +252,18 @@ def driven(scene: Scene, time: float) -> float:
     return found if math.isfinite(found) else 1.0
 
 
-def _longest_step(scene: Scene, time: float, allowed: float) -> float:
-    """Return the step (s) that no wave outruns which over the whole time would count."""
+def _pushes(scene: Scene) -> list[tuple[float, float]]:
+    """Return the largest torque over moment (1/s2) of each wave, and how fast it turns (rad/s)."""
     moments = scene.moments or (1.0, 1.0, 1.0)
-    frequencies = [
-        abs(frequency)
+    return [
+        (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
         for amplitude, frequency in scene.torque.sines + scene.torque.cosines
-        if any(abs(a) / i * abs(time) > allowed for a, i in zip(amplitude, moments, strict=True))
     ]
-    fastest = max(frequencies, default=0.0)
-    return _WAVE_STEP / fastest if fastest > 0.0 else math.inf
 
 
 def _turned(scene: Scene, span: float, largest: float) -> float:
     """Return the radians by which waves turn, each as far as it moves so large an omega."""
-    moments = scene.moments or (1.0, 1.0, 1.0)
     found = 0.0
-    for amplitude, frequency in scene.torque.sines + scene.torque.cosines:
-        push = max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True))
-        found += min(abs(frequency) * span, push * span / largest if largest > 0.0 else 0.0)
+    for push, frequency in _pushes(scene):
+        found += min(frequency * span, push * span / largest if largest > 0.0 else 0.0)
     return found
-
-
-def _unit(span: float) -> float:
-    """Return the unit of time in which a span is no tiny number, a power of 2; 1 for most."""
-    return 1.0 if abs(span) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(span)[1])
-
-
-def _in_units(right_hand_side: RightHandSide, unit: float) -> RightHandSide:
-    """Return the same equations in another unit of time."""
-    if unit == 1.0:
-        return right_hand_side
-    return lambda time, omega: [unit * slope for slope in right_hand_side(unit * time, omega)]

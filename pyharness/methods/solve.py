@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from pyharness.model.same_motion import factor_near_one, is_ordinary, scaled, un
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, number, several, tolerance_of
+
+_ROWS = ("time", "recorded_time", "omega")
 
 
 def solve(
@@ -30,7 +33,7 @@ def solve(
     Parameters
     ----------
     scene : Scene
-        What to solve; its step size plays a part only for the fixed-step methods.
+        Its step size plays a part only for the fixed-step methods.
     times : float or iterable of float, shape (n,)
         Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
         twice, from 0 backward and from 0 forward.
@@ -78,11 +81,9 @@ def solve(
     effort = checked_effort(effort)
     values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]
-    rest = values[len(below) :]
     # On either side away from 0.
-    marches = [
-        _march(chosen, scene, each, tolerance, effort) for each in (below[::-1], rest) if each
-    ]
+    sides = (below[::-1], values[len(below) :])
+    marches = [_march(chosen, scene, each, tolerance, effort) for each in sides if each]
     if below:
         marches[0] = _reversed(marches[0])
     found = marches[0] if len(marches) == 1 else _joined(*marches)
@@ -93,12 +94,8 @@ def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet in a scene.
 
     The one that it claims; more for `solve_ivp`, whose steps can't be told to err less than by
-    some 2e-14, where many add up or the motion multiplies them.
-
-    Raises
-    ------
-    InputError
-        Where `solve_ivp` would need too many steps even to see that.
+    some 2e-14, where many add up or the motion multiplies them. InputError where it would need too
+    many steps even to see that.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -145,24 +142,21 @@ def _march(
 
 
 def _reversed(found: Trajectory) -> Trajectory:
-    return replace(
-        found,
-        time=found.time[::-1],
-        recorded_time=found.recorded_time[::-1],
-        omega=found.omega[::-1],
-    )
+    rows: dict[str, Any] = {name: getattr(found, name)[::-1] for name in _ROWS}
+    return replace(found, **rows)
 
 
 def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
     """Return the rows of two marches from 0; what overflows is missing at the ends."""
+    both = before, after
+    rows: dict[str, Any] = {
+        name: np.concatenate([getattr(x, name) for x in both]) for name in _ROWS
+    }
     return replace(
-        after,
-        time=np.concatenate([before.time, after.time]),
-        recorded_time=np.concatenate([before.recorded_time, after.recorded_time]),
-        omega=np.concatenate([before.omega, after.omega]),
+        after if before.ended == "complete" else before,
+        **rows,
         steps=before.steps + after.steps,
         evaluations=before.evaluations + after.evaluations,
-        ended=after.ended if before.ended == "complete" else before.ended,
     )
 
 

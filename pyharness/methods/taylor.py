@@ -15,32 +15,7 @@ from pyharness.model.trajectory import Trajectory
 def taylor(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene by Taylor series.
-
-    Parameters
-    ----------
-    scene : Scene
-        What to integrate.
-    times : sequence of float, shape (n,)
-        Strictly monotonic away from 0, on one side of it (s); not checked.
-    tolerance : float
-        Largest error of any component at `times`, relative to the largest from 0 to the last of
-        them.
-    effort : float
-        Factor on the work after which it gives up.
-
-    Returns
-    -------
-    Trajectory
-        Fewer rows than times where the solution overflows; a series counts as one evaluation.
-
-    Raises
-    ------
-    InputError
-        Where the method gave up: the time is long for so fast a motion.
-    NotBuiltError
-        Where the extension is not built.
-    """
+    """Solve a scene by Taylor series, each counted as one evaluation."""
     work = np.array([effort, 0.0])
     rows, n_rows, status, steps = extension().taylor_rows(
         *normalized(scene), scene.omega, times, tolerance, effort=work

@@ -1,10 +1,9 @@
 """Closed forms: against mpmath, against the reference, and against their own symmetries.
 
 The bound is on the evaluation: sixteen roundings of the largest angular velocity of the motion,
-at any time. What rounding A, B, C does to the phase is added where moments are given.
+at any time.
 """
 
-import itertools
 import math
 import random
 from concurrent.futures import ThreadPoolExecutor
@@ -14,14 +13,13 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
-from tests.exact_tops import DIGITS, exact_coefficients, exact_top
+from tests.exact_tops import DIGITS, exact_top
 
 _UNIT = 2.0**-53
 _BOUND = 16 * _UNIT
@@ -37,9 +35,7 @@ def _at(coefficients: Triple, omega: Triple, time: float) -> Array:
 def _error(found: Array, exact: list[mpmath.mpf], omega: Triple) -> float:
     """Return the largest error over the largest angular velocity that was met."""
     largest = max(*map(abs, exact), *map(abs, omega))
-    return float(
-        max(abs(mpmath.mpf(float(x)) - y) for x, y in zip(found, exact, strict=True)) / largest
-    )
+    return float(max(abs(float(x) - y) for x, y in zip(found, exact, strict=True)) / largest)
 
 
 def _random_top(source: random.Random, kind: str) -> tuple[Triple, Triple, float]:
@@ -76,108 +72,12 @@ def test_any_top_at_any_time(kind: str) -> None:
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("case", [2, 3, 4])
-def test_cases_agree_with_the_reference(case: int) -> None:
-    scene = case_scene(case)
-    times = [0.01, 0.37, 1.0, 3.0]
-    truth = reference(scene, times)
-    found = solve(scene, times, "closed-form", METHODS["closed-form"].finest)
-    assert np.abs(found.omega - truth.omega).max() <= truth.error + 10.0 * 3e-16
-    assert found.evaluations == 0
-
-
-@pytest.mark.parametrize("case", [3, 4])
-@pytest.mark.parametrize("time", [3.0, 100.0, 1e4, -1e5])
-def test_rounding_of_the_coefficients_is_all_that_grows_with_time(case: int, time: float) -> None:
-    """|d phase/dt| <= 5 rad/s here; A, B, C are rounded twice; the moving parts are below 1.4."""
-    scene = case_scene(case)
-    exact = exact_top(exact_coefficients(scene.moments or ()), scene.omega, time)
-    found = _at(scene.euler_coefficients, scene.omega, time)
-    assert _error(found, exact, scene.omega) <= _BOUND + 2 * _UNIT * 5.0 * abs(time) * 1.4 / 10.0
-
-
-@pytest.mark.parametrize("disturbance", [10.0**-n for n in range(1, 16)])
-def test_spin_about_the_middle_axis(disturbance: float) -> None:
-    """Several flips; the first comes after ln(1/disturbance) over 0.35 seconds."""
-    scene = case_scene(4)
-    for omega in (
-        (disturbance, 1.0, 0.0),
-        (0.0, -1.0, disturbance),
-        (disturbance, 1.0, disturbance),
-    ):
-        for time in (1.0, 50.0, 120.0, -333.0):
-            exact = exact_top(scene.euler_coefficients, omega, time)
-            assert _error(_at(scene.euler_coefficients, omega, time), exact, omega) <= _BOUND
-
-
-def test_spin_about_each_axis_is_steady() -> None:
-    a = case_scene(4).euler_coefficients
-    for axis in range(3):
-        omega = [0.0, 0.0, 0.0]
-        omega[axis] = -3.0
-        np.testing.assert_allclose(_at(a, (omega[0], omega[1], omega[2]), 1e5), omega, rtol=1e-15)
-
-
-@pytest.mark.parametrize("time", [1e-3, 0.5, -2.0, 30.0, 900.0, -5000.0])
-def test_separatrix_itself(time: float) -> None:
-    """A = C, omega1 = omega3: omega2 = r tanh, the others r sech, over the roots of 2 and 1."""
-    omega = (1.0, 0.3, 1.0)
-    with mpmath.workdps(DIGITS):
-        # omega2' = -omega1 omega3 / 2 and omega1' = omega2 omega1 / 4.
-        size = mpmath.sqrt(mpmath.mpf(1) / 2 + mpmath.mpf(0.3) ** 2 / 4)
-        phase = mpmath.atanh(mpmath.mpf(0.3) / 2 / size) - size / 2 * mpmath.mpf(time)
-        exact = [size * mpmath.sqrt(2) / mpmath.cosh(phase), 2 * size * mpmath.tanh(phase)]
-    exact.append(exact[0])
-    assert _error(_at((0.25, -0.5, 0.25), omega, time), exact, omega) <= _BOUND
-
-
-@pytest.mark.parametrize("difference", [0.0, *(10.0**-n for n in range(1, 17))])
-@pytest.mark.parametrize("omega", [(0.3, 1.0, 10.0), (10.0, 0.3, 1.0), (1.0, 10.0, 1e-8)])
-def test_near_symmetry(difference: float, omega: Triple) -> None:
-    scene = Scene("", omega, moments=(40.0, 40.0 * (1.0 + difference), 20.0))
-    coefficients = scene.euler_coefficients
-    for time in (3.0, -77.0):
-        if coefficients[2]:
-            exact = exact_top(coefficients, omega, time)
-        else:
-            exact = list(map(mpmath.mpf, reference(scene, [time]).omega[0]))
-        assert _error(_at(coefficients, omega, time), exact, omega) <= _BOUND
-
-
-def test_axes_and_signs_turn_to_the_last_bit() -> None:
-    source = random.Random(1)
-    for _ in range(50):
-        a, w, t = _random_top(source, "plain")
-        found = _at(a, w, t)
-        turned = _at((a[1], a[2], a[0]), (w[1], w[2], w[0]), t)
-        np.testing.assert_array_equal(turned, found[[1, 2, 0]])
-        signs = np.array([-1.0, -1.0, 1.0])
-        np.testing.assert_array_equal(_at(a, (-w[0], -w[1], w[2]), t), found * signs)
-        # Time and all signs together.
-        np.testing.assert_array_equal(_at(a, (-w[0], -w[1], -w[2]), -t), -found)
-        back = _at(a, (found[0], found[1], found[2]), -t)
-        phase = max(map(abs, a)) * max(map(abs, w)) * abs(t)
-        assert np.abs(back - w).max() <= 100 * _BOUND * (1.0 + phase) * max(map(abs, w))
-
-
 @pytest.mark.parametrize("power", [-990, -600, 500, 900])
 def test_powers_of_two_scale_to_the_last_bit(power: int) -> None:
     a, w = (0.25, -2.0 / 3.0, 0.5), (0.1, 1.0, 10.0)
     factor = 2.0**power
     found = _at(a, (w[0] * factor, w[1] * factor, w[2] * factor), 3.0 / factor)
     np.testing.assert_array_equal(found, _at(a, w, 3.0) * factor)
-
-
-@pytest.mark.parametrize("size", [1e-300, 1e-200, 1e-30, 1e30, 1e150, 1e300])
-def test_scales_of_omega(size: float) -> None:
-    a, w, t = (0.25, -2.0 / 3.0, 0.5), (size / 10, size, size), 7.0 / size
-    assert _error(_at(a, w, t), exact_top(a, w, t), w) <= _BOUND
-
-
-@pytest.mark.parametrize("size", [1e-200, 1e-12, 1e12, 1e200])
-def test_scales_of_the_coefficients(size: float) -> None:
-    a, w, t = (0.25 * size, -size, 0.5 * size), (0.1, 1.0, 1.0), 7.0 / size
-    assert _error(_at(a, w, t), exact_top(a, w, t), w) <= _BOUND
 
 
 @pytest.mark.parametrize(
@@ -197,10 +97,9 @@ def test_a_single_coefficient_is_linear(coefficients: Triple, wanted: Triple) ->
 @pytest.mark.parametrize("signs", [(1.0, -1.0), (-1.0, 1.0)])
 def test_symmetric_body_about_every_axis(axis: int, signs: tuple[float, float]) -> None:
     """Unequal sizes too, which no body has: an ellipse."""
-    a = [0.0, 0.0, 0.0]
+    a, w = [0.0, 0.0, 0.0], (0.7, -1.3, 2.1)
     j, k = (axis + 1) % 3, (axis + 2) % 3
     a[j], a[k] = 0.75 * signs[0], 0.3 * signs[1]
-    w = (0.7, -1.3, 2.1)
     with mpmath.workdps(DIGITS):
         rate = mpmath.sqrt(-mpmath.mpf(a[j]) * mpmath.mpf(a[k]))
         angle = rate * mpmath.mpf(w[axis]) * 40
@@ -229,9 +128,8 @@ def test_symmetric_body_about_every_axis(axis: int, signs: tuple[float, float]) 
 def test_what_can_not_be_done_is_said(
     coefficients: Triple, omega: Triple, time: float, status: int
 ) -> None:
-    rows = extension().torque_free_solution(coefficients, omega, [0.0, time])
-    assert rows[2] == status
-    assert rows[1] == (0 if status == 3 else 1)
+    _, n_rows, ended = extension().torque_free_solution(coefficients, omega, [0.0, time])
+    assert (n_rows, ended) == (0 if status == 3 else 1, status)
     end, ended = _packed_end(coefficients, omega, time)
     assert ended == status
     assert np.isnan(end).all()
@@ -247,12 +145,13 @@ def _packed_end(coefficients: Triple, omega: Triple, time: float) -> tuple[Array
 
 
 def test_refusals_name_the_reason() -> None:
-    with pytest.raises(InputError, match="closed-form: the scene has torque"):
-        solve(case_scene(5), [1.0], "closed-form", 1e-9)
-    with pytest.raises(InputError, match="all of one sign"):
-        solve(Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 2.0, 3.0)), [1.0], "closed-form", 1e-9)
-    with pytest.raises(InputError, match="no digit left"):
-        solve(case_scene(4), [1.0, 1e30], "closed-form", 1e-9)
+    for scene, words in (
+        (case_scene(5), "closed-form: the scene has torque"),
+        (Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 2.0, 3.0)), "all of one sign"),
+        (case_scene(4), "no digit left"),
+    ):
+        with pytest.raises(InputError, match=words):
+            solve(scene, [1.0, 1e30], "closed-form", 1e-9)
 
 
 @pytest.mark.parametrize("time", [-2.0, 1e-3, 50.0])
@@ -280,19 +179,10 @@ def test_sphere_overflows_with_a_status() -> None:
 def test_end_alone_and_rows_give_the_same_bits_in_any_thread() -> None:
     source = random.Random(2)
     tops = [_random_top(source, kind) for kind in ("plain", "middle axis") * 100]
-    rows = [_at(*top) for top in tops]
-
-    def end(top: tuple[Triple, Triple, float]) -> Array:
-        omega, status = _packed_end(*top)
-        assert status == 0
-        return omega
-
+    rows = [_at(*top).tobytes() for top in tops]
     with ThreadPoolExecutor(8) as pool:
-        for found in itertools.chain(pool.map(end, tops), pool.map(end, tops[::-1])):
-            rows.append(found)
-    count = len(tops)
-    np.testing.assert_array_equal(rows[:count], rows[count : 2 * count])
-    np.testing.assert_array_equal(rows[:count], rows[2 * count :][::-1])
+        found = pool.map(lambda top: _packed_end(*top), [*tops, *tops])
+        assert [(end.tobytes(), status) for end, status in found] == [(row, 0) for row in rows * 2]
 
 
 @pytest.mark.parametrize("radians", [1e9, 1e11, 1e12, 1e13, 1e14, 4e14])
@@ -311,16 +201,21 @@ def test_error_does_not_depend_on_the_phase(radians: float) -> None:
         solve(scene, [radians, 1e16, 1e17], "closed-form", 1e-9)
 
 
-@pytest.mark.parametrize("time", [0.5, 2.0, 10.0, 30.0, 300.0, -1000.0])
+@pytest.mark.parametrize("time", [1e-3, 0.5, -2.0, 30.0, 300.0, -1000.0])
 def test_small_components_beside_the_separatrix_keep_their_digits(time: float) -> None:
-    """A = C, omega1 = omega3: they fall by exp(-phase), whose rounding they would multiply."""
+    """A = C, omega1 = omega3: omega2 = r tanh, the others r sech, over the roots of 2 and 1.
+
+    These fall by exp(-phase), whose rounding they would multiply.
+    """
     omega = (1.0, 0.3, 1.0)
+    found = _at((0.25, -0.5, 0.25), omega, time)
     with mpmath.workdps(DIGITS):
+        # omega2' = -omega1 omega3 / 2 and omega1' = omega2 omega1 / 4.
         size = mpmath.sqrt(mpmath.mpf(1) / 2 + mpmath.mpf(0.3) ** 2 / 4)
         phase = mpmath.atanh(mpmath.mpf(0.3) / 2 / size) - size / 2 * mpmath.mpf(time)
-        exact = size * mpmath.sqrt(2) / mpmath.cosh(phase)
-        found = _at((0.25, -0.5, 0.25), omega, time)
-        assert abs(float((found[0] - exact) / exact)) <= 4 * _UNIT
+        small, large = size * mpmath.sqrt(2) / mpmath.cosh(phase), 2 * size * mpmath.tanh(phase)
+        assert abs(float((found[0] - small) / small)) <= 4 * _UNIT
+    assert _error(found, [small, large, small], omega) <= _BOUND
 
 
 @pytest.mark.parametrize("disturbance", [1e-20, 1e-50, 1e-100, 1e-119])
@@ -330,16 +225,9 @@ def test_faint_disturbances_grow_as_they_should(disturbance: float, time: float)
     a, c = 1.0, 0.5
     rate = math.sqrt(a * c)
     found = _at((a, -1.0, c), (disturbance, 1.0, 0.0), time)
-    np.testing.assert_allclose(
-        found,
-        [
-            disturbance * math.cosh(rate * time),
-            1.0,
-            disturbance * math.sqrt(c / a) * math.sinh(rate * time),
-        ],
-        rtol=2e-15,
-        atol=0.0,
-    )
+    grown = math.cosh(rate * time), math.sqrt(c / a) * math.sinh(rate * time)
+    wanted = (disturbance * grown[0], 1.0, disturbance * grown[1])
+    np.testing.assert_allclose(found, wanted, rtol=2e-15, atol=0.0)
 
 
 def test_component_that_hardly_moves_is_rounded_once() -> None:

@@ -1,14 +1,14 @@
 """Ctrl-C: it ends every kernel at once, and leaves the interpreter as it was."""
 
-import os
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from pyharness.methods.prepared import prepare
 from pyharness.methods.solve import solve
 from pyharness.model import extension as room
 from pyharness.model.extension import extension
-from pyharness.model.listing import corrected
+from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.original.compiled import run
 
@@ -49,10 +49,6 @@ def _prepared(scene: Scene, name: str, time: float, tolerance: float) -> Callabl
     return lambda: solver(np.array(scene.omega), time)
 
 
-def _program(name: str) -> Callable[[], object]:
-    return lambda: run(BUSY, corrected(name), may_stop=False)
-
-
 def _linear() -> object:
     matrix = np.eye(2500, order="F") + 0.001
     return room.extension().solve_linear(matrix, matrix[:, :1])
@@ -71,140 +67,102 @@ LONG: dict[str, Callable[[], object]] = {
     "gauss-1": _method(DRIVEN, "gauss-1", 1e3, 1e-8),
     "gauss-8": _method(CROWDED, "gauss-8", 1e5),
     "sphere": lambda: solve(SPHERE, TIMES, "closed-form", 1e-12, effort=1e6),
-    "two-term": _program("two-term"),
-    "four-term": _program("four-term"),
-    "runge-kutta": _program("runge-kutta"),
+    **{name: partial(run, BUSY, corrected(name), may_stop=False) for name in PROGRAMS},
     "linear-solver": _linear,
     "dop853": _method(PUSHED, "dop853", 1e4, 1e-3),
     "lsoda": _method(PUSHED, "lsoda", 1e4, 1e-3),
     "radau": _method(PUSHED, "radau", 1e4, 1e-3),
     "reference": _method(PUSHED, "reference", 1e4),
 }
-# Of SciPy, in Python, or prepared before.
-WITHOUT_A_DOOR = (
-    "dop853", "lsoda", "radau", "reference", "quick", "quick-waves", "prepared-series",
-)  # fmt: skip
+# Of SciPy, in Python, or prepared before: their kernels are not called through the door.
+DOORLESS = ["dop853", "lsoda", "radau", "reference", "quick", "quick-waves", "prepared-series"]
 
 
 class _Keyboard:
-    """Presses Ctrl-C, from another thread, a while after it was told to; stands for the kernels.
+    """Presses Ctrl-C once, a while after it was first told to."""
 
-    The first call of one of them tells it, so that what is done before does not count.
-    """
+    pressed = 0.0
 
-    def __init__(self) -> None:
-        self.pressed = 0.0
-        self._timer = threading.Timer(0.05, self._press)
+    def press(self) -> None:
+        if not self.pressed:
+            self.pressed = time.perf_counter() + 0.1
+            signal.setitimer(signal.ITIMER_REAL, 0.1)
 
-    def _press(self) -> None:
-        self.pressed = time.perf_counter()
-        os.kill(os.getpid(), signal.SIGINT)
+    def door(self) -> ModuleType:
+        """Stand for the extension: what is done before a kernel is called does not count."""
+        self.press()
+        return extension()
 
-    def start(self) -> None:
-        if not self._timer.is_alive():
-            self._timer.start()
 
-    def leave(self) -> None:
-        """Press no more: what ended by itself is not to be interrupted in another test."""
-        self._timer.cancel()
-
-    def __getattr__(self, kernel: str) -> Callable[..., object]:
-        def call(*arguments: object, **named: object) -> object:
-            self.start()
-            result: object = getattr(extension(), kernel)(*arguments, **named)
-            return result
-
-        return call
+@pytest.fixture
+def keyboard() -> Iterator[_Keyboard]:
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    yield _Keyboard()
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.mark.parametrize("name", LONG)
-def test_kernel_ends_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    keyboard = _Keyboard()
-    for each in ("methods.taylor", "methods.fixed_step", "methods.closed_form", "methods.gauss"):
-        monkeypatch.setattr(f"pyharness.{each}.extension", lambda: keyboard)
-    monkeypatch.setattr("pyharness.original.compiled.extension", lambda: keyboard)
-    monkeypatch.setattr("pyharness.model.extension.extension", lambda: keyboard)
-    if name in WITHOUT_A_DOOR:
-        keyboard.start()
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            LONG[name]()
-    finally:
-        keyboard.leave()
-    assert time.perf_counter() - keyboard.pressed < PATIENCE
-
-
-def test_interpreter_and_solver_go_on() -> None:
-    """The same bits afterwards, from the very solver that was interrupted."""
-    solver = prepare(PUSHED, "taylor", effort=1e6)
-    wanted = solver(np.array(PUSHED.omega), 2.0).copy()
-    _Keyboard().start()
+def test_kernel_ends_at_once(
+    name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rooms = [f"methods.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss")]
+    for each in (*rooms, "original.compiled", "model.extension"):
+        monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
+    if name in DOORLESS:
+        keyboard.press()
     with pytest.raises(KeyboardInterrupt):
-        solver(np.array(PUSHED.omega), 1e5)
-    np.testing.assert_array_equal(solver(np.array(PUSHED.omega), 2.0), wanted)
+        LONG[name]()
+    assert -0.02 < time.perf_counter() - keyboard.pressed < PATIENCE
+
+
+def test_interpreter_and_solver_go_on(keyboard: _Keyboard) -> None:
+    """The same bits afterwards, from the very solver that was interrupted."""
+    solver, start = prepare(PUSHED, "taylor", effort=1e6), np.array(PUSHED.omega)
+    wanted = solver(start, 2.0)
+    keyboard.press()
+    with pytest.raises(KeyboardInterrupt):
+        solver(start, 1e5)
+    np.testing.assert_array_equal(solver(start, 2.0), wanted)
     assert solver.status == "complete"
 
 
-def test_other_threads_are_not_disturbed() -> None:
+def test_other_threads_are_not_disturbed(keyboard: _Keyboard) -> None:
     """A signal is the main thread's: a kernel elsewhere runs on to its end."""
     wanted = solve(PUSHED, [5e3], "taylor")
-    found = []
-    ended = threading.Event()
-
-    def work() -> None:
-        found.append(solve(PUSHED, [5e3], "taylor"))
-        ended.set()
-
-    threading.Thread(target=work).start()
-    _Keyboard().start()
-    with pytest.raises(KeyboardInterrupt):
-        time.sleep(60.0)
-    assert ended.wait(60.0)
-    np.testing.assert_array_equal(found[0].omega, wanted.omega)
+    with ThreadPoolExecutor(1) as pool:
+        found = pool.submit(solve, PUSHED, [5e3], "taylor")
+        keyboard.press()
+        with pytest.raises(KeyboardInterrupt):
+            time.sleep(60.0)
+    np.testing.assert_array_equal(found.result().omega, wanted.omega)
 
 
-def test_handler_that_does_not_raise_runs_on_the_way() -> None:
+def test_handler_that_does_not_raise_runs_on_the_way(keyboard: _Keyboard) -> None:
     wanted = solve(PUSHED, [5e3], "taylor")
-    calls = []
-    before = signal.signal(signal.SIGALRM, lambda *_: calls.append(time.perf_counter()))
-    try:
-        signal.setitimer(signal.ITIMER_REAL, 0.01)
-        found = solve(PUSHED, [5e3], "taylor")
-        end = time.perf_counter()
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-    assert calls
-    assert end - calls[0] > 0.01
+    calls: list[float] = []
+    signal.signal(signal.SIGALRM, lambda *_: calls.append(time.perf_counter()))
+    signal.setitimer(signal.ITIMER_REAL, 0.01)
+    found = solve(PUSHED, [5e3], "taylor")
+    assert time.perf_counter() - calls[0] > 0.01
     np.testing.assert_array_equal(found.omega, wanted.omega)
 
 
-def test_command_line_says_so_in_a_line(tmp_path: Path) -> None:
+def test_command_line_says_so_in_a_line() -> None:
     """All of them side by side, each some time after it has begun."""
-    # In few letters: a scene file has a largest size.
-    lines = "".join(
-        f"{{amplitude=[{a[0]:.1e},{a[1]:.1e},0],frequency={f:.5f}}},\n" for a, f in _waves(15_000)
+    commands = (
+        "run --case 5 --method taylor --times 1e5 --effort 1e6",
+        "compare --case 5 --steps 100000 --effort 1e6",
+        "stress --only threads",
     )
-    path = tmp_path / "crowded.toml"
-    path.write_text(
-        "[body]\nmoments = [40.0, 30.0, 20.0]\n[initial]\nomega = [0.3, 1.1, 2.7]\n"
-        f"[torque]\nsines = [{lines}]\n[run]\nsteps = 100000\n"
-    )
-    commands = [
-        ["run", "--scene", str(path), "--program", "four-term", "--effort", "1e6"],
-        ["run", "--case", "5", "--method", "taylor", "--times", "1e5", "--effort", "1e6"],
-        ["run", "--case", "5", "--method", "lsoda", "--times", "1e5", "--effort", "1e6"],
-        ["compare", "--case", "5", "--steps", "100000", "--effort", "1e6"],
-        ["stress", "--only", "threads"],
-    ]
     start = "print(flush=True); from pyharness.__main__ import start; start()"
+    pipe = subprocess.PIPE
     running = [
         subprocess.Popen(
-            [sys.executable, "-c", start, *command],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            [sys.executable, "-c", start, *each.split()], stdout=pipe, stderr=pipe, text=True
         )
-        for command in commands
-    ]  # fmt: skip
+        for each in commands
+    ]
     for each in running:
         assert each.stdout is not None
         each.stdout.readline()

@@ -5,14 +5,15 @@ import os
 import shutil
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, case_scene
+from pyharness import Scene, case_scene
 from pyharness.methods.problem import normalized
 from pyharness.methods.solve import solve
 from pyharness.model import codes
@@ -26,36 +27,27 @@ from tests.random_scenes import NASTY
 
 FORTRAN = Path(__file__).parent.parent.parent / "fortran"
 RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
+REST = Scene("", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0))
+SPUN = replace(REST, omega=(0.3, -1.0, 2.0))
 WAVES = TorqueLaw(
     (10.0, 0.0, -5.0), (1.0, 2.0, 0.0), (((20.0, 0.0, 5.0), 3.0), ((0.0, 9.0, 0.0), 11.0)),
     (((5.0, 5.0, 5.0), 3.0), ((0.0, 0.0, 30.0), 0.5), ((1.0, 2.0, 3.0), 0.0)),
 )  # fmt: skip
+TWO_SPEEDS = TorqueLaw(sines=(((20.0, 0.0, 5.0), 2.0),), cosines=(((5.0, 30.0, -5.0), 5.0),))
+FROM_REST = {
+    "from rest": TorqueLaw((5.0, 3.0, 1.0)),
+    "rate from rest": TorqueLaw(rate=(90.0, 60.0, 70.0)),
+    "sine from rest": TorqueLaw(sines=(((50.0, 30.0, 10.0), 2.0),)),
+    "about one axis from rest": TorqueLaw(sines=(((0.0, 0.0, 10.0), 2.0),)),
+}
 SCENES = {
     **{f"case {case}": case_scene(case) for case in range(1, 8)},
-    "waves": Scene("", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0), torque=WAVES),
-    "sine and cosine of two speeds": Scene(
-        "", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0),
-        torque=TorqueLaw(
-            sines=(((20.0, 0.0, 5.0), 2.0),), cosines=(((5.0, 30.0, -5.0), 5.0),)
-        ),
-    ),
-    "from rest": Scene(
-        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((5.0, 3.0, 1.0))
-    ),
-    "rate from rest": Scene(
-        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw(rate=(90.0, 60.0, 70.0))
-    ),
-    "sine from rest": Scene(
-        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
-        torque=TorqueLaw(sines=(((50.0, 30.0, 10.0), 2.0),)),
-    ),
-    "about one axis from rest": Scene(
-        "", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0),
-        torque=TorqueLaw(sines=(((0.0, 0.0, 10.0), 2.0),)),
-    ),
+    "waves": replace(SPUN, torque=WAVES),
+    "sine and cosine of two speeds": replace(SPUN, torque=TWO_SPEEDS),
+    **{name: replace(REST, torque=law) for name, law in FROM_REST.items()},
     "two zeros": Scene("", (1.0, 2.0, 3.0), coefficients=(0.0, -1.0, 0.0)),
     "not a body": Scene("", (0.1, 0.2, -0.3), coefficients=(1.0, 1.0, 0.5)),
-}  # fmt: skip
+}
 
 
 @cache
@@ -117,44 +109,25 @@ def test_thousands_of_turns_of_a_wave(frequency: float, time: float, tolerance: 
     assert _error(omega, reference(scene, [time]).omega[0]) <= tolerance
 
 
+def _held_to_fine_rows(
+    scene: Scene, time: float, tolerances: Sequence[float], share: float
+) -> None:
+    """Hold the end to a share of each tolerance, by a finer series; not where that gives up."""
+    times = np.linspace(0.0, time, 33)[1:]
+    truth, n_rows, _, _ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-15)
+    if n_rows == len(times):
+        scale = max(np.abs(truth).max(), *map(abs, scene.omega))
+        for tolerance in tolerances:
+            error = np.abs(_end(scene, time, tolerance)[0] - truth[:, -1]).max()
+            assert error <= share * tolerance * scale
+
+
 @pytest.mark.parametrize("kind", NASTY)
 def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
     """Where a small difference grows the series takes smaller errors by itself."""
     generator = np.random.default_rng([3, list(NASTY).index(kind)])
-    for number in range(60):
-        scene, time = NASTY[kind](generator)
-        times = np.linspace(0.0, time, 33)[1:]
-        truth, n_rows, _, _ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-14)
-        if n_rows < len(times):
-            continue
-        scale = max(np.abs(truth).max(), max(map(abs, scene.omega)))
-        for tolerance in (1e-3, 1e-6, 1e-9):
-            omega, _, _ = _end(scene, time, tolerance)
-            error = np.abs(omega - truth[:, -1]).max() / scale
-            assert error <= tolerance, f"{kind} {number} to {tolerance:g}"
-
-
-@pytest.mark.parametrize("name", ["case 2", "case 3", "case 4", "case 5", "case 6"])
-def test_forth_and_back(name: str) -> None:
-    """A torque that does not vary knows no time, so the way back starts at 0 again."""
-    scene = SCENES[name]
-    there, _, _ = _end(scene, 3.0, 1e-15)
-    turned = Scene("", tuple(there), moments=scene.moments, torque=scene.torque)
-    back, _, _ = _end(turned, -3.0, 1e-15)
-    assert _error(back, np.array(scene.omega)) <= 2e-13
-
-
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_rows_are_what_solves_to_each_time_give(name: str, side: float) -> None:
-    times = [side * t for t in (0.0, 1e-9, 0.01, 0.3, 0.31, 0.9, 2.0)]
-    rows = solve(SCENES[name], times, "taylor", 1e-15)
-    assert rows.ended == "complete"
-    np.testing.assert_array_equal(rows.omega[0], SCENES[name].omega)
-    scale = np.abs(rows.omega).max()
-    for time, row in zip(times[1:], rows.omega[1:], strict=True):
-        omega, _, _ = _end(SCENES[name], time, 1e-15)
-        np.testing.assert_allclose(row, omega, rtol=0, atol=3e-15 * scale)
+    for _ in range(60):
+        _held_to_fine_rows(*NASTY[kind](generator), (1e-3, 1e-6, 1e-9), 1.0)
 
 
 def test_many_rows_within_one_step() -> None:
@@ -175,35 +148,8 @@ def test_blow_up_ends_the_rows(level: int) -> None:
     assert (n_rows, status) == (0, 2)
 
 
-@pytest.mark.parametrize("size", [1e100, 1e160])
-def test_hopeless_scale_ends(size: float) -> None:
-    scene = Scene("", (size, size, size), coefficients=(1.0, -1.0, 1.0))
-    with pytest.raises(InputError, match=r"taylor gave up before t = 2 s after 1 step;"):
-        solve(scene, [2.0], "taylor", 1e-6)
-
-
-def test_tiny_and_resting_bodies() -> None:
-    scene = Scene("", (1e-300, -2e-300, 0.0), moments=(3.0, 2.0, 1.0))
-    omega, status, steps = _end(scene, 5.0, 1e-12)
-    assert (status, steps) == (0, 1)
-    np.testing.assert_array_equal(omega, scene.omega)
-    omega, status, _ = _end(Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0)), 5.0, 1e-12)
-    assert status == 0
-    np.testing.assert_array_equal(omega, 0.0)
-
-
-def test_steps_fall_with_the_tolerance_and_not_below_the_need() -> None:
-    counts = [_end(case_scene(7), 3.0, e)[2] for e in (1e-3, 1e-6, 1e-9, 1e-12)]
-    assert max(counts) <= 150
-
-
-def test_threads_give_the_same_bits() -> None:
-    def many(_: int) -> list[bytes]:
-        return [_end(case_scene(c), 3.0, 1e-12)[0].tobytes() for c in range(1, 8)]
-
-    with ThreadPoolExecutor(8) as pool:
-        results = list(pool.map(many, range(64)))
-    assert all(result == results[0] for result in results)
+def test_steps_are_few() -> None:
+    assert max(_end(case_scene(7), 3.0, e)[2] for e in (1e-3, 1e-6, 1e-9, 1e-12)) <= 150
 
 
 @pytest.mark.skipif(
@@ -241,28 +187,14 @@ def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
         found = np.zeros(3)
         ended, count = ctypes.c_int(), ctypes.c_int64()
         loops(
-            *map(_address, (coefficients, constant, rate)),
-            sines.shape[1], _address(sines), cosines.shape[1], _address(cosines),
-            _address(np.array(scene.omega)), _address(np.array([1e-12])),
-            _address(np.array([2.0])), _address(found), ctypes.byref(ended), ctypes.byref(count),
+            coefficients.ctypes, constant.ctypes, rate.ctypes, sines.shape[1], sines.ctypes,
+            cosines.shape[1], cosines.ctypes, np.array(scene.omega).ctypes,
+            np.array([1e-12]).ctypes, np.array([2.0]).ctypes, found.ctypes, ctypes.byref(ended),
+            ctypes.byref(count),
         )  # fmt: skip
         omega, status, steps = _end(scene, 2.0, 1e-12)
         assert (ended.value, abs(count.value - steps) <= 1) == (status, True), name
         np.testing.assert_allclose(found, omega, rtol=0, atol=1e-13 * np.abs(omega).max())
-
-
-def _address(array: Array) -> ctypes.Array[ctypes.c_double]:
-    """Return the array's memory, columns first, in a form that ctypes passes and keeps alive."""
-    if not array.size:
-        return (ctypes.c_double * 1)()
-    return (ctypes.c_double * array.size).from_buffer(array.T.reshape(-1).data)
-
-
-def test_start_alone_is_a_row() -> None:
-    scene = case_scene(5)
-    found = solve(scene, [0.0], "taylor", 1e-9)
-    np.testing.assert_array_equal(found.omega, [scene.omega])
-    assert (found.ended, found.steps) == ("complete", 0)
 
 
 def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
@@ -280,11 +212,5 @@ def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
 def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number: int) -> None:
     """Of 1500 draws those where a difference that is carried wrongly would have cost the most."""
     generator = np.random.default_rng([11, list(NASTY).index(kind)])
-    for _ in range(number + 1):
-        scene, time = NASTY[kind](generator)
-    times = np.linspace(0.0, time, 33)[1:]
-    truth, *_ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-15)
-    scale = max(np.abs(truth).max(), *map(abs, scene.omega))
-    found, status, _ = _end(scene, time, 1e-3)
-    assert status == 0
-    assert np.abs(found - truth[:, -1]).max() <= 0.4e-3 * scale
+    scene, time = [NASTY[kind](generator) for _ in range(number + 1)][-1]
+    _held_to_fine_rows(scene, time, [1e-3], 0.4)

@@ -6,21 +6,22 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness import Scene, TorqueLaw
+from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Triple, Wave
+from pyharness.model.turned_scenes import turned
 
 Generator = np.random.Generator
 
 
 def triple(values: np.ndarray) -> Triple:
     """Return three plain floats."""
-    first, second, third = (float(x) for x in values)
+    first, second, third = values.tolist()
     return first, second, third
 
 
 def size(generator: Generator, low: float, high: float) -> np.ndarray:
     """Return three numbers of about 10**low to 10**high, of either sign."""
-    values: np.ndarray = generator.normal(size=3) * 10.0 ** generator.uniform(low, high)
-    return values
+    return np.array(generator.normal(size=3) * 10.0 ** generator.uniform(low, high))
 
 
 def waves(generator: Generator, amplitude: tuple[float, float], f: tuple[float, float]) -> Wave:
@@ -28,36 +29,31 @@ def waves(generator: Generator, amplitude: tuple[float, float], f: tuple[float, 
     return triple(size(generator, *amplitude)), float(10.0 ** generator.uniform(*f))
 
 
-def law(
-    generator: Generator, high: float = 2.0, low: float = -1.0, kind: int | None = None
-) -> TorqueLaw:
-    """Return a torque of any kind, or of the one asked for: 0 none, 4 all."""
-    kind = int(generator.integers(5)) if kind is None else kind
-    amplitude, f = (low, high), (-0.5, 2.5)
+def law(generator: Generator, high: float = 2.0, low: float = -1.0, least: int = 0) -> TorqueLaw:
+    """Return a torque of any kind from the least: 0 none, 4 all."""
+    kind = generator.integers(least, 5)
 
-    def some() -> tuple[Wave, ...]:
-        return tuple(waves(generator, amplitude, f) for _ in range(generator.integers(1, 3)))
+    def some() -> list[Wave]:
+        return [waves(generator, (low, high), (-0.5, 2.5)) for _ in range(generator.integers(1, 3))]
 
     return TorqueLaw(
-        triple(size(generator, low, high) * (kind != 0)),
-        triple(size(generator, low, high - 1.0) * (kind in (2, 4))),
-        some() if kind >= 3 else (),
-        some() if kind == 4 else (),
+        size(generator, low, high) * (kind != 0),
+        size(generator, low, high - 1.0) * (kind in (2, 4)),
+        some() if kind >= 3 else [],
+        some() if kind == 4 else [],
     )
 
 
 def moments(generator: Generator) -> np.ndarray:
     """Return three moments that a body can have, in any order."""
-    values = np.sort(generator.uniform(1.0, 10.0, 3))
-    values[2] = min(values[2], 0.999 * (values[0] + values[1]))
-    shuffled: np.ndarray = generator.permutation(values)
-    return shuffled
+    first, second, third = np.sort(generator.uniform(1.0, 10.0, 3))
+    return generator.permutation([first, second, min(third, 0.999 * (first + second))])
 
 
 def plain(generator: Generator) -> tuple[Scene, float]:
     """Return a body, a start and a torque over two orders of magnitude each, and a time."""
     body, torque = moments(generator), law(generator)
-    scene = Scene("", triple(size(generator, -1, 1)), moments=triple(body), torque=torque)
+    scene = Scene("", size(generator, -1, 1), moments=body, torque=torque)
     return scene, float(generator.choice([1, 1, -1]) * 10.0 ** generator.uniform(-1.0, 0.7))
 
 
@@ -65,8 +61,8 @@ def _nearly_symmetric(generator: Generator) -> tuple[Scene, float]:
     scene, t_end = plain(generator)
     one, _, two = scene.moments or (1.0, 1.0, 1.0)
     near = one * (1.0 + 10.0 ** generator.uniform(-12, -1))
-    torque = law(generator, kind=int(generator.integers(1, 5)))
-    return replace(scene, moments=(one, near, min(two, 1.9 * one)), torque=torque), t_end
+    body = (one, near, min(two, 1.9 * one))
+    return replace(scene, moments=body, torque=law(generator, least=1)), t_end
 
 
 def _near_the_separatrix(generator: Generator) -> tuple[Scene, float]:
@@ -78,11 +74,10 @@ def _near_the_separatrix(generator: Generator) -> tuple[Scene, float]:
         start[2] = generator.uniform(0.1, 2.0)
         start[0] = start[2] * np.sqrt(i3 * (i3 - i2) / (i1 * (i2 - i1)))
         start[0] *= 1.0 + 10.0 ** generator.uniform(-6, -2)
-    faint = TorqueLaw(triple(size(generator, -8, 0)))
-    if generator.random() < 0.5:
-        faint = replace(faint, sines=(waves(generator, (-8, 0), (-1, 1.5)),))
+    push = size(generator, -8, 0)
+    some = [waves(generator, (-8, 0), (-1, 1.5))] if generator.random() < 0.5 else []
     t_end = float(generator.choice([1, -1]) * 10.0 ** generator.uniform(0, 1))
-    return Scene("", triple(start), moments=(i1, i2, i3), torque=faint), t_end
+    return Scene("", start, (i1, i2, i3), torque=TorqueLaw(push, sines=some)), t_end
 
 
 def _violent(generator: Generator) -> tuple[Scene, float]:
@@ -99,14 +94,14 @@ def _resonant(generator: Generator) -> tuple[Scene, float]:
     f = spin * np.sqrt(abs((c - a) * (c - b) / (a * b))) * generator.choice([0.5, 1.0, 1.0, 2.0])
     wave = (triple(size(generator, -2, 1)), float(f * (1.0 + 0.01 * generator.normal())))
     t_end = float(10.0 ** generator.uniform(0, 1))
-    return Scene("", triple(start), moments=(a, b, c), torque=TorqueLaw(sines=(wave,))), t_end
+    return Scene("", start, (a, b, c), torque=TorqueLaw(sines=[wave])), t_end
 
 
 def _fast(generator: Generator) -> tuple[Scene, float]:
     """Return waves of up to 1e4 rad/s, faint ones and such that rule the motion."""
     scene, t_end = plain(generator)
     some = [waves(generator, (-1, 3.5), (1.5, 4)) for _ in range(generator.integers(1, 4))]
-    return replace(scene, torque=TorqueLaw(cosines=tuple(some[:1]), sines=tuple(some[1:]))), t_end
+    return replace(scene, torque=TorqueLaw(cosines=some[:1], sines=some[1:])), t_end
 
 
 def _no_body(generator: Generator) -> tuple[Scene, float]:
@@ -119,32 +114,21 @@ def _other_units(generator: Generator) -> tuple[Scene, float]:
     """Return times and moments that are many powers of ten away from one."""
     scene, t_end = plain(generator)
     rate, mass = 10.0 ** generator.uniform(-30, 30), 10.0 ** generator.uniform(-20, 20)
-    torque = rate * rate * mass
-
-    def scaled(some: tuple[Wave, ...]) -> tuple[Wave, ...]:
-        return tuple((triple(np.array(a) * torque), f * rate) for a, f in some)
-
-    law_ = scene.torque
-    return Scene(
-        "", triple(np.array(scene.omega) * rate), moments=triple(np.array(scene.moments) * mass),
-        torque=TorqueLaw(
-            triple(np.array(law_.constant) * torque), triple(np.array(law_.rate) * torque * rate),
-            scaled(law_.sines), scaled(law_.cosines),
-        ),
-    ), t_end / rate  # fmt: skip
+    fast = scaled(scene, rate)
+    heavy = turned(fast, lambda each: triple(mass * np.array(each)), body=True)
+    return replace(heavy, omega=fast.omega), t_end / rate
 
 
 def _long(generator: Generator) -> tuple[Scene, float]:
     scene, _ = plain(generator)
-    torque = law(generator, 0.5, -2.0, int(generator.integers(1, 5)))
+    torque = law(generator, 0.5, -2.0, least=1)
     start = triple(size(generator, -1, 0.3))
     return replace(scene, omega=start, torque=torque), float(10.0 ** generator.uniform(0.7, 1.7))
 
 
 def _from_rest(generator: Generator) -> tuple[Scene, float]:
     scene, t_end = plain(generator)
-    torque = law(generator, kind=int(generator.integers(1, 5)))
-    return replace(scene, omega=(0.0, 0.0, 0.0), torque=torque), t_end
+    return replace(scene, omega=(0.0, 0.0, 0.0), torque=law(generator, least=1)), t_end
 
 
 NASTY: dict[str, Callable[[Generator], tuple[Scene, float]]] = {

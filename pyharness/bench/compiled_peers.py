@@ -5,6 +5,7 @@ write it by hand for speed; so are the stages of the methods.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,29 +14,24 @@ from pyharness.bench.contenders import Maker, refuse_rounding
 from pyharness.compare.candidates import End, Ready, not_finite, plain
 from pyharness.model.scene import Scene
 
-_MOST_STEPS = 10_000_000
+MOST_STEPS = 10_000_000
+Formula = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]
 # Classical Runge-Kutta: stages below the diagonal, weights, nodes.
-_RK4 = (
-    [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]],
-    [1 / 6, 1 / 3, 1 / 3, 1 / 6],
-    [0.0, 0.5, 0.5, 1.0],
-)
+RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0.0, 0.5, 0.5, 1.0]
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
     """Equal steps of RK4, or of the formula of order 8 in DOP853."""
     import numba
 
-    nodes: Sequence[float]
-    if method == "rk4":
-        stages, weights, nodes = _RK4
-    else:
+    formula: Formula = RK4
+    if method != "rk4":
         from scipy.integrate._ivp import dop853_coefficients as table
 
         count = table.N_STAGES
         stages = [table.A[i, :i].tolist() for i in range(count)]
-        weights, nodes = table.B.tolist(), table.C[:count].tolist()
-    kernel = numba.njit(fastmath=False)(_compiled(_steps_source(scene, stages, weights, nodes)))
+        formula = stages, table.B.tolist(), table.C[:count].tolist()
+    kernel = numba.njit(fastmath=False)(_compiled(_steps_source(scene, formula)))
     omega0, omega = np.array(scene.omega), np.empty(3)
 
     def make(horizon: float, setting: float) -> Ready:
@@ -45,7 +41,7 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
             kernel(omega0, horizon, steps, omega)
             return omega
 
-        return Ready(run, lambda result: End(plain(result), evaluations=steps * len(weights)))
+        return Ready(run, lambda result: End(plain(result), evaluations=steps * len(formula[1])))
 
     return make
 
@@ -64,21 +60,17 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
         if name == "lsoda":
             refuse_rounding("LSODA", setting)
         times, calls = np.array([0.0, horizon]), np.zeros(1)
-
-        address = function.address
-
-        def run() -> Any:
-            return solver(address, omega0, times, calls, setting, setting * largest, _MOST_STEPS)
+        given = omega0, times, calls, setting, setting * largest, MOST_STEPS
 
         def read(result: Any) -> End:
             rows, success = result
             if not success:
                 return not_finite("the solver reports a failure")
             calls[0] = 0.0
-            solver(counting.address, omega0, times, calls, setting, setting * largest, _MOST_STEPS)
+            solver(counting.address, *given)
             return End(plain(rows[-1]), evaluations=int(calls[0]))
 
-        return Ready(run, read)
+        return Ready(partial(solver, function.address, *given), read)
 
     return make
 
@@ -90,15 +82,17 @@ def _compiled(source: str) -> Any:
     return names["function"]
 
 
-def _rates(scene: Scene, time: str, state: Sequence[str]) -> list[str]:
-    """Return the right-hand sides as text."""
+def rates(
+    scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
+) -> list[str]:
+    """Return the right-hand sides as text; A, B, C are the scene's where none are given."""
     x, y, z = state
     moments = scene.moments or (1.0, 1.0, 1.0)
     law = scene.torque
-    rates = []
+    found = []
     for axis, product in enumerate((f"{y} * {z}", f"{x} * {z}", f"{x} * {y}")):
         terms = []
-        coefficient = scene.euler_coefficients[axis]
+        coefficient = (coefficients or scene.euler_coefficients)[axis]
         if coefficient:
             terms.append(f"{coefficient!r} * {product}")
         if law.constant[axis]:
@@ -110,17 +104,13 @@ def _rates(scene: Scene, time: str, state: Sequence[str]) -> list[str]:
                 if amplitude[axis]:
                     wave = f"{function}({frequency!r} * ({time}))"
                     terms.append(f"{amplitude[axis] / moments[axis]!r} * {wave}")
-        rates.append(" + ".join(terms) or "0.0")
-    return rates
+        found.append(" + ".join(terms) or "0.0")
+    return found
 
 
-def _steps_source(
-    scene: Scene,
-    stages: Sequence[Sequence[float]],
-    weights: Sequence[float],
-    nodes: Sequence[float],
-) -> str:
+def _steps_source(scene: Scene, formula: Formula) -> str:
     """Return a function of equal Runge-Kutta steps without a loop over stages or components."""
+    stages, weights, nodes = formula
     lines = [
         "def function(omega0, t_end, steps, omega):",
         "    h = t_end / steps",
@@ -132,7 +122,7 @@ def _steps_source(
         for name in "xyz":
             lines.append(f"        {name}s = {name}{_increment(row, name)}")
         time = f"t + {nodes[i]!r} * h" if nodes[i] else "t"
-        for name, rate in zip("xyz", _rates(scene, time, ("xs", "ys", "zs")), strict=True):
+        for name, rate in zip("xyz", rates(scene, time, ("xs", "ys", "zs")), strict=True):
             lines.append(f"        k{name}{i} = {rate}")
     for name in "xyz":
         lines.append(f"        {name} = {name}{_increment(weights, name)}")
@@ -148,7 +138,7 @@ def _increment(factors: Sequence[float], name: str) -> str:
 def _callback_source(scene: Scene, counted: bool) -> str:
     """Return a right-hand side as numbalsoda calls it; `p` counts the calls if asked to."""
     lines = ["def function(t, u, du, p):", "    x, y, z = u[0], u[1], u[2]"]
-    lines += [f"    du[{i}] = {rate}" for i, rate in enumerate(_rates(scene, "t", ("x", "y", "z")))]
+    lines += [f"    du[{i}] = {rate}" for i, rate in enumerate(rates(scene, "t", "xyz"))]
     if counted:
         lines.append("    p[0] += 1.0")
     return "\n".join(lines) + "\n"

@@ -13,7 +13,6 @@ from pyharness.methods.plan import closed_form
 from pyharness.methods.prepared import prepare
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array
 
 HORIZONS = tuple(10.0 ** (k / 2.0) for k in range(11))
 _ROUNDING = 2.0**-53
@@ -22,52 +21,31 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """Error at one time.
-
-    Attributes
-    ----------
-    time : float
-        s.
-    error : float
-        Largest difference of the Taylor method from the closed form over `_STARTS` starts of the
-        same motion, relative to the largest angular velocity.
-    conditioning : float
-        What one rounding of the time changes, likewise.
-    steps : int
-        Taylor steps of one run.
-    """
+    """Error at one time (s)."""
 
     time: float
+    # Largest difference of the Taylor method from the closed form over `_STARTS` starts of the same
+    # motion, relative to the largest angular velocity; what one rounding of the time changes.
     error: float
     conditioning: float
-    steps: int
+    steps: int  # of the Taylor method in one run
 
 
 def growth(
     scene: Scene, horizons: Sequence[float] = HORIZONS, tolerance: float = 1e-15
 ) -> list[Growth]:
-    """Measure the growth of the error of the Taylor method on a torque-free body.
+    """Measure the growth of the error of the Taylor method at times (s) of a torque-free body.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without torque.
-    horizons : sequence of float
-        Times, s.
-    tolerance : float
-        Of the Taylor method.
-
-    Raises
-    ------
-    InputError
-        Where the scene has no closed form.
+    InputError where the scene has no closed form.
     """
     if closed_form(scene) is None:
         raise InputError("growth: the scene has no closed form to be held against")
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()
-    starts = _starts(scene, exact(np.array(scene.omega), 0.0))
+    # Of one motion, so that no lucky phase decides.
+    omega = np.array(scene.omega)
+    starts = np.array([exact(omega, 0.37 * k).copy() for k in range(_STARTS)])
     found = []
     for time in horizons:
         errors, turns = [], []
@@ -79,9 +57,3 @@ def growth(
         conditioning = _ROUNDING * time * max(turns) / size
         found.append(Growth(time, float(max(errors)) / size, conditioning, series.steps))
     return found
-
-
-def _starts(scene: Scene, omega: Array) -> Array:
-    """Return states of one motion, so that no lucky phase decides."""
-    exact = prepare(scene, "closed-form")
-    return np.array([exact(omega.copy(), 0.37 * k).copy() for k in range(_STARTS)])

@@ -8,15 +8,15 @@ of each in turn, so that what else the machine does hits all alike. The median c
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
-from pyharness.bench.contenders import Contender, Maker, RefusedError
-from pyharness.compare.candidates import not_finite
-from pyharness.compare.timing import Entry, time_calls
+from pyharness.bench.contenders import Contender, Maker
+from pyharness.compare.candidates import Ready, not_finite
+from pyharness.compare.timing import seconds
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
@@ -31,27 +31,17 @@ _LONGEST_CALL = 1.0  # s
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
 _LARGEST_STEPS = 1 << 22
 _FAILURES = 12
-
-Progress = Callable[[str], None]
+_ROUNDS = 9
+_BATCH = 1e-3  # s; calls faster than this are batched
 
 
 @dataclass(frozen=True)
 class Workload:
-    """A scene and how far to go.
+    """A scene and how far to go."""
 
-    Attributes
-    ----------
-    label : str
-        `5` for Case 5 to T = 3, `3L` for Case 3 to T = 100.
-    scene : Scene
-        What to integrate.
-    horizon : float
-        T, s.
-    """
-
-    label: str
+    label: str  # `5` for Case 5 to T = 3, `3L` for Case 3 to T = 100
     scene: Scene
-    horizon: float
+    horizon: float  # T, s
 
     @property
     def group(self) -> str:
@@ -63,36 +53,16 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """A contender with one setting.
-
-    Attributes
-    ----------
-    workload : Workload
-        What was integrated.
-    method : str
-        Name of the contender.
-    kind : str
-        What the setting is: tolerance, steps, none.
-    setting : float or None
-        Its value.
-    seconds : float or None
-        Median time of a call; None where the call failed.
-    error : float or None
-        Largest error of omega at T over the largest component there; None where it failed.
-    evaluations : int or None
-        Right-hand sides of a call, where they can be counted.
-    note : str
-        Why it failed.
-    """
+    """A contender with one setting."""
 
     workload: Workload
-    method: str
-    kind: str
+    method: str  # name of the contender
+    kind: str  # what the setting is: tolerance, steps, none
     setting: float | None
-    seconds: float | None
-    error: float | None
-    evaluations: int | None
-    note: str = ""
+    seconds: float | None  # median time of a call; None where it failed
+    error: float | None  # of omega at T, over the largest component there; None where it failed
+    evaluations: int | None  # right-hand sides of a call, where they can be counted
+    note: str = ""  # why it failed
 
 
 @dataclass(frozen=True)
@@ -107,73 +77,65 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a run of the benchmark found.
-
-    Attributes
-    ----------
-    workloads, rows, refused : list
-        What was asked, measured, and not run.
-    preparation : dict
-        Seconds of compiling and of first calls by (case, method).
-    doubt : dict
-        Relative error that the reference may have, by label.
-    """
+    """What a run of the benchmark found."""
 
     workloads: list[Workload]
     rows: list[Row]
     refused: list[Refusal]
-    preparation: dict[tuple[int | None, str], float]
-    doubt: dict[str, float]
+    preparation: dict[tuple[int | None, str], float]  # s, by (case, method)
+    doubt: dict[str, float]  # relative error that the reference may have, by label
 
 
 def workloads(case: int | None = None, horizon: float | None = None) -> list[Workload]:
     """Return what is integrated: Cases 2 to 7, Cases 3 and 4 also for long; or what is asked."""
     cases = _CASES if case is None else (case,)
-    if horizon is not None:
-        mark = "" if horizon == HORIZON else "L" if horizon == LONG_HORIZON else f" T={horizon:g}"
-        return [Workload(f"{n}{mark}", case_scene(n), horizon) for n in cases]
-    short = [Workload(str(n), case_scene(n), HORIZON) for n in cases]
-    return short + [
-        Workload(f"{n}L", case_scene(n), LONG_HORIZON) for n in cases if n in _LONG_CASES
-    ]
+    asked = [(n, HORIZON if horizon is None else horizon) for n in cases]
+    if horizon is None:
+        asked += [(n, LONG_HORIZON) for n in cases if n in _LONG_CASES]
+    marks = {HORIZON: "", LONG_HORIZON: "L"}
+    return [Workload(f"{n}{marks.get(t, f' T={t:g}')}", case_scene(n), t) for n, t in asked]
 
 
 def measure(
-    loads: Sequence[Workload], contenders: Sequence[Contender], progress: Progress | None = None
+    loads: Sequence[Workload],
+    contenders: Sequence[Contender],
+    say: Callable[[str], None] = lambda _: None,
 ) -> Finding:
-    """Run the benchmark."""
-    say = progress or (lambda text: None)
+    """Run the benchmark; `say` is told how far it is."""
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | None, str], Maker] = {}
     for number, load in enumerate(loads, 1):
         place = f"case {load.label} ({number} of {len(loads)})"
-        say(f"{place}: reference")
+
+        def tell(text: str, place: str = place) -> None:
+            say(f"{place}: {text}")
+
+        tell("reference")
         truth = reference(load.scene, [load.horizon], precise=True)
         size = float(np.abs(truth.omega).max(initial=0.0)) or 1.0
         found.doubt[load.label] = truth.estimate / size
-        entries: list[tuple[Contender, Entry]] = []
+        entries: list[tuple[Ready, Row]] = []
         for contender in contenders:
-            say(f"{place}: {contender.name}")
+            tell(contender.name)
             key = (load.scene.case, contender.name)
             # Compiled code is kept for the same scene with another horizon.
             begin = perf_counter()
             try:
                 if key not in makers:
                     makers[key] = contender.prepare(load.scene)
-            except RefusedError as error:
+            except InputError as error:
                 found.refused.append(Refusal(load, contender.name, None, str(error)))
                 continue
             spent = perf_counter() - begin
             first, more = _first_calls(load, contender, makers[key], truth, found.refused)
             found.preparation[key] = found.preparation.get(key, 0.0) + spent + more
-            entries += [(contender, entry) for entry in first]
-        time_calls([entry for _, entry in entries], partial(_say_at, say, place))
-        found.rows.extend(_row(load, contender, entry) for contender, entry in entries)
+            entries += first
+        running = [ready.run for ready, row in entries if row.error is not None]
+        times = iter(seconds(running, _BATCH, _ROUNDS, tell))
+        for _, row in entries:
+            median = None if row.error is None else next(times)
+            found.rows.append(replace(row, seconds=median))
     return found
-
-
-def _say_at(say: Progress, place: str, text: str) -> None:
-    say(f"{place}: {text}")
 
 
 def relative_error(omega: Array, truth: Reference) -> float | None:
@@ -208,21 +170,22 @@ def ladder(contender: Contender, scene: Scene, horizon: float) -> Iterator[float
 
 def _first_calls(
     load: Workload, contender: Contender, make: Maker, truth: Reference, refused: list[Refusal]
-) -> tuple[list[Entry], float]:
+) -> tuple[list[tuple[Ready, Row]], float]:
     """Return what will be timed, and the seconds that making and first calls took beyond it."""
-    entries: list[Entry] = []
-    spent = preparing = before = 0.0
-    settings = ladder(contender, load.scene, load.horizon)
-    for setting in settings:
-        last = entries[-1].first if entries else 0.0
+    entries: list[tuple[Ready, Row]] = []
+    errors: list[float | None] = []
+    spent = preparing = last = before = 0.0
+    for setting in ladder(contender, load.scene, load.horizon):
+        named = None if contender.setting == "none" else setting
         # Bounded: one call may have been interrupted.
         expected = last * min(4.0, max(1.0, last / before)) if before else last
+        hopeless = ""
         if expected > _LONGEST_CALL or spent + expected > _BUDGET[contender.setting]:
-            reason = f"and finer: left out, a call would take about {expected:.2g} s"
-            refused.append(Refusal(load, contender.name, setting, reason))
-            break
-        if len(entries) >= _FAILURES and all(e.error is None for e in entries[-_FAILURES:]):
-            reason = f"and finer: left out, {_FAILURES} settings in a row came to nothing"
+            hopeless = f"a call would take about {expected:.2g} s"
+        elif len(errors) >= _FAILURES and set(errors[-_FAILURES:]) == {None}:
+            hopeless = f"{_FAILURES} settings in a row came to nothing"
+        if hopeless:
+            reason = f"and finer: left out, {hopeless}"
             refused.append(Refusal(load, contender.name, setting, reason))
             break
         try:
@@ -236,8 +199,7 @@ def _first_calls(
                 result = ready.run()
                 first = perf_counter() - middle
                 end = ready.read(result)
-        except RefusedError as refusal:
-            named = None if contender.setting == "none" else setting
+        except InputError as refusal:
             refused.append(Refusal(load, contender.name, named, str(refusal)))
             continue
         except (UserWarning, ValueError, ArithmeticError, RuntimeError) as failure:
@@ -246,12 +208,16 @@ def _first_calls(
             continue
         preparing += max(0.0, middle - begin - first)
         spent += first
-        before = last
+        before, last = last, first
         error = relative_error(end.omega, truth)
         if error is None and end.ended == "complete":
             end = not_finite()
-        entries.append(Entry(ready, first, end, error, setting))
-        if contender.setting == "steps" and _at_rounding([entry.error for entry in entries]):
+        errors.append(error)
+        counted = None if error is None else end.evaluations
+        note = "" if end.ended == "complete" else end.ended
+        name, kind = contender.name, contender.setting
+        entries.append((ready, Row(load, name, kind, named, None, error, counted, note)))
+        if kind == "steps" and _at_rounding(errors):
             break
     return entries, preparing
 
@@ -260,16 +226,3 @@ def _at_rounding(errors: Sequence[float | None]) -> bool:
     """Whether smaller steps no longer help: three times in a row nothing was gained."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10
-
-
-def _row(load: Workload, contender: Contender, entry: Entry) -> Row:
-    return Row(
-        workload=load,
-        method=contender.name,
-        kind=contender.setting,
-        setting=None if contender.setting == "none" else entry.setting,
-        seconds=entry.seconds,
-        error=entry.error,
-        evaluations=entry.end.evaluations if entry.error is not None else None,
-        note="" if entry.end.ended == "complete" else entry.end.ended,
-    )

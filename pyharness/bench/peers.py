@@ -2,35 +2,33 @@
 
 import warnings
 from collections.abc import Callable
-from fractions import Fraction
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
+from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Contender, Maker, refuse_rounding
 from pyharness.compare.candidates import End, Ready, not_finite, plain
-from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene import Scene
+from pyharness.truth.reference import exact_coefficients
 
 _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
-_MOST_STEPS = 10_000_000
 
 
 def peers() -> list[Contender]:
     """Return all peers, installed or not."""
-    from pyharness.bench import compiled_peers as compiled
-
     # 2**-52 is heyoka's default.
     finest = (*TOLERANCES, 2.0**-52)
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> Contender:
         settings = finest if name == "heyoka" else TOLERANCES
-        return Contender(name, "peer", "tolerance", prepare, settings, package=package)
+        return Contender(name, "tolerance", prepare, settings, package=package)
 
     def fixed(name: str, order: int) -> Contender:
         prepare = partial(compiled.numba_fixed, name)
-        return Contender(f"numba-{name}", "peer", "steps", prepare, order=order, package="numba")
+        return Contender(f"numba-{name}", "steps", prepare, order=order, package="numba")
 
     return [
         adaptive("heyoka", "heyoka", _heyoka),
@@ -49,14 +47,6 @@ def peers() -> list[Contender]:
 def installed(contender: Contender) -> bool:
     """Whether the package of a contender is there."""
     return not contender.package or find_spec(contender.package) is not None
-
-
-def exact_coefficients(scene: Scene) -> Triple:
-    """Return A, B, C of the moments as they are, rounded once."""
-    if scene.moments is None:
-        return scene.euler_coefficients
-    i1, i2, i3 = map(Fraction, scene.moments)
-    return float((i2 - i3) / i1), float((i3 - i1) / i2), float((i1 - i2) / i3)
 
 
 def _heyoka(scene: Scene) -> Maker:
@@ -92,22 +82,12 @@ def _heyoka(scene: Scene) -> Maker:
 def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
     import heyoka
 
-    x, y, z = heyoka.make_vars("x", "y", "z")
-    law, time = scene.torque, heyoka.time
-    moments = scene.moments or (1.0, 1.0, 1.0)
-    products = (y * z, x * z, x * y)
-    equations = []
-    for axis, coefficient in enumerate(exact_coefficients(scene)):
-        moment = moments[axis]
-        rate = coefficient * products[axis] + law.constant[axis] / moment
-        if law.rate[axis]:
-            rate = rate + law.rate[axis] / moment * time
-        for waves, function in ((law.sines, heyoka.sin), (law.cosines, heyoka.cos)):
-            for amplitude, frequency in waves:
-                if amplitude[axis]:
-                    rate = rate + amplitude[axis] / moment * function(frequency * time)
-        equations.append(((x, y, z)[axis], rate))
-    return equations
+    state = heyoka.make_vars("x", "y", "z")
+    names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
+    names |= dict(zip("xyz", state, strict=True))
+    coefficients = [float(each) for each in exact_coefficients(scene)]
+    rates = [eval(rate, names) for rate in compiled.rates(scene, "t", "xyz", coefficients)]
+    return [(x, heyoka.expression(rate)) for x, rate in zip(state, rates, strict=True)]
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
@@ -141,7 +121,7 @@ def _odeint(scene: Scene) -> Maker:
         refuse_rounding("LSODA", setting)
         run = partial(
             odeint, scene.right_hand_side(), scene.omega, np.array([0.0, horizon]),
-            rtol=setting, atol=setting * largest, tfirst=True, mxstep=_MOST_STEPS,
+            rtol=setting, atol=setting * largest, tfirst=True, mxstep=compiled.MOST_STEPS,
         )  # fmt: skip
 
         def read(rows: Any) -> End:

@@ -1,9 +1,10 @@
 """The pictures of `bench`: error against time and against right-hand sides; growth of errors."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pyharness.bench.measure import Finding, Row, Workload
+from pyharness.bench.measure import Finding, Workload
 from pyharness.model.report import Picture, Table, numbers
 
 if TYPE_CHECKING:
@@ -36,15 +37,22 @@ def bench_picture(finding: Finding, data: Table) -> Picture:
     names = list(dict.fromkeys(row.method for row in finding.rows))
     styles = _styles(names)
     for (left, right), load in zip(axes, finding.workloads, strict=True):
-        rows = [row for row in finding.rows if row.workload == load and _shown(row)]
+        rows = [
+            (row.method, 1e6 * row.seconds, row.evaluations, max(row.error, _FLOOR / 8.0))
+            for row in finding.rows
+            if row.workload == load and row.seconds is not None
+            if row.error is not None and row.error < 1.0
+        ]
         for name in names:
-            own = [row for row in rows if row.method == name]
-            _draw(left, name, [(1e6 * (row.seconds or 0.0), row) for row in own], styles[name])
-            counted = [(float(row.evaluations), row) for row in own if row.evaluations]
-            _draw(right, name, counted, styles[name])
+            own = [row[1:] for row in rows if row[0] == name]
+            timed = [(time, error) for time, _, error in own]
+            counted = [(float(count), error) for _, count, error in own if count]
+            for axis, points in ((left, timed), (right, counted)):
+                if points:
+                    axis.plot(*zip(*points, strict=True), label=name, **styles[name])
         _frame(left, load, "microseconds per solve")
         _frame(right, load, "right-hand sides per solve")
-        if any(row.evaluations for row in rows):
+        if any(count for _, _, count, _ in rows):
             _slopes(right)
     handles: dict[str, Any] = {}
     for each in axes.flat:
@@ -66,7 +74,7 @@ def bench_picture(finding: Finding, data: Table) -> Picture:
 
 
 def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    used: dict[str, int] = {}
+    used: Counter[str] = Counter()
     styles = {}
     for name in names:
         if name in _OURS:
@@ -75,26 +83,14 @@ def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
             family = "gauss"
         else:
             family = "program" if name.startswith(_PROGRAMS) else "peer"
-        marker = _MARKERS[used.get(family, 0) % len(_MARKERS)]
-        used[family] = used.get(family, 0) + 1
+        marker = _MARKERS[used[family] % len(_MARKERS)]
+        used[family] += 1
         # Original filled, corrected open; the same for peers and ours.
         face = _FAMILIES[family]["color"] if family in ("ours", "program") else "white"
         styles[name] = _FAMILIES[family] | {
             "marker": marker, "markersize": 5.0, "markerfacecolor": face, "markeredgewidth": 0.8,
         }  # fmt: skip
     return styles
-
-
-def _shown(row: Row) -> bool:
-    return row.error is not None and row.seconds is not None and row.error < 1.0
-
-
-def _draw(
-    axes: "Axes", name: str, points: Sequence[tuple[float, Row]], style: dict[str, Any]
-) -> None:
-    if points:
-        errors = [max(row.error or 0.0, _FLOOR / 8.0) for _, row in points]
-        axes.plot([x for x, _ in points], errors, label=name, **style)
 
 
 def _frame(axes: "Axes", load: Workload, label: str) -> None:

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from pyharness.bench.growth import Growth
-from pyharness.bench.measure import TARGETS, Finding, Workload
+from pyharness.bench.measure import TARGETS, Finding, Refusal, Row
 from pyharness.bench.pictures import bench_picture, growth_picture
 from pyharness.bench.savings import Saving
 from pyharness.bench.scores import groups, means, scores, yardstick
@@ -21,7 +21,7 @@ from pyharness.model.report import (
     numbers,
     short,
     words,
-)
+)  # fmt: skip
 
 _MOST_SHOWN = 3
 _RATIO = Column("ratio", digits(".2f"), full=digits(".2f"))
@@ -115,35 +115,24 @@ def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
 def _record(finding: Finding) -> dict[str, Any]:
     return {
         "rows": [
-            {
-                "case": row.workload.scene.case,
-                "horizon": row.workload.horizon,
-                "method": row.method,
-                "setting": row.setting,
-                "seconds": row.seconds,
-                "error": row.error,
-                "evaluations": row.evaluations,
-                "kind": row.kind,
-                "note": row.note or None,
-            }
+            _asked(row)
+            | {name: getattr(row, name) for name in ("seconds", "error", "evaluations", "kind")}
+            | {"note": row.note or None}
             for row in finding.rows
         ],
-        "refused": [
-            {
-                "case": each.workload.scene.case,
-                "horizon": each.workload.horizon,
-                "method": each.method,
-                "setting": each.setting,
-                "reason": each.reason,
-            }
-            for each in finding.refused
-        ],
+        "refused": [_asked(each) | {"reason": each.reason} for each in finding.refused],
         "compile_seconds": [
             {"case": case, "method": method, "seconds": seconds}
             for (case, method), seconds in finding.preparation.items()
         ],
         "reference_error": finding.doubt,
     }
+
+
+def _asked(each: Row | Refusal) -> dict[str, Any]:
+    load = each.workload
+    asked = {"case": load.scene.case, "horizon": load.horizon}
+    return asked | {"method": each.method, "setting": each.setting}
 
 
 def microseconds(seconds: float | None) -> str:
@@ -178,27 +167,21 @@ def _parts(finding: Finding) -> list[tuple[str, Table]]:
             pairs = zip(score.seconds, score.ratios, strict=True)
             rows.append([score.method, *(x for pair in pairs for x in pair), score.best])
         if rows:
-            parts.append((_title(finding, load), Table(columns, rows)))
+            doubt = short(finding.doubt.get(load.label))
+            title = f"Case {load.label}: {load.scene.name}, T = {load.horizon:g} s "
+            title += f"(reference good to {doubt} of the largest omega)"
+            parts.append((title, Table(columns, rows)))
     columns = [Column("ratio at", left=True), *(Column(name, ratio) for name in targets)]
     for group, loads in groups(finding).items():
         if len(loads) > 1:
             labels = ", ".join(load.label for load in loads)
             title = f"Geometric mean of {yardstick(finding)} time / own time: {group} "
             title += f"(cases {labels})"
-            rows = [[each.method, *each.ratios] for each in means(finding, loads)]
-            rows = [row for row in rows if set(row[1:]) != {None}]
+            found = means(finding, loads)
+            rows = [[name, *ratios] for name, ratios in found.items() if set(ratios) != {None}]
             if rows:
                 parts.append((title, Table(columns, rows)))
     return parts
-
-
-def _title(finding: Finding, load: Workload) -> str:
-    scene = load.scene
-    doubt = short(finding.doubt.get(load.label))
-    return (
-        f"Case {load.label}: {scene.name}, T = {load.horizon:g} s "
-        f"(reference good to {doubt} of the largest omega)"
-    )
 
 
 def _notes(finding: Finding) -> list[str]:
@@ -218,23 +201,19 @@ def _notes(finding: Finding) -> list[str]:
 
 def not_measured(finding: Finding) -> list[str]:
     """Return what came to nothing, a line for each contender and reason, with the first places."""
-    lines = []
+    # What a call would take, and where it ended, differs from case to case; the reason does not.
+    came: list[tuple[Row | Refusal, str]] = [
+        (each, each.reason.split(", a call would take")[0]) for each in finding.refused
+    ]
+    came += [(row, row.note.split(" at step")[0]) for row in finding.rows if row.error is None]
     reasons: dict[tuple[str, str], list[str]] = {}
-    for each in finding.refused:
-        # What a call would take differs from case to case; the reason does not.
-        reason = each.reason.split(", a call would take")[0]
-        reasons.setdefault((each.method, reason), []).append(_place(each.workload, each.setting))
-    for row in finding.rows:
-        if row.error is None:
-            reason = row.note.split(" at step")[0]
-            place = _place(row.workload, row.setting)
-            reasons.setdefault((row.method, reason), []).append(place)
+    for each, reason in came:
+        place = f"case {each.workload.label}"
+        place += "" if each.setting is None else f" at {each.setting:g}"
+        reasons.setdefault((each.method, reason), []).append(place)
+    lines = []
     for (method, reason), places in reasons.items():
         shown = ", ".join(places[:_MOST_SHOWN])
         more = f" and {len(places) - _MOST_SHOWN} more" if len(places) > _MOST_SHOWN else ""
         lines.append(f"{method}: {reason} ({shown}{more})")
     return lines
-
-
-def _place(load: Workload, setting: float | None) -> str:
-    return f"case {load.label}" if setting is None else f"case {load.label} at {setting:g}"

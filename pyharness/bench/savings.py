@@ -21,21 +21,11 @@ _SECONDS = 2e-3  # of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """One skip.
+    """One skip."""
 
-    Attributes
-    ----------
-    part : str
-        What is skipped, as the plan names it.
-    where : str
-        The scene or program that shows it.
-    with_it, without : float
-        Seconds with the part computed and without, medians of interleaved batches.
-    """
-
-    part: str
-    where: str
-    with_it: float
+    part: str  # what is skipped, as the plan names it
+    where: str  # the scene or program that shows it
+    with_it: float  # s with the part computed, a median of interleaved batches
     without: float
 
     @property
@@ -46,70 +36,41 @@ class Saving:
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
     """Measure every skip; `t_end` in s, `tolerance` relative."""
+    constant = case_scene(5)
+    times = [t_end * k / 100.0 for k in range(1, 101)]
+    rows = prepare(constant, "taylor", tolerance)
+    one: Callable[[], object]
+    other: Callable[[], object]
     found = []
     for case in (2, 3, 4):
         scene = case_scene(case)
-        found.append(
-            _saving(
-                "integration",
-                f"Case {case}: closed form",
-                _solver(scene, "taylor", t_end, tolerance),
-                _solver(scene, "closed-form", t_end, tolerance),
-            )
-        )
-    constant = case_scene(5)
-    found.append(
-        _saving(
-            "torque of time",
-            "Case 5: constant torque",
-            _solver(_as_if_varying(constant), "taylor", t_end, tolerance),
-            _solver(constant, "taylor", t_end, tolerance),
-        )
+        one, other = (_solver(scene, name, t_end, tolerance) for name in ("taylor", "closed-form"))
+        found.append(_saving("integration", f"Case {case}: closed form", one, other))
+    one, other = (
+        _solver(scene, "taylor", t_end, tolerance) for scene in (_as_if_varying(constant), constant)
     )
-    times = [t_end * k / 100.0 for k in range(1, 101)]
-    rows = prepare(constant, "taylor", tolerance)
-    found.append(
-        _saving(
-            "dense output",
-            "Case 5: 100 rows",
-            lambda: rows.trajectory(constant.omega, times),
-            lambda: rows.trajectory(constant.omega, times[-1:]),
-        )
-    )
+    found.append(_saving("torque of time", "Case 5: constant torque", one, other))
+    one, other = (partial(rows.trajectory, constant.omega, each) for each in (times, times[-1:]))
+    found.append(_saving("dense output", "Case 5: 100 rows", one, other))
     for program in PROGRAMS:
-        scene = replace(constant, steps=1000)
-        listing = corrected(program)
+        one = partial(compiled.run, replace(constant, steps=1000), corrected(program))
         found.append(
-            _saving(
-                "velocity",
-                f"{program}, 1000 steps",
-                partial(compiled.run, scene, listing),
-                partial(compiled.run, scene, listing, velocity=False),
-            )
+            _saving("velocity", f"{program}, 1000 steps", one, partial(one, velocity=False))
         )
+    code = "import pyharness.methods.prepared"
     for part, module in (("SciPy", "scipy.integrate"), ("reference", "pyharness.truth.reference")):
-        code = "import pyharness.methods.prepared"
-        found.append(
-            _saving(
-                part,
-                f"a process that imports {module}",
-                partial(_python, f"{code}, {module}"),
-                partial(_python, code),
-            )
-        )
+        one, other = partial(_python, f"{code}, {module}"), partial(_python, code)
+        found.append(_saving(part, f"a process that imports {module}", one, other))
     return found
 
 
 def _solver(scene: Scene, method: str, t_end: float, tolerance: float) -> Callable[[], object]:
-    solver = prepare(scene, method, tolerance)
-    omega = np.array(scene.omega)
-    return lambda: solver(omega, t_end)
+    return partial(prepare(scene, method, tolerance), np.array(scene.omega), t_end)
 
 
 def _as_if_varying(scene: Scene) -> Scene:
     # A rate too small to move a bit, so that the kernel has to look at the time.
-    law = replace(scene.torque, rate=(1e-300, 0.0, 0.0))
-    return replace(scene, torque=law)
+    return replace(scene, torque=replace(scene.torque, rate=(1e-300, 0.0, 0.0)))
 
 
 def _python(code: str) -> None:

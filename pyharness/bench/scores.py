@@ -12,41 +12,18 @@ YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 @dataclass(frozen=True)
 class Score:
-    """A contender on one workload.
-
-    Attributes
-    ----------
-    method : str
-        Its name.
-    seconds : tuple of (float or None)
-        Time of the fastest setting whose error is at most each of `TARGETS`.
-    best : float or None
-        The smallest error of any setting.
-    ratios : tuple of (float or None)
-        Time of the yardstick over its own: above 1 it is faster.
-    """
+    """A contender on one workload."""
 
     method: str
-    seconds: tuple[float | None, ...]
-    best: float | None
-    ratios: tuple[float | None, ...]
-
-
-@dataclass(frozen=True)
-class Mean:
-    """Geometric means of the ratios of a contender over the workloads of a group."""
-
-    method: str
-    ratios: tuple[float | None, ...]
+    seconds: tuple[float | None, ...]  # of the fastest setting with an error of each of `TARGETS`
+    best: float | None  # the smallest error of any setting
+    ratios: tuple[float | None, ...]  # time of the yardstick over its own: above 1 it is faster
 
 
 def yardstick(finding: Finding) -> str | None:
     """Return the contender that others are measured by; None where nothing was measured."""
     names = list(dict.fromkeys(row.method for row in finding.rows))
-    for name in YARDSTICKS:
-        if name in names:
-            return name
-    return names[0] if names else None
+    return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
 
 def scores(finding: Finding, load: Workload) -> list[Score]:
@@ -75,18 +52,17 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
     return dict(sorted(found.items(), key=lambda item: (item[1][0].horizon, item[0])))
 
 
-def means(finding: Finding, loads: Sequence[Workload]) -> list[Mean]:
+def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
     """Return geometric means over `loads`; None where an error was not reached in all of them."""
-    tables = [{score.method: score for score in scores(finding, load)} for load in loads]
-    names = list(dict.fromkeys(name for table in tables for name in table))
-    found = []
-    for name in names:
-        columns = []
-        for index in range(len(TARGETS)):
-            ratios = [table[name].ratios[index] if name in table else None for table in tables]
-            columns.append(_geometric_mean(ratios))
-        found.append(Mean(name, tuple(columns)))
-    return found
+    tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
+    names = dict.fromkeys(name for table in tables for name in table)
+    nowhere = (None,) * len(TARGETS)
+    return {
+        name: list(
+            map(_geometric_mean, zip(*(table.get(name, nowhere) for table in tables), strict=True))
+        )
+        for name in names
+    }
 
 
 def _time_to(rows: Sequence[Row], target: float) -> float | None:
@@ -104,6 +80,6 @@ def _ratio(by: float | None, seconds: float | None) -> float | None:
 
 def _geometric_mean(ratios: Sequence[float | None]) -> float | None:
     known = [ratio for ratio in ratios if ratio is not None]
-    if not known or len(known) < len(ratios):
+    if len(known) < len(ratios):
         return None
     return math.exp(math.fsum(map(math.log, known)) / len(known))

@@ -13,26 +13,15 @@ from pyharness.truth.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """How far a trajectory is from the truth.
+    """How far a trajectory is from the truth."""
 
-    Attributes
-    ----------
-    omega : tuple of float
-        Largest error of each component (rad/s).
-    velocity : float or None
-        Largest error of any component of V (m/s).
-    energy, momentum : float or None
-        Largest drift of energy and of momentum squared, relative to the start; None where a
-        torque acts or the moments are not known.
-    error : ndarray, shape (n,)
-        Largest error of any component of omega at each result (rad/s).
-    """
-
-    omega: tuple[float, float, float]
-    velocity: float | None
+    omega: tuple[float, float, float]  # largest error of each component (rad/s)
+    velocity: float | None  # largest error of any component of V (m/s)
+    # Largest drifts of energy and of momentum squared, relative to the start; None where a torque
+    # acts or the moments are not known.
     energy: float | None
     momentum: float | None
-    error: Array
+    error: Array  # largest error of any component of omega at each result (rad/s)
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
@@ -75,26 +64,22 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
     """Name all in which two trajectories of a program differ: bits, counters, stop, IER."""
-    found = [
-        name
-        for name, x, y in (
-            ("steps", first.steps, second.steps),
-            ("evaluations", first.evaluations, second.evaluations),
-            ("ending", first.ended, second.ended),
-            ("stop", first.stop, second.stop),
-        )
-        if x != y
-    ]
+    counts = (
+        ("steps", first.steps, second.steps),
+        ("evaluations", first.evaluations, second.evaluations),
+        ("ending", first.ended, second.ended),
+        ("stop", first.stop, second.stop),
+    )
+    found = [name for name, x, y in counts if x != y]
     if found:
         return found
-    for name, x, y in (
+    arrays = (
         ("time", first.time, second.time),
         ("TIME", first.recorded_time, second.recorded_time),
         ("omega", first.omega, second.omega),
         ("velocity", _velocity(first), _velocity(second)),
-    ):
-        if ulps(x, y):
-            found.append(name)
+    )
+    found = [name for name, x, y in arrays if ulps(x, y)]
     if not np.array_equal(first.ier, second.ier):  # type: ignore[arg-type]
         found.append("IER")
     return found

@@ -20,29 +20,16 @@ from pyharness.original.compiled import program_arguments
 from pyharness.original.programs import PROGRAM_REGISTRY
 
 _SAME = 1e-9  # of a time, but for the rounding of its steps
-NOWHERE = (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """What a candidate made of a scene at one time.
+    """What a candidate made of a scene at one time."""
 
-    Attributes
-    ----------
-    omega : ndarray, shape (3,)
-        rad/s; NaN where it did not get there.
-    ended : str
-        ``complete``, or why it is not.
-    steps : int
-        As the candidate counts them.
-    evaluations : int or None
-        Right-hand sides, where they are counted.
-    """
-
-    omega: Array
-    ended: str = "complete"
-    steps: int = 0
-    evaluations: int | None = None
+    omega: Array  # rad/s; NaN where it did not get there
+    ended: str = "complete"  # or why it is not
+    steps: int = 0  # as the candidate counts them
+    evaluations: int | None = None  # right-hand sides, where they are counted
 
     @property
     def is_refused(self) -> bool:
@@ -60,22 +47,14 @@ class Ready:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method with its tolerance, a prepared solver, or a program with its listing.
-
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    ready : callable
-        From a scene and a time (s) to a `Ready`; InputError where it can't take them, as a program
-        whose steps end elsewhere.
-    rows : callable
-        From a scene to its trajectory at the scene's own times; of methods also at other ones,
-        given as second argument; a prepared solver has none.
-    """
+    """A method with its tolerance, a prepared solver, or a program with its listing."""
 
     name: str
+    # From a scene and a time (s); InputError where it can't take them, as a program whose steps
+    # end elsewhere.
     ready: Callable[[Scene, float], Ready]
+    # From a scene, at the scene's own times; of methods also at other ones, given as second
+    # argument; a prepared solver has none.
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
@@ -154,26 +133,22 @@ def plain(values: Iterable[float]) -> Array:
 
 def not_finite(why: str = "overflow") -> End:
     """Return the end of a call that got nowhere."""
-    return End(np.array(NOWHERE), why)
+    return End(np.full(3, math.nan), why)
 
 
 def _last(found: Trajectory) -> End:
-    omega = found.omega[-1] if len(found.omega) else np.array(NOWHERE)
+    omega = found.omega[-1] if len(found.omega) else not_finite().omega
     return End(omega, found.ended, found.steps, found.evaluations)
 
 
 def _answered(solver: Solver, omega: Array) -> End:
-    return End(plain(omega), solver.status, solver.steps, _evaluations(solver))
-
-
-def _evaluations(solver: Solver) -> int | None:
-    """Return right-hand sides; a Taylor series evaluates none, it expands one."""
-    method = solver.plan.method
-    if method == "taylor":
-        return None
-    if method.startswith("gauss-"):
-        return solver.steps
-    return solver.steps * METHODS[method].evaluations if method in FIXED_STEP else 0
+    method, counted = solver.plan.method, 0
+    if method in FIXED_STEP:
+        counted = solver.steps * METHODS[method].evaluations
+    elif method.startswith("gauss-"):
+        counted = solver.steps
+    # A Taylor series evaluates no right-hand side, it expands one.
+    return End(plain(omega), solver.status, solver.steps, None if method == "taylor" else counted)
 
 
 def _printed(result: Any) -> End:

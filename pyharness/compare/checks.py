@@ -10,31 +10,16 @@ REFUSED = "refused: "
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison.
+    """One comparison."""
 
-    Attributes
-    ----------
-    id : str
-        Kind, subject and circumstance, joined by slashes, as in ``cells/two-term/case-3/...``;
-        no two checks of a run have the same.
-    passed : bool
-        Whether all is as it should be.
-    value : float or None
-        What was found; None where there is no one number.
-    limit : float or None
-        What `value` must not exceed; None where the check is yes or no, or only describes.
-    replay : str
-        The command that makes this check alone.
-    note : str
-        What is wrong, or what was seen, in a few words.
-    """
-
+    # Kind, subject and circumstance, joined by slashes, as in ``cells/two-term/case-3/...``; no
+    # two checks of a run have the same.
     id: str
     passed: bool
-    value: float | None
-    limit: float | None
-    replay: str
-    note: str = ""
+    value: float | None  # None where there is no one number
+    limit: float | None  # of `value`; None where the check is yes or no, or only describes
+    replay: str  # the command that makes this check alone
+    note: str = ""  # what is wrong, or what was seen, in a few words
 
     @property
     def kind(self) -> str:
@@ -44,21 +29,11 @@ class Check:
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a scene drawn at random, with what its limit is made of.
+    """A check in a scene drawn at random, with what its limit is made of."""
 
-    Attributes
-    ----------
-    entrance : str
-        How the scene was solved.
-    tolerance : float
-        What was asked for.
-    growth : float
-        Largest factor by which a small difference on the way reaches the end.
-    """
-
-    entrance: str = ""
-    tolerance: float = math.nan
-    growth: float = math.nan
+    entrance: str = ""  # how the scene was solved
+    tolerance: float = math.nan  # what was asked for
+    growth: float = math.nan  # largest factor by which a small difference reaches the end
 
 
 def bounded(id: str, value: float, limit: float, replay: str, note: str = "") -> Check:
@@ -75,13 +50,11 @@ def described(id: str, value: float | None, replay: str, note: str = "") -> Chec
 
 def severity(check: Check) -> tuple[bool, float]:
     """Return what orders checks: those that failed last, then by their share of the limit."""
-    if check.value is None or check.limit is None:
+    if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
-    if check.limit == 0.0:
-        return not check.passed, 0.0 if check.value == 0.0 else float("inf")
-    share = abs(check.value) / check.limit
+    share = abs(check.value) / check.limit if check.limit else math.inf
     # NaN compares with nothing.
-    return not check.passed, share if share == share else float("inf")
+    return not check.passed, math.inf if math.isnan(share) else share
 
 
 def selected(id: str, only: Sequence[str]) -> bool:

@@ -7,16 +7,7 @@ from typing import Any
 
 from pyharness.compare.checks import Check, Sample, severity
 from pyharness.model.records import build_record
-from pyharness.model.report import (
-    Column,
-    Line,
-    Report,
-    Section,
-    Table,
-    counted,
-    short,
-    words,
-)
+from pyharness.model.report import Column, Line, Report, Section, Table, counted, short, words
 
 _MOST_FAILURES = 50
 _FEW = 10  # checks, each of which is told
@@ -110,12 +101,10 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
     if not cells:
         return []
     bands = [name for _, name in _BANDS]
-    rows: list[list[Any]] = []
-    for entrance, band in sorted(cells, key=lambda each: (each[0], bands.index(each[1]))):
-        row: list[Any] = [entrance, band]
-        for values in cells[entrance, band]:
-            row += [len(values), max(values, default=None)]
-        rows.append(row)
+    rows = [
+        [*key, *(x for values in cells[key] for x in (len(values), max(values, default=None)))]
+        for key in sorted(cells, key=lambda each: (each[0], bands.index(each[1])))
+    ]
     told = "worst: error less rounding (2e-15 K) over the tolerance; K: growth of a difference"
     return [Table(_SAMPLES, rows), told]
 

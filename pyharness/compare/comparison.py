@@ -40,6 +40,11 @@ class ProgramFinding:
     order: Order | None
     seconds_per_step: float
 
+    @property
+    def who(self) -> str:
+        """The program and its listing."""
+        return f"{self.listing.program} {self.listing.label}"
+
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
@@ -68,19 +73,19 @@ class Comparison:
         """What is not as it should be, one sentence each; empty if all is well."""
         found = []
         for each in self.programs:
-            who = f"{each.listing.program} {each.listing.label}"
             if each.differences:
-                found.append(f"{who}: Fortran and twin differ in {', '.join(each.differences)}")
+                told = ", ".join(each.differences)
+                found.append(f"{each.who}: Fortran and twin differ in {told}")
             if each.order is not None and each.order.state == "misses":
-                text = "misses the reference as the step is halved"
-                found.append(f"{who}: {text}: {each.order}, due {each.order.due}")
+                told = f"{each.order}, due {each.order.due}"
+                found.append(f"{each.who}: misses the reference as the step is halved: {told}")
         return tuple(found)
 
     @property
     def not_judged(self) -> tuple[str, ...]:
         """Of which corrected programs the scene can't tell whether they are right, and why."""
         return tuple(
-            f"{each.listing.program} {each.listing.label}: {each.order}"
+            f"{each.who}: {each.order}"
             for each in self.programs
             if each.order is not None and not each.order.is_judged
         )
@@ -136,18 +141,12 @@ def compare_programs(
         run, other = compiled.rows(scene), twin.rows(scene)
         judged = not listing.defects and not listing.readings
         program = PROGRAM_REGISTRY[listing.program]
+        order = measured_order(scene, program, listing, truth) if judged else None
         (seconds,) = timed([partial(compiled.rows, scene)], _TIMING_SECONDS, _TIMING_BATCHES)
-        programs.append(
-            ProgramFinding(
-                listing=listing,
-                trajectory=run,
-                accuracy=accuracy(scene, run, truth),
-                ulps=distance(run, other),
-                differences=tuple(differences(run, other)),
-                order=measured_order(scene, program, listing, truth) if judged else None,
-                seconds_per_step=seconds / max(run.steps, 1),
-            )
-        )
+        good, found = accuracy(scene, run, truth), tuple(differences(run, other))
+        per_step = seconds / max(run.steps, 1)
+        ulp = distance(run, other)
+        programs.append(ProgramFinding(listing, run, good, ulp, found, order, per_step))
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
     methods = [_method(scene, name, tolerance, effort, truth) for name in SCIPY_METHODS]
@@ -167,11 +166,8 @@ def listings_for(
     mistake. With `base` and nothing else, only that listing is shown.
     """
     chosen = list(programs)
-    for option, kind, names in (
-        ("--fix", "defect", fix),
-        ("--keep", "defect", keep),
-        ("--reading", "reading", readings),
-    ):
+    for option, names in (("--fix", fix), ("--keep", keep), ("--reading", readings)):
+        kind = "reading" if option == "--reading" else "defect"
         allowed = {name for program in chosen for name in names_of(kind, program)}
         for name in names:
             if name not in allowed:
@@ -180,10 +176,10 @@ def listings_for(
         raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
     result = []
     for program in chosen:
-        defects, own_readings = names_of("defect", program), names_of("reading", program)
+        defects, own = names_of("defect", program), names_of("reading", program)
         fixed = [name for name in fix if name in defects]
         kept = [name for name in keep if name in defects]
-        selected = [name for name in readings if name in own_readings]
+        selected = [name for name in readings if name in own]
         bases = [base] if base and not (fix or keep) else ["original", "corrected"]
         rows = [subset(program, each, readings=selected) for each in bases]
         if fixed or kept:

@@ -38,38 +38,22 @@ _ROUNDINGS = 8.0
 _CONDITION = 1e15
 
 State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"]
-Quantity = Literal["omega", "velocity"]
 
 
 @dataclass(frozen=True)
 class Order:
-    """What became of the error as the step was halved.
+    """What became of the error as the step was halved."""
 
-    Attributes
-    ----------
-    due : int
-        The order that the method has.
-    state : {"as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"}
-        Whether it showed. `rounding`: the error was that of rounding before it could. The last
-        four: it can't be told, for no step was small enough, the program found its matrix
-        singular, the motion multiplies rounding too much, or the solution leaves every bound.
-    value : float or None
-        As measured, if it could be.
-    step_size : float
-        The finest step that was tried (s); of `singular` the longest that makes it so.
-    steps : int
-        How many were taken in the finest run that could be held against the truth.
-    error, time : float
-        The largest error of that run (rad/s), and when it had it (s).
-    """
-
-    due: int
+    due: int  # the order that the method has
+    # Whether it showed. `rounding`: the error was that of rounding before it could. The last four:
+    # it can't be told, for no step was small enough, the program found its matrix singular, the
+    # motion multiplies rounding too much, or the solution leaves every bound.
     state: State
-    value: float | None
-    step_size: float
-    steps: int = 0
-    error: float = math.inf
-    time: float = math.nan
+    value: float | None  # as measured, if it could be
+    step_size: float  # the finest that was tried (s); of `singular` the longest that makes it so
+    steps: int = 0  # taken in the finest run that could be held against the truth
+    error: float = math.inf  # the largest of that run (rad/s)
+    time: float = math.nan  # when it had it (s)
 
     @property
     def is_judged(self) -> bool:
@@ -95,23 +79,10 @@ class _SingularError(Exception):
 def measured_order(
     scene: Scene, program: Program, listing: Listing, truth: Reference, pairs: int = 2
 ) -> Order:
-    """Measure the order of a program's omega; see `order_of`.
+    """Measure the order of a compiled program's omega; see `order_of`.
 
     An error that rounding may have grown to is no miss. That it does not settle is one, if a
     textbook method of its order does.
-
-    Parameters
-    ----------
-    scene : Scene
-        With the longest step.
-    program : Program
-        Its compiled code is judged.
-    listing : Listing
-        Its defects and readings.
-    truth : Reference
-        At the times of `scene`.
-    pairs : int
-        As in `order_of`.
     """
 
     def omega(finer: Scene) -> Array:
@@ -139,29 +110,16 @@ def order_of(
     solution: Callable[[Scene], Array],
     due: int,
     truth: Reference,
-    quantity: Quantity = "omega",
+    quantity: Literal["omega", "velocity"] = "omega",
     pairs: int = 2,
     most_steps: int | None = None,
 ) -> Order:
     """Halve the step until it is small, and measure the power with which the error falls.
 
-    Parameters
-    ----------
-    scene : Scene
-        With the longest step.
-    solution : callable
-        Returns what is judged after each step of the scene that it is given, shape (n, 3);
-        fewer rows where it overflows.
-    due : int
-        The order that it has.
-    truth : Reference
-        At the times of `scene`.
-    quantity : {"omega", "velocity"}
-        What of the truth is meant.
-    pairs : int
-        Halvings, one after another, in which the order has to show, or not to.
-    most_steps : int, optional
-        How far to go; by default 2**18, or eight halvings.
+    The scene has the longest step, the truth its times. `solution` returns what is judged after
+    each step of the scene that it is given, shape (n, 3); fewer rows where it overflows. In `pairs`
+    halvings, one after another, the order has to show, or not to; by default they go on to 2**18
+    steps, or eight times.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -173,9 +131,8 @@ def order_of(
     fastest = _fastest(scene, truth.omega)
     state: State = "unsettled"
     step_size, steps = scene.step_size, 0
-    error, worst = math.inf, math.nan
+    error, previous_error, worst = math.inf, math.inf, math.nan
     previous: Array | None = None
-    previous_error = math.inf
     orders: list[float] = []
     for finer in _halved(scene, most_steps):
         parts = finer.steps // n

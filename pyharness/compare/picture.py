@@ -61,7 +61,8 @@ def comparison_picture(comparison: Comparison) -> Picture:
     for column in range(len(names)):
         axes[3, column].axhline(truth.error, color="black", linewidth=0.8)
         axes[3, column].grid(visible=True, linewidth=0.3)
-    _limit_errors(axes[3, 0])
+    bottom, top = axes[3, 0].get_ylim()
+    axes[3, 0].set_ylim(max(bottom, 1e-17), min(top, 1e4))
     axes[0, 0].legend(loc="best", handlelength=4)
     note = "x: the program stopped or overflowed; at the edge: out of view" if ended else ""
     title = (f"{heading(comparison.scene)[0]}; thin line: error of the reference", note)
@@ -96,8 +97,3 @@ def _frame(axes: "Axes", truth: np.ndarray) -> None:
     margin = max(0.6 * (high - low), 0.05 * max(abs(low), abs(high)), 1e-12)
     bottom, top = axes.get_ylim()
     axes.set_ylim(max(bottom, low - margin), min(top, high + margin))
-
-
-def _limit_errors(axes: "Axes") -> None:
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(max(bottom, 1e-17), min(top, 1e4))

@@ -2,13 +2,14 @@
 
 import datetime
 import math
-import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from random import Random
 
 from pyharness.model.listing import PROGRAMS, Listing, names_of
 from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
+from pyharness.model.turned_scenes import turned
 
 COARSEST = 1e-3
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
@@ -16,33 +17,15 @@ _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 
 @dataclass(frozen=True)
 class Draw:
-    """What one number of a seed stands for.
+    """What one number of a seed stands for."""
 
-    Attributes
-    ----------
-    scene : Scene
-        Half of them nasty; `scene.name` says in what way.
-    listing : Listing
-        Of any program, with any defects and readings.
-    lipschitz : float
-        Constant of the stop test (1/s).
-    may_stop : bool
-        Whether the stop test may end the run.
-    digits : float
-        0 for the coarsest tolerance that a method is asked for, 1 for its own finest.
-    backward : bool
-        Whether a method is asked for negative times.
-    stages : int
-        Of Gauss collocation.
-    """
-
-    scene: Scene
-    listing: Listing
-    lipschitz: float
+    scene: Scene  # half of them nasty; its name says in what way
+    listing: Listing  # of any program, with any defects and readings
+    lipschitz: float  # constant of the stop test (1/s)
     may_stop: bool
-    digits: float
-    backward: bool
-    stages: int
+    digits: float  # 0 for the coarsest tolerance of a method, 1 for its own finest
+    backward: bool  # whether a method is asked for negative times
+    stages: int  # of Gauss collocation
 
     @property
     def time(self) -> float:
@@ -63,10 +46,9 @@ def weekly_seed(day: datetime.date | None = None) -> str:
 def draw(seed: str, number: int) -> Draw:
     """Return what `number` of `seed` stands for; the same with every version of Python."""
     # A generator of its own for each number, so that one can be repeated without the others.
-    source = random.Random(f"{seed}/{number}")
-    nasty = number % 2 == 1
+    source = Random(f"{seed}/{number}")
     scene = _plain(source)
-    if nasty:
+    if number % 2 == 1:
         name = source.choice(list(_NASTY))
         scene = replace(_NASTY[name](source), name=name)
     program = source.choice(PROGRAMS)
@@ -85,85 +67,88 @@ def draw(seed: str, number: int) -> Draw:
     )
 
 
-def _plain(source: random.Random) -> Scene:
-    """Return a body that exists, turning at a few radians a second."""
+def _body(source: Random) -> list[float]:
+    """Return moments that a body can have, in rising order."""
     low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
-    moments = [low, middle, source.uniform(middle, low + middle)]
+    return [low, middle, source.uniform(middle, low + middle)]
+
+
+def _plain(source: Random) -> Scene:
+    """Return a body that exists, turning at a few radians a second."""
+    moments = _body(source)
     source.shuffle(moments)
-    return _scene(source, "plain", _triple(moments), _triple(_vector(source, 5.0)))
+    return _scene(source, _vector(source, 5.0), _triple(moments))
 
 
-def _near_symmetric(source: random.Random) -> Scene:
+def _near_symmetric(source: Random) -> Scene:
     moment = source.uniform(1.0, 50.0)
     apart = 1.0 + source.choice((-1.0, 1.0)) * 10.0 ** -source.uniform(1.0, 16.0)
     moments = [moment, moment * apart, moment * source.uniform(0.1, 1.9)]
     source.shuffle(moments)
-    return _scene(source, "near-symmetric", _triple(moments), _triple(_vector(source, 5.0)))
+    return _scene(source, _vector(source, 5.0), _triple(moments))
 
 
-def _near_separatrix(source: random.Random) -> Scene:
-    low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
-    moments = [low, middle, source.uniform(middle, low + middle)]
-    spin = [0.0, source.choice((-1.0, 1.0)) * source.uniform(0.5, 5.0), 0.0]
-    faint = 10.0 ** -source.uniform(1.0, 12.0)
-    omega = [w + faint * e for w, e in zip(spin, _vector(source, 1.0), strict=True)]
+def _near_separatrix(source: Random) -> Scene:
+    moments = _body(source)
+    spin = source.choice((-1.0, 1.0)) * source.uniform(0.5, 5.0)
+    omega = _disturbed(source, spin, 10.0 ** -source.uniform(1.0, 12.0))
     axes = source.sample(range(3), 3)
-    return _scene(
-        source, "near-separatrix",
-        _triple([moments[k] for k in axes]), _triple([omega[k] for k in axes]), torque=False,
-    )  # fmt: skip
+    return _scene(source, _at(omega, axes), _at(moments, axes), torque=False)
 
 
-def _violent(source: random.Random) -> Scene:
+def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
+    """Return a spin about the middle axis, and a little about every axis."""
+    return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
+
+
+def _violent(source: Random) -> Scene:
     scene = _plain(source)
-    size = max(scene.moments or (1.0,)) * 10.0 ** source.uniform(1.0, 4.0)
-    law = TorqueLaw(
-        constant=_triple(_vector(source, size)),
-        rate=_triple(_vector(source, size)),
-        sines=(_wave(source, size, 10.0 ** source.uniform(0.0, 4.0)),),
-    )
-    step = 1e-2 / size**0.5
-    return Scene("violent torque", scene.omega, scene.moments, torque=law, step_size=step, steps=50)
+    size = _largest(scene) * 10.0 ** source.uniform(1.0, 4.0)
+    constant, rate = _vector(source, size), _vector(source, size)
+    law = TorqueLaw(constant, rate, [_wave(source, size, 10.0 ** source.uniform(0.0, 4.0))])
+    return replace(scene, torque=law, step_size=1e-2 / size**0.5, steps=50)
 
 
-def _from_rest(source: random.Random) -> Scene:
+def _from_rest(source: Random) -> Scene:
     """Return a body at rest under torque of any kind, about one axis or about all."""
     scene = _plain(source)
-    size = max(scene.moments or (1.0,)) * 10.0 ** source.uniform(-3.0, 1.0)
+    size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
     axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
     law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
-    law = _about(law, axes)
-    return replace(scene, omega=(0.0, 0.0, 0.0), torque=law)
+
+    def kept(values: Triple) -> Triple:
+        return _triple([x if k in axes else 0.0 for k, x in enumerate(values)])
+
+    return turned(replace(scene, omega=(0.0, 0.0, 0.0), torque=law), kept, body=False)
 
 
-def _slow_waves(source: random.Random) -> Scene:
+def _slow_waves(source: Random) -> Scene:
     """Return waves that turn by as little as 1e-14 radians, half of them from rest."""
     scene = _plain(source)
-    size = max(scene.moments or (1.0,)) * 10.0 ** source.uniform(-2.0, 2.0)
-    kind = source.choice((4, 8, 12))
-    law = _law(source, size, kind, (1e-12, 0.1))
+    size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
+    law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))
     start = 0.0 if source.random() < 0.5 else 10.0 ** -source.uniform(0.0, 6.0)
-    return replace(scene, omega=_triple([start * w for w in scene.omega]), torque=law)
+    return replace(scene, omega=_times(start, scene.omega), torque=law)
 
 
-def _many_speeds(source: random.Random) -> Scene:
+def _many_speeds(source: Random) -> Scene:
     """Return up to six waves from 1e-6 to 600 rad/s beside each other."""
     scene = _plain(source)
-    size = max(scene.moments or (1.0,))
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):
-        amplitude = size * 10.0 ** source.uniform(-3.0, 1.5)
+        amplitude = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.5)
         frequency = 10.0 ** source.uniform(-6.0, 2.8)
         some[source.randrange(2)].append(_wave(source, amplitude, frequency))
-    law = TorqueLaw(sines=tuple(some[0]), cosines=tuple(some[1]))
+    sines, cosines = some
     if source.random() < 0.2:
         # One frequency in a sine and in a cosine, which methods may take together.
-        law = replace(law, cosines=tuple((a, f) for a, f in law.sines))
+        cosines = sines
     start = source.choice((0.0, 0.01, 1.0))
-    return replace(scene, omega=_triple([start * w for w in scene.omega]), torque=law)
+    law = TorqueLaw(sines=sines, cosines=cosines)
+    return replace(scene, omega=_times(start, scene.omega), torque=law)
 
 
-def _far_scale(source: random.Random) -> Scene:
+def _far_scale(source: Random) -> Scene:
     """Return a scene with other units of time and mass: omega from 1e-135 to 1e135."""
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
@@ -172,82 +157,54 @@ def _far_scale(source: random.Random) -> Scene:
         scene = replace(_plain(source), torque=TorqueLaw())
     found = scaled(scene, 2.0**exponent)
     mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
-    law = found.torque
-
-    def times(values: Sequence[float]) -> Triple:
-        return _triple([mass * x for x in values])
-
-    return replace(
-        found,
-        name="far scale",
-        moments=times(found.moments or ()),
-        torque=TorqueLaw(
-            times(law.constant),
-            times(law.rate),
-            tuple((times(a), f) for a, f in law.sines),
-            tuple((times(a), f) for a, f in law.cosines),
-        ),
-    )
+    return replace(turned(found, lambda each: _times(mass, each), body=True), omega=found.omega)
 
 
-def _sensitive(source: random.Random) -> Scene:
+def _sensitive(source: Random) -> Scene:
     """Return a spin beside the middle axis that multiplies a difference up to 1e6 times."""
-    low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
-    high = source.uniform(middle, low + middle)
+    low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
     faint = abs(spin) * 10.0 ** -source.uniform(1.0, 8.0)
-    omega = [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
+    omega = _disturbed(source, spin, faint)
     law = TorqueLaw()
     if source.random() < 0.6:
         size = low * faint * max(rate, 0.1)
         law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
     axes = source.sample(range(3), 3)
     steps = source.randint(10, 60)
-    scene = Scene(
-        "sensitive",
-        _triple([omega[k] for k in axes]),
-        _triple([(low, middle, high)[k] for k in axes]),
-        torque=law,
-        step_size=min(50.0, source.uniform(1.0, 14.0) / max(rate, 1e-3)) / steps,
-        steps=steps,
-    )
-    return scene
+    step_size = min(50.0, source.uniform(1.0, 14.0) / max(rate, 1e-3)) / steps
+    moments = _at(body, axes)
+    return Scene("", _at(omega, axes), moments, torque=law, step_size=step_size, steps=steps)
 
 
-def _long(source: random.Random) -> Scene:
+def _long(source: Random) -> Scene:
     """Return a motion of up to a few hundred radians."""
     scene = _plain(source)
     return replace(scene, step_size=10.0 ** source.uniform(0.5, 1.3) / scene.steps)
 
 
-def _no_body(source: random.Random) -> Scene:
+def _no_body(source: Random) -> Scene:
     """Return coefficients of any sign, which no body has."""
-    return _scene(
-        source, "coefficients", None, _triple(_vector(source, 2.0)), _triple(_vector(source, 1.5))
-    )
+    return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
-def _extreme(source: random.Random) -> Scene:
+def _extreme(source: Random) -> Scene:
     """Return numbers from one end of binary64 to the other, which mostly overflow."""
 
     def any_size() -> float:
         if source.random() < 0.1:
-            return float(source.choice((0.0, -0.0)))
+            return source.choice((0.0, -0.0))
         return float(source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-300.0, 300.0))
 
-    law = TorqueLaw(_triple([any_size() for _ in range(3)]))
-    return Scene(
-        "extreme",
-        _triple([any_size() for _ in range(3)]),
-        _triple([abs(any_size()) or 1.0 for _ in range(3)]),
-        torque=law if source.random() < 0.5 else TorqueLaw(),
-        step_size=10.0 ** source.uniform(-100.0, 2.0),
-        steps=20,
-    )
+    law, omega, sizes = ([any_size() for _ in range(3)] for _ in range(3))
+    moments = [abs(x) or 1.0 for x in sizes]
+    torque = TorqueLaw(law) if source.random() < 0.5 else TorqueLaw()
+    step_size = 10.0 ** source.uniform(-100.0, 2.0)
+    return Scene("", omega, moments, torque=torque, step_size=step_size, steps=20)
 
 
-_NASTY: dict[str, Callable[[random.Random], Scene]] = {
+_NASTY: dict[str, Callable[[Random], Scene]] = {
     "near-symmetric": _near_symmetric,
     "near-separatrix": _near_separatrix,
     "violent torque": _violent,
@@ -262,75 +219,61 @@ _NASTY: dict[str, Callable[[random.Random], Scene]] = {
 }
 
 
-def _law(
-    source: random.Random, size: float, kinds: int, frequencies: tuple[float, float]
-) -> TorqueLaw:
+def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
     """Return a torque of about `size`: 1 constant, 2 rate, 4 a sine, 8 a cosine, or a sum."""
     low, high = map(math.log10, frequencies)
-    nothing = (0.0, 0.0, 0.0)
-    parts = [_triple(_vector(source, size)) for _ in range(2)]
-    waves = [_wave(source, size, 10.0 ** source.uniform(low, high)) for _ in range(2)]
+    constant, rate = _vector(source, size), _vector(source, size)
+    sine, cosine = (_wave(source, size, 10.0 ** source.uniform(low, high)) for _ in range(2))
     return TorqueLaw(
-        parts[0] if kinds & 1 else nothing,
-        parts[1] if kinds & 2 else nothing,
-        (waves[0],) if kinds & 4 else (),
-        (waves[1],) if kinds & 8 else (),
-    )
-
-
-def _about(law: TorqueLaw, axes: Sequence[int]) -> TorqueLaw:
-    """Return what of a torque acts about some axes."""
-
-    def kept(values: Triple) -> Triple:
-        return _triple([x if k in axes else 0.0 for k, x in enumerate(values)])
-
-    return TorqueLaw(
-        kept(law.constant),
-        kept(law.rate),
-        tuple((kept(a), f) for a, f in law.sines),
-        tuple((kept(a), f) for a, f in law.cosines),
+        constant if kinds & 1 else (0.0, 0.0, 0.0),
+        rate if kinds & 2 else (0.0, 0.0, 0.0),
+        [sine] if kinds & 4 else [],
+        [cosine] if kinds & 8 else [],
     )
 
 
 def _scene(
-    source: random.Random,
-    name: str,
-    moments: Triple | None,
+    source: Random,
     omega: Triple,
+    moments: Triple | None,
     coefficients: Triple | None = None,
     torque: bool = True,
 ) -> Scene:
     """Return a scene with one of the kinds of torque that there are, or none."""
-    size = 10.0 if moments is None else max(moments)
-    size *= source.uniform(0.1, 2.0)
-    kind = source.randrange(4) if torque else 0
-    law = TorqueLaw()
-    if kind == 1:
-        law = TorqueLaw(_triple(_vector(source, size)))
-    elif kind == 2:
-        law = TorqueLaw(_triple(_vector(source, size)), _triple(_vector(source, size)))
-    elif kind == 3:
-        law = TorqueLaw(
-            sines=(_wave(source, size, source.uniform(0.1, 30.0)),),
-            cosines=(_wave(source, size, source.uniform(0.1, 300.0)),),
-        )
-    return Scene(
-        name,
-        omega,
-        moments,
-        coefficients,
-        law,
-        step_size=10.0 ** source.uniform(-3.0, -1.3),
-        steps=source.randint(10, 60),
+    size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
+
+    def wave(most: float) -> list[Wave]:
+        return [_wave(source, size, source.uniform(0.1, most))]
+
+    laws: tuple[Callable[[], TorqueLaw], ...] = (
+        TorqueLaw,
+        lambda: TorqueLaw(_vector(source, size)),
+        lambda: TorqueLaw(_vector(source, size), _vector(source, size)),
+        lambda: TorqueLaw(sines=wave(30.0), cosines=wave(300.0)),
     )
+    law = laws[source.randrange(4) if torque else 0]()
+    step_size, steps = 10.0 ** source.uniform(-3.0, -1.3), source.randint(10, 60)
+    return Scene("plain", omega, moments, coefficients, law, step_size, steps)
 
 
-def _vector(source: random.Random, size: float) -> list[float]:
-    return [source.uniform(-size, size) for _ in range(3)]
+def _largest(scene: Scene) -> float:
+    return max(scene.moments or (1.0,))
 
 
-def _wave(source: random.Random, size: float, frequency: float) -> Wave:
-    return _triple(_vector(source, size)), frequency
+def _vector(source: Random, size: float) -> Triple:
+    return _triple([source.uniform(-size, size) for _ in range(3)])
+
+
+def _wave(source: Random, size: float, frequency: float) -> Wave:
+    return _vector(source, size), frequency
+
+
+def _times(factor: float, values: Triple) -> Triple:
+    return _triple([factor * x for x in values])
+
+
+def _at(values: list[float], axes: list[int]) -> Triple:
+    return _triple([values[k] for k in axes])
 
 
 def _triple(values: list[float]) -> Triple:

@@ -1,11 +1,10 @@
 """The report of `compare`."""
 
-import math
 from typing import Any
 
 from pyharness.compare.agreement import Accuracy
-from pyharness.compare.comparison import Comparison
-from pyharness.compare.orders import Order
+from pyharness.compare.comparison import Comparison, MethodFinding, ProgramFinding
+from pyharness.model.records import build_record, ending_record, listing_record, scene_record
 from pyharness.model.report import (
     Column,
     Picture,
@@ -17,7 +16,7 @@ from pyharness.model.report import (
     words,
 )
 from pyharness.model.scene_report import heading
-from pyharness.model.trajectory import Stop, Trajectory
+from pyharness.model.trajectory import Trajectory
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
 _DRIFTS = (Column("energy", short), Column("mom.sq", short))
@@ -66,14 +65,11 @@ def _as_expected(comparison: Comparison) -> str:
     orders = [each.order for each in comparison.programs if each.order is not None]
     if not orders:
         return text
-    seen = ", ".join(map(_seen, orders))
+    seen = ", ".join(
+        f"{each.value:.1f}" if each.value is not None else "rounding" if each.is_judged else "-"
+        for each in orders
+    )
     return f"{text}; orders corrected {seen} (due: {', '.join(str(each.due) for each in orders)})"
-
-
-def _seen(order: Order) -> str:
-    if order.value is None:
-        return "rounding" if order.is_judged else "-"
-    return f"{order.value:.1f}"
 
 
 def _programs(comparison: Comparison) -> Table:
@@ -85,7 +81,7 @@ def _programs(comparison: Comparison) -> Table:
     rows = []
     for each in comparison.programs:
         run, good, listing = each.trajectory, each.accuracy, each.listing
-        end = _stop(run.stop, comparison.lipschitz) if run.stop else _ended(run)
+        end = _end(run, comparison.lipschitz)
         row = [listing.program, listing.label, run.steps, end, *good.omega, good.velocity]
         rows.append([*row, good.energy, good.momentum, each.ulps, each.seconds_per_step])
     return Table(columns, rows)
@@ -114,50 +110,35 @@ def _data(comparison: Comparison) -> Table:
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"
     )
     rows: list[dict[str, Any]] = []
-    for each in comparison.programs:
-        run = each.trajectory
+    for each in map(_program, comparison.programs):
+        listing, stop = each["listing"], each["stop"] or {}
         row = {
-            "method": each.listing.program,
-            "listing": each.listing.label,
-            "active": " ".join(sorted(each.listing.defects | each.listing.readings)),
-            "ulps": each.ulps,
-            "steps": run.steps,
-            "seconds": each.seconds_per_step * run.steps,
-            **_found(run, each.accuracy),
+            "method": each["program"],
+            "listing": listing["label"],
+            "active": " ".join(sorted(listing["defects"] + listing["readings"])),
+            "stop_variable": stop.get("variable"),
+            "stop_quotient": stop.get("quotient"),
+            "seconds": each["seconds_per_step"] * each["steps"],
         }
-        if run.stop:
-            row |= {"stop_variable": run.stop.variable, "stop_quotient": run.stop.quotient}
-        if each.order:
-            row |= {"order": each.order.value, "order_state": each.order.state}
-        rows.append(row)
-    for method in comparison.methods:
-        row = {"method": method.method, "ended": method.failure}
-        if method.trajectory is not None and method.accuracy is not None:
-            row |= {"seconds": method.seconds, **_found(method.trajectory, method.accuracy)}
-        rows.append(row)
-    return numbers(names, [list(map(row.get, names.split())) for row in rows])
+        rows.append(each | row)
+    for each in map(_method, comparison.methods):
+        # The steps of a method are its own, its failure is how it ended.
+        row = {"steps": None, "ended": each["failure"] or each.get("ended", "")}
+        rows.append(each | row | ({"seconds": None} if each["failure"] else {}))
+    for each in rows:
+        errors = each.get("error", [None] * 3)
+        each |= dict(zip(("error_w1", "error_w2", "error_w3"), errors, strict=True))
+        each["error_v"] = each.get("velocity_error")
+    return numbers(names, [list(map(each.get, names.split())) for each in rows])
 
 
-def _found(run: Trajectory, good: Accuracy) -> dict[str, Any]:
-    return {
-        **dict(zip(("error_w1", "error_w2", "error_w3"), good.omega, strict=True)),
-        "error_v": good.velocity,
-        "energy_drift": good.energy,
-        "momentum_drift": good.momentum,
-        "ended": run.ended,
-        "evaluations": run.evaluations,
-    }
-
-
-def _stop(stop: Stop, limit: float) -> str:
-    quotient = "inf" if math.isinf(stop.quotient) else f"{stop.quotient:.0f}"
+def _end(run: Trajectory, limit: float) -> str:
+    if run.stop is None:
+        return "overflow" if run.ended == "overflow" else "-"
+    quotient = f"{run.stop.quotient:.0f}"
     if len(quotient) > 5:
-        quotient = short(stop.quotient)
-    return f"{stop.variable} {quotient}>{limit:g}"
-
-
-def _ended(run: Trajectory) -> str:
-    return "overflow" if run.ended == "overflow" else "-"
+        quotient = short(run.stop.quotient)
+    return f"{run.stop.variable} {quotient}>{limit:g}"
 
 
 def _count(ulps: float) -> str:
@@ -165,49 +146,45 @@ def _count(ulps: float) -> str:
 
 
 def _record(comparison: Comparison) -> dict[str, Any]:
-    from pyharness.model.records import build_record, ending_record, listing_record, scene_record
-
+    truth = comparison.reference
     return {
         "scene": scene_record(comparison.scene),
         "lipschitz": comparison.lipschitz,
-        "reference": {
-            "source": comparison.reference.source,
-            "estimate": comparison.reference.estimate,
-            "error": comparison.reference.error,
-        },
-        "programs": [
-            {
-                "program": each.listing.program,
-                "listing": listing_record(each.listing),
-                **ending_record(each.trajectory),
-                **_accuracy_record(each.accuracy),
-                "ulps": each.ulps,
-                "differences": list(each.differences),
-                "order": each.order.value if each.order else None,
-                "order_state": each.order.state if each.order else None,
-                "seconds_per_step": each.seconds_per_step,
-            }
-            for each in comparison.programs
-        ],
-        "methods": [
-            {
-                "method": each.method,
-                "tolerance": each.tolerance,
-                "failure": each.failure or None,
-                **({} if each.trajectory is None else ending_record(each.trajectory)),
-                **({} if each.accuracy is None else _accuracy_record(each.accuracy)),
-                "seconds": each.seconds,
-            }
-            for each in comparison.methods
-        ],
+        "reference": {name: getattr(truth, name) for name in ("source", "estimate", "error")},
+        "programs": list(map(_program, comparison.programs)),
+        "methods": list(map(_method, comparison.methods)),
         "unexpected": list(comparison.unexpected),
         "not_judged": list(comparison.not_judged),
         "build": build_record(),
     }
 
 
-def _accuracy_record(accuracy: Accuracy) -> dict[str, Any]:
+def _program(each: ProgramFinding) -> dict[str, Any]:
     return {
+        "program": each.listing.program,
+        "listing": listing_record(each.listing),
+        **_run(each.trajectory, each.accuracy),
+        "ulps": each.ulps,
+        "differences": list(each.differences),
+        "order": each.order.value if each.order else None,
+        "order_state": each.order.state if each.order else None,
+        "seconds_per_step": each.seconds_per_step,
+    }
+
+
+def _method(each: MethodFinding) -> dict[str, Any]:
+    return {
+        "method": each.method,
+        "tolerance": each.tolerance,
+        "failure": each.failure or None,
+        **(_run(each.trajectory, each.accuracy) if each.trajectory and each.accuracy else {}),
+        "seconds": each.seconds,
+    }
+
+
+def _run(run: Trajectory, accuracy: Accuracy) -> dict[str, Any]:
+    return {
+        **ending_record(run),
         "error": list(accuracy.omega),
         "velocity_error": accuracy.velocity,
         "energy_drift": accuracy.energy,

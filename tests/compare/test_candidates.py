@@ -28,14 +28,14 @@ def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> N
     assert listed(original("two-term"), "python").end(SCENE, END).ended == "complete"
 
 
-def test_a_program_is_not_taken_for_one_at_another_time() -> None:
-    with pytest.raises(InputError, match=r"its steps end at 1 s, not at 2 s"):
-        unstopped(original("two-term")).end(SCENE, 2.0)
-
-
-def test_end_of_a_method_is_that_of_its_rows_and_a_prepared_solver_has_none() -> None:
+def test_end_of_a_method_is_that_of_its_rows() -> None:
     method = solved("taylor", 1e-12)
     np.testing.assert_array_equal(method.end(SCENE, END).omega, method.rows(SCENE, [END]).omega[-1])
+
+
+def test_what_a_candidate_has_not_is_refused() -> None:
+    with pytest.raises(InputError, match=r"its steps end at 1 s, not at 2 s"):
+        unstopped(original("two-term")).end(SCENE, 2.0)
     with pytest.raises(InputError, match="the end alone"):
         called("quick", 1e-3).rows(SCENE)
 

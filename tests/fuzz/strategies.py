@@ -6,14 +6,16 @@ that a seed and a number make again.
 
 import math
 import struct
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from random import Random
 from typing import Any
 
 from pyharness import InputError, Scene, TorqueLaw
+from pyharness.compare.random_scenes import Draw, draw
 from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import METHODS
-from pyharness.model.listing import PROGRAMS, Listing, names_of
+from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Triple, Wave
 
 _CORNERS = (
@@ -21,19 +23,8 @@ _CORNERS = (
     1e-155, 2.0**-53, 1e15, 1e16, 1e154, 1e155, 1e300, 1e308, 1.7976931348623157e308, -1e308,
 )  # fmt: skip
 _WORDS = (
-    "",
-    "text",
-    "ü",
-    "日本",
-    "\U0001f600",
-    "a b",
-    "0",
-    "-",
-    "--",
-    "None",
-    "é" * 40,
-    "x" * 3000,
-)
+    "", "text", "ü", "日本", "\U0001f600", "a b", "0", "-", "--", "None", "é" * 40, "x" * 3000,
+)  # fmt: skip
 
 
 def _sign(random: Random) -> float:
@@ -42,15 +33,14 @@ def _sign(random: Random) -> float:
 
 def violent(random: Random) -> float:
     """Return a finite number of any size."""
-    kind = random.randrange(4)
-    if kind == 0:
-        return random.choice(_CORNERS)
-    if kind == 1:
-        return _sign(random) * math.pow(10.0, random.uniform(-308.0, 308.0))
-    if kind == 2:
-        return _sign(random) * math.pow(10.0, random.uniform(-9.0, 9.0))
-    value: float = struct.unpack("<d", random.getrandbits(64).to_bytes(8, "little"))[0]
-    return value if abs(value) < float("inf") else 0.0
+    kinds: tuple[Callable[[], float], ...] = (
+        lambda: random.choice(_CORNERS),
+        lambda: _sign(random) * math.pow(10.0, random.uniform(-308.0, 308.0)),
+        lambda: _sign(random) * math.pow(10.0, random.uniform(-9.0, 9.0)),
+        lambda: float(struct.unpack("<d", random.randbytes(8))[0]),
+    )
+    value = random.choice(kinds)()
+    return value if math.isfinite(value) else 0.0
 
 
 def tame(random: Random) -> float:
@@ -86,52 +76,34 @@ def scene(random: Random, most_steps: int = 12) -> Scene:
         violence = random.choice((0.0, 0.1, 0.3, 1.0))
         law = TorqueLaw()
         if random.random() < 0.6:
-            waves = random.random() < 0.5
-            law = TorqueLaw(
-                _triple(random, violence),
-                _triple(random, violence) if random.random() < 0.5 else (0.0, 0.0, 0.0),
-                _waves(random, violence) if waves else (),
-                _waves(random, violence) if waves else (),
-            )
-        first, second, third = body = _triple(random, violence)
-        by_moments = random.random() < 0.6
-        moments = (abs(first) or 1.0, abs(second) or 1.0, abs(third) or 1.0)
+            law = TorqueLaw(_triple(random, violence))
+            if random.random() < 0.5:
+                law = replace(law, rate=_triple(random, violence))
+            if random.random() < 0.5:
+                sines, cosines = _waves(random, violence), _waves(random, violence)
+                law = replace(law, sines=sines, cosines=cosines)
+        body = _triple(random, violence)
         step_size = 0.01 if random.random() < 0.5 else abs(number(random, violence)) or 0.1
+        start, steps = _triple(random, violence), random.randint(1, most_steps)
         try:
-            return Scene(
-                "random",
-                _triple(random, violence),
-                moments=moments if by_moments else None,
-                coefficients=None if by_moments else body,
-                torque=law,
-                step_size=step_size,
-                steps=random.randint(1, most_steps),
-            )
+            if random.random() < 0.6:
+                moments = [abs(x) or 1.0 for x in body]
+                return Scene("random", start, moments, None, law, step_size, steps)
+            return Scene("random", start, None, body, law, step_size, steps)
         except InputError:
             continue
 
 
-@dataclass(frozen=True)
-class ProgramInput:
-    """A run of a program, in both languages."""
-
-    scene: Scene
-    listing: Listing
-    lipschitz: float
-    may_stop: bool
+# A run of a program, in both languages.
+ProgramInput = Draw
 
 
 def program_input(random: Random) -> ProgramInput:
-    """Return a scene, any listing, and a stop test."""
-    program = random.choice(PROGRAMS)
-    readings = [name for name in names_of("reading", program) if random.random() < 0.3]
-    defects = [name for name in names_of("defect", program) if random.random() < 0.5]
-    return ProgramInput(
-        scene(random),
-        Listing(program, frozenset(defects), frozenset(readings)),
-        abs(number(random, 0.5)) or 500.0,
-        random.random() < 0.5,
-    )
+    """Return a scene, any listing, and a stop test, most often more violent than those drawn."""
+    drawn = draw("fuzz", random.randrange(10**6))
+    if random.random() < 0.2:
+        return drawn
+    return replace(drawn, scene=scene(random), lipschitz=abs(number(random, 0.5)) or 500.0)
 
 
 @dataclass(frozen=True)
@@ -218,21 +190,19 @@ class ListingInput:
 def listing_input(random: Random) -> ListingInput:
     """Return names, known or not, in any combination."""
 
+    def known(kind: str) -> tuple[str, ...]:
+        return (*names_of("defect"), *names_of("reading")) if kind == "any" else names_of(kind)
+
+    def one(names: tuple[str, ...], mistakes: float) -> str:
+        name = random.choice(names)
+        return mutated_word(random, name) if random.random() < mistakes else name
+
     def several(kind: str) -> tuple[str, ...]:
-        known = [*names_of("defect"), *names_of("reading")] if kind == "any" else names_of(kind)
-        count = random.choice((0, 0, 1, 1, 2, 3))
-        return tuple(
-            mutated_word(random, random.choice(known))
-            if random.random() < 0.15
-            else random.choice(known)
-            for _ in range(count)
-        )
+        return tuple(one(known(kind), 0.15) for _ in range(random.choice((0, 0, 1, 1, 2, 3))))
 
     kind = random.choice(("defect", "defect", "defect", "any"))
     return ListingInput(
-        mutated_word(random, random.choice(PROGRAMS))
-        if random.random() < 0.05
-        else random.choice(PROGRAMS),
+        one(PROGRAMS, 0.05),
         random.choice((None, None, "original", "corrected", "", "corrected")),
         several(kind),
         several(kind),
@@ -242,21 +212,15 @@ def listing_input(random: Random) -> ListingInput:
 
 def mutated_word(random: Random, word: str) -> str:
     """Return a word with a typing error, or another one; none has a path's separator."""
-    kind = random.randrange(6)
-    place = random.randrange(len(word) + 1)
-    if kind == 0:
-        result = word[:place] + word[place + 1 :]
-    elif kind == 1:
-        result = word[:place] + chr(random.choice((0x20, 0x2C, 0xFC, 0x1B, 0xA, 0x2028))) + word
-    elif kind == 2:
-        result = word.upper()
-    elif kind == 3:
-        result = random.choice(_WORDS)
-    elif kind == 4:
-        result = "".join(chr(random.randrange(1, 0x3000)) for _ in range(random.randrange(12)))
-    else:
-        result = word + chr(random.choice((0xDC80, 0xDCFF, 0x301, 0x1F600)))
-    return result.replace("/", "|")
+    kinds: tuple[Callable[[int], str], ...] = (
+        lambda place: word[:place] + word[place + 1 :],
+        lambda place: word[:place] + chr(random.choice((32, 0x2C, 0xFC, 27, 10, 0x2028))) + word,
+        lambda _: word.upper(),
+        lambda _: random.choice(_WORDS),
+        lambda _: "".join(chr(random.randrange(1, 0x3000)) for _ in range(random.randrange(12))),
+        lambda _: word + chr(random.choice((0xDC80, 0xDCFF, 0x301, 0x1F600))),
+    )
+    return random.choice(kinds)(random.randrange(len(word) + 1)).replace("/", "|")
 
 
 def scene_text(random: Random) -> str:
@@ -305,70 +269,51 @@ def scene_bytes(random: Random) -> bytes:
 
 
 def _value(random: Random) -> str:
-    kind = random.randrange(12)
-    if kind == 0:
-        return random.choice("123456789") + "0" * random.choice((20, 309, 400, 4000, 5000))
-    if kind == 1:
-        return "0x" + "F" * random.choice((16, 300, 5000))
-    if kind == 2:
-        return "[" * random.choice((3, 200, 5000)) + "1"
-    if kind == 3:
-        depth = random.choice((3, 100, 400))
-        return "[" * depth + "1" + "]" * depth
-    if kind == 4:
-        return "{a=" * 50 + "1" + "}" * 50
-    if kind == 5:
-        return "[" + "1.0," * random.choice((4, 3000)) + "]"
-    if kind == 6:
-        return repr(number(random, 0.7))
-    return random.choice(_VALUES)
+    kinds: tuple[Callable[[], str], ...] = (
+        lambda: random.choice("123456789") + "0" * random.choice((20, 309, 400, 4000, 5000)),
+        lambda: "0x" + "F" * random.choice((16, 300, 5000)),
+        lambda: "[" * random.choice((3, 200, 5000)) + "1",
+        lambda: random.choice(["[" * depth + "1" + "]" * depth for depth in (3, 100, 400)]),
+        lambda: "{a=" * 50 + "1" + "}" * 50,
+        lambda: "[" + "1.0," * random.choice((4, 3000)) + "]",
+        lambda: repr(number(random, 0.7)),
+    )
+    plain = (lambda: random.choice(_VALUES),) * 5
+    return random.choice(kinds + plain)()
 
 
 def _mutated_text(random: Random, text: str) -> str:
     lines = text.split("\n")
     place = random.randrange(len(lines))
-    kind = random.randrange(10)
-    if kind <= 3:
-        key, separator, _ = lines[place].partition(" = ")
-        lines[place] = key + separator + _value(random) if separator else lines[place]
-    elif kind == 4:
-        lines.insert(place, lines[random.randrange(len(lines))])
-    elif kind == 5:
-        del lines[place]
-    elif kind == 6:
-        lines.insert(place, f"{random.choice(_KEYS)} = {_value(random)}")
-    elif kind == 7:
-        lines.insert(
-            place, "[" + ".".join([random.choice(_KEYS)] * random.choice((1, 2, 500))) + "]"
-        )
-    elif kind == 8:
-        lines.insert(place, f"[[{random.choice(_KEYS)}]]")
-    else:
-        random.shuffle(lines)
-    return "\n".join(lines)
+    before, line, after = lines[:place], lines[place], lines[place + 1 :]
+    key, separator, _ = line.partition(" = ")
+    other = random.choice(_KEYS)
+    kinds: tuple[Callable[[], list[str]], ...] = (
+        *(lambda: [*before, f"{key} = {_value(random)}" if separator else line, *after],) * 4,
+        lambda: [*before, random.choice(lines), line, *after],
+        lambda: before + after,
+        lambda: [*before, f"{other} = {_value(random)}", line, *after],
+        lambda: [*before, f"[{'.'.join([other] * random.choice((1, 2, 500)))}]", line, *after],
+        lambda: [*before, f"[[{other}]]", line, *after],
+        lambda: random.sample(lines, len(lines)),
+    )
+    return "\n".join(random.choice(kinds)())
 
 
 def _mutated_bytes(random: Random, content: bytes, text: str) -> bytes:
     place = random.randrange(len(content) + 1)
-    kind = random.randrange(11)
-    if kind == 0:
-        return content[:place]
-    if kind == 1:
-        return content[:place] + bytes([random.randrange(256)]) + content[place + 1 :]
-    if kind == 2:
-        return content[:place] + random.randbytes(random.randrange(20)) + content[place:]
-    if kind == 3:
-        return content[:place] + b"\0" + content[place:]
-    if kind == 4:
-        return b"\xef\xbb\xbf" + content
-    if kind == 5:
-        return text.encode(random.choice(("utf-16", "utf-32", "utf-7")), "replace")
-    if kind == 6:
-        return text.replace("brick", "ü").encode("latin-1", "replace")
-    if kind == 7:
-        return content.replace(b"\n", random.choice((b"\r\n", b"\r", b"\n\n", b"\0")))
-    if kind == 8:
-        return content[:place] + content[:place] + content[place:]
-    if kind == 9:
-        return content + b"#" * random.choice((10, 999_000, 1_100_000))
-    return b""
+    before, after = content[:place], content[place:]
+    kinds: tuple[Callable[[], bytes], ...] = (
+        lambda: before,
+        lambda: before + random.randbytes(1) + after[1:],
+        lambda: before + random.randbytes(random.randrange(20)) + after,
+        lambda: before + b"\0" + after,
+        lambda: b"\xef\xbb\xbf" + content,
+        lambda: text.encode(random.choice(("utf-16", "utf-32", "utf-7")), "replace"),
+        lambda: text.replace("brick", "ü").encode("latin-1", "replace"),
+        lambda: content.replace(b"\n", random.choice((b"\r\n", b"\r", b"\n\n", b"\0"))),
+        lambda: before + content,
+        lambda: content + b"#" * random.choice((10, 999_000, 1_100_000)),
+        lambda: b"",
+    )
+    return random.choice(kinds)()

@@ -7,7 +7,6 @@ hJ in place of z. The original Runge-Kutta program keeps a second vector, U(1), 
 step: its matrix has two rows, for U(1) and for the result.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -17,10 +16,9 @@ from numpy.typing import NDArray
 
 from pyharness.model.listing import Listing
 from pyharness.theory.collocation_matrices import PARTS
-from pyharness.theory.rational import Exact, inverse, product, times
+from pyharness.theory.rational import Exact, Fractions, collocation_matrix, inverse
 
 Complex = NDArray[np.complexfloating[Any, Any]]
-Coefficients = NDArray[np.object_]
 
 _HIGHEST = 5
 # A boundary nearer than that is the origin itself.
@@ -30,15 +28,11 @@ _NOTHING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """The matrix of one step.
+    """The matrix of one step."""
 
-    Attributes
-    ----------
-    coefficients : ndarray of Fraction, shape (m, m, 5)
-        Element (i, j), the coefficients of 1, z ... z**4; the last row is the result's.
-    """
-
-    coefficients: Coefficients
+    # of Fraction, shape (m, m, 5): element (i, j), the coefficients of 1, z ... z**4; the last row
+    # is the result's
+    coefficients: Fractions
 
     @property
     def size(self) -> int:
@@ -61,19 +55,14 @@ class Amplification:
             return Amplification(self.coefficients[:-1, :-1])
         return self
 
-    def of(self, matrix: Exact) -> Exact:
+    def of(self, matrix: Exact) -> Fractions:
         """Return the matrix of a step for a system, from hJ of n rows: m n rows, exact."""
-        count = len(matrix)
-        powers = [[[Fraction(int(i == j)) for j in range(count)] for i in range(count)]]
-        for _ in range(_HIGHEST - 1):
-            powers.append(product(matrix, powers[-1]))
-        result = np.zeros((self.size, count, self.size, count), dtype=object)
-        for i in range(self.size):
-            for j in range(self.size):
-                for power, c in zip(powers, self.coefficients[i, j], strict=True):
-                    result[i, :, j, :] += c * np.array(power, dtype=object)
-        flat: Exact = result.reshape(self.size * count, self.size * count).tolist()
-        return flat
+        power = np.eye(len(matrix), dtype=object)
+        total = np.kron(self.coefficients[..., 0], power)
+        for k in range(1, _HIGHEST):
+            power = np.array(matrix, dtype=object) @ power
+            total = total + np.kron(self.coefficients[..., k], power)
+        return np.asarray(total)
 
     def text(self) -> str:
         """Return the polynomial, or the matrix row by row, as text."""
@@ -82,37 +71,16 @@ class Amplification:
 
 
 def amplification(listing: Listing, step: int = 1) -> Amplification:
-    """Return the matrix of one step of a program.
+    """Return the matrix of a program's step number `step`, from 1.
 
-    Parameters
-    ----------
-    listing : Listing
-        The program and its active defects.
-    step : int
-        Which step, from 1: with `dt-accumulates` the points of collocation move.
+    In collocation the first estimate takes the right-hand side z x constant, so that it is on a
+    straight line; one correction takes it along that.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
-    moved = step if listing.has("dt-accumulates") else 1
-    return collocation([part * moved for part in PARTS[listing.program]])
-
-
-def collocation(points: Sequence[Fraction]) -> Amplification:
-    """Return the matrix of the scheme of IV.2 with points in parts of the step.
-
-    The first estimate takes the right-hand side z x constant, one correction takes it along it.
-    """
-    count = len(points)
-    matrix = [[(j + 1) * point**j for j in range(count)] for point in points]
-    solver = np.array(inverse(matrix), dtype=object)
-
-    def fitted(rates: Sequence[Coefficients], times: Sequence[Fraction]) -> list[Coefficients]:
-        c = solver @ np.array(rates, dtype=object)
-        return [_one(1, 0)[0] + sum(each * t ** (k + 1) for k, each in enumerate(c)) for t in times]
-
-    constant = _times_z(_one(1, 0)[0])
-    estimate = fitted([constant] * count, points)
-    (end,) = fitted([_times_z(x) for x in estimate], [Fraction(1)])
+    points, weights = _quadrature(listing, step)
+    nothing = Fraction(0)
+    end = [Fraction(1), weights.sum(), weights @ points, nothing, nothing]
     return Amplification(np.array([[end]], dtype=object))
 
 
@@ -121,11 +89,16 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
 
     Along the first estimate the right-hand side is F + s J F + s**2 Q(F): the true weight is 1/3.
     """
+    points, weights = _quadrature(listing, step)
+    found: Fraction = weights @ points**2
+    return found
+
+
+def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
+    """Return points, which `dt-accumulates` moves from step to step, and weights in their step."""
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
-    matrix = [[(j + 1) * point**j for j in range(len(points))] for point in points]
-    c = times(inverse(matrix), [point * point for point in points])
-    return sum(c, Fraction(0))
+    return np.array(points, dtype=object), inverse(collocation_matrix(points)).sum(axis=0)
 
 
 def _runge_kutta(listing: Listing) -> Amplification:
@@ -133,7 +106,7 @@ def _runge_kutta(listing: Listing) -> Amplification:
     first, base = _one(2, 0), _one(2, 1)
     half = Fraction(1, 2)
 
-    def stored(before: Coefficients, slope: Coefficients, length: Fraction) -> Coefficients:
+    def stored(before: Fractions, slope: Fractions, length: Fraction) -> Fractions:
         start = before if listing.has("stage-base") else base
         return np.asarray(start + length * slope)
 
@@ -153,24 +126,19 @@ def _runge_kutta(listing: Listing) -> Amplification:
     return Amplification(matrix[1:].sum(axis=1, keepdims=True))
 
 
-def runge_kutta_4() -> Amplification:
-    """Return that of equation 31 as it stands."""
-    return _runge_kutta(Listing("runge-kutta", frozenset()))
-
-
-def _one(size: int, place: int) -> Coefficients:
+def _one(size: int, place: int) -> Fractions:
     """Return the vector at `place` itself, shape (size, powers of z)."""
     result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
     result[place, 0] = Fraction(1)
     return result
 
 
-def _times_z(x: Coefficients) -> Coefficients:
+def _times_z(x: Fractions) -> Fractions:
     assert not x[..., -1].any()
     return np.roll(x, 1, axis=-1)
 
 
-def _polynomial_text(coefficients: Coefficients) -> str:
+def _polynomial_text(coefficients: Fractions) -> str:
     terms = []
     for k, c in enumerate(coefficients):
         if c:
@@ -183,18 +151,8 @@ def _polynomial_text(coefficients: Coefficients) -> str:
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
     """Return how far along a direction disturbances do not grow, and the slope there.
 
-    Parameters
-    ----------
-    matrix : Amplification
-        Of a step.
-    direction : complex
-        -1 or 1j: z is a positive number times this.
-
-    Returns
-    -------
-    distance, slope : float
-        Distance 0 where they grow from the beginning; the slope is that of the largest
-        eigenvalue beyond the distance.
+    Along -1 or 1j: distance 0 where they grow from the beginning; the slope is that of the
+    largest eigenvalue beyond the distance.
     """
 
     def grows(distance: float) -> bool:

@@ -12,6 +12,7 @@ from decimal import Decimal
 
 import numpy as np
 
+from pyharness.methods.linearised import jacobians
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
@@ -26,52 +27,30 @@ _SAMPLES = 256
 
 @dataclass(frozen=True)
 class Noise:
-    """What one step may add, over the largest abs(omega).
+    """What one step may add, over the largest abs(omega)."""
 
-    Attributes
-    ----------
-    step : float
-        s.
-    rounding : float
-        Bound of what rounding adds, as often up as down.
-    truncation : float
-        Bound of what the method leaves out, which may have a preference.
-    conserves : bool
-        Whether truncation leaves energy and momentum alone, so that only the phase sees it.
-    """
-
-    step: float
-    rounding: float
-    truncation: float
+    step: float  # s
+    rounding: float  # bound of what rounding adds, as often up as down
+    truncation: float  # bound of what the method leaves out, which may have a preference
+    # whether truncation leaves energy and momentum alone, so that only the phase sees it
     conserves: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One torque-free motion, as its bounds see it: largest values along it.
+    """One torque-free motion, as its bounds see it: largest values along it."""
 
-    Attributes
-    ----------
-    states, slopes, jacobians : ndarray, shapes (n, 3), (n, 3), (n, 3, 3)
-        Along it: omega (rad/s), its derivative, and the derivative of that by omega.
-    largest : float
-        Largest abs(omega), rad/s.
-    frequency : float
-        Of the motion about the polhode: 2 pi over the period (rad/s).
-    gains : dict
-        By which an error of omega over `largest` enters energy, momentum (both relative) and
-        the frequency (rad/s).
-    turn : float
-        The phase (rad) that an error of omega over `largest` amounts to.
-    """
-
+    # shapes (n, 3), (n, 3), (n, 3, 3); along it: omega (rad/s), its derivative, and the derivative
+    # of that by omega
     states: Array
     slopes: Array
     jacobians: Array
-    largest: float
-    frequency: float
+    largest: float  # largest abs(omega), rad/s
+    frequency: float  # of the motion about the polhode: 2 pi over the period (rad/s)
+    # by which an error of omega over `largest` enters energy, momentum (both relative) and the
+    # frequency (rad/s)
     gains: dict[str, float]
-    turn: float
+    turn: float  # the phase (rad) that an error of omega over `largest` amounts to
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
         """Return the bounds on energy, momentum and phase after a number of steps."""
@@ -102,15 +81,6 @@ def orbit(scene: Scene) -> Orbit:
     states = floats([torque_free(scene, t, rounded=True) for t in times])
     largest = float(np.abs(states).max())
     slopes = a * np.roll(states, -1, 1) * np.roll(states, -2, 1)
-    x, y, z = states.T
-    zero = np.zeros(len(states))
-    jacobians = np.array(
-        [
-            [zero, a[0] * z, a[0] * y],
-            [a[1] * z, zero, a[1] * x],
-            [a[2] * y, a[2] * x, zero],
-        ]
-    ).transpose(2, 0, 1)
     moments = np.array(scene.moments)
     turns = frequency * largest * np.abs(slopes).sum(axis=1) / (slopes**2).sum(axis=1)
     gains = {}
@@ -121,7 +91,8 @@ def orbit(scene: Scene) -> Orbit:
         # Energy is half of a square, momentum the root of one.
         gains[name] = float(part.max()) * (2.0 if name == "energy" else 1.0)
     gains["frequency"] = largest * max(_steepness(a, state) for state in states)
-    return Orbit(states, slopes, jacobians, largest, frequency, gains, float(turns.max()))
+    along = jacobians(scene, states)
+    return Orbit(states, slopes, along, largest, frequency, gains, float(turns.max()))
 
 
 def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
@@ -137,19 +108,14 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
     back, half a unit in the last place. The sum of the terms rounds each three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
-    signed = np.array(scene.euler_coefficients)
-    terms, errors = [body.states], [np.abs(body.states)]
+    terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
     for k in range(1, order + 1):
-        value, size, carried = np.zeros((3, *body.states.shape))
+        size, carried = np.zeros((2, *body.states.shape))
         for j in range(k):
-            for axis in range(3):
-                p, q = (axis + 1) % 3, (axis + 2) % 3
-                x, y = terms[j][:, p], terms[k - 1 - j][:, q]
-                value[:, axis] += x * y
-                size[:, axis] += np.abs(x * y)
-                carried[:, axis] += errors[j][:, p] * np.abs(y)
-                carried[:, axis] += np.abs(x) * errors[k - 1 - j][:, q]
-        terms.append(signed * value * (step / k))
+            x, y = np.roll(terms[j], -1, 1), np.roll(terms[k - 1 - j], -2, 1)
+            size += np.abs(x * y)
+            carried += np.roll(errors[j], -1, 1) * np.abs(y)
+            carried += np.abs(x) * np.roll(errors[k - 1 - j], -2, 1)
         errors.append(a * (step / k) * (carried + (k + 3.0) * size))
     total = sum(e + 3.0 * np.abs(t) for e, t in zip(errors[1:], terms[1:], strict=True))
     return Noise(step, ROUNDING * float(np.max(total)) / body.largest, left_out, conserves=False)
@@ -180,7 +146,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     at_node = step * spread * ((stages + 3.0) * rate + stiffness * state) * resolvent
     total = step * ((stages + 4.0) * rate + stiffness * (state + at_node))
     factor = math.factorial(stages) ** 4 / math.factorial(2 * stages) ** 2 / (2 * stages + 1)
-    terms = _term_sizes(body, scene, step, 2 * stages + 1)
+    terms = [float(np.abs(each).max()) for each in _terms(body, scene, step, 2 * stages + 1)]
     left_out = factor * sum(
         (step * stiffness) ** j / math.factorial(j) * (2 * stages + 1 - j) * terms[-1 - j]
         for j in range(stages + 1)
@@ -188,8 +154,8 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     return Noise(step, ROUNDING * total / state, left_out / state, conserves=True)
 
 
-def _term_sizes(body: Orbit, scene: Scene, step: float, order: int) -> list[float]:
-    """Return the largest Taylor terms 0 ... order along the motion, for a step (rad/s)."""
+def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
+    """Return the Taylor terms 0 ... order of a step along the motion (rad/s)."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -197,7 +163,7 @@ def _term_sizes(body: Orbit, scene: Scene, step: float, order: int) -> list[floa
         for j in range(k):
             value += np.roll(terms[j], -1, 1) * np.roll(terms[k - 1 - j], -2, 1)
         terms.append(a * value * (step / k))
-    return [float(np.abs(each).max()) for each in terms]
+    return terms
 
 
 def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, float]:
@@ -218,18 +184,11 @@ def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, fl
     x, y, z = (float(w) for w in truth)
     slope = np.array(scene.euler_coefficients) * np.array([y * z, z * x, x * y])
     late = float(error @ slope / (slope @ slope))
-    return {
-        "energy": change(1),
-        "momentum": 0.5 * change(2),
-        "phase": body.frequency * late,
-    }
+    return {"energy": change(1), "momentum": 0.5 * change(2), "phase": body.frequency * late}
 
 
 def root_mean_square(found: Array) -> Array:
-    """Return the size of errors over the starts, rows of `found`, for each number of steps.
-
-    A start that did not go so far, NaN, does not count.
-    """
+    """Return the size of errors over the starts, rows of `found`; NaN, not so far, not counted."""
     return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
 
 
@@ -255,9 +214,8 @@ def _frequency(a: Array, omega: Array) -> float:
 
 def _steepness(a: Array, omega: Array) -> float:
     """Return the sum of the derivatives of the frequency by omega, without their signs."""
-    total, size = 0.0, 1e-6 * float(np.abs(omega).max())
-    for axis in range(3):
-        shift = np.zeros(3)
-        shift[axis] = size
-        total += abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)
-    return total
+    size = 1e-6 * float(np.abs(omega).max())
+    return sum(
+        abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)
+        for shift in size * np.eye(3)
+    )

@@ -11,19 +11,15 @@ from fractions import Fraction
 import numpy as np
 
 from pyharness.model.trajectory import Array
-from pyharness.original.collocation import collocation_matrix
+from pyharness.original import collocation
 from pyharness.original.linear_solver import SINGULAR, leqt1f
 from pyharness.theory.rational import (
-    Exact,
-    absolute,
-    dot,
+    Fractions,
+    collocation_matrix,
     fractions,
     gamma,
     inverse,
-    magnitudes,
     norm,
-    product,
-    times,
 )
 
 # Where the residual is zero, in parts of the step.
@@ -35,45 +31,27 @@ PARTS = {
 
 @dataclass(frozen=True)
 class Solved:
-    """One matrix with its right-hand sides, solved by LEQT1F and exactly.
+    """One matrix with its right-hand sides, solved by LEQT1F and exactly."""
 
-    Attributes
-    ----------
-    ier : int
-        0 or 129, of the compiled solver.
-    differing : int
-        Numbers, of X and IER, that are not the same bits in Fortran and in the twin.
-    condition, scaled_condition : float
-        Exact, in the row-sum norm: of the matrix, and after its columns are divided by their
-        largest elements.
-    growth : float
-        Largest row sum of abs(L) abs(U) over that of the matrix, columns scaled likewise.
-    order : tuple of int
-        The rows in the order in which they became pivots.
-    pivoting : tuple of float
-        How far the chosen pivots fall short of the largest candidates, and how far rounding
-        may let them, both relative.
-    residual, forward, increment : float
-        Errors over their bounds, the largest of all right-hand sides (Higham 2002, theorem
-        9.4): of A X = B, of each element of X, and of what X adds to an unknown over the step.
-    increment_error : float
-        That last error over step times the largest right-hand side.
-    yardstick : float
-        As `forward`, of `numpy.linalg.solve`.
-    """
-
-    ier: int
-    differing: int
+    ier: int  # 0 or 129, of the compiled solver
+    differing: int  # numbers, of X and IER, that are not the same bits in Fortran and in the twin
+    # exact, in the row-sum norm: of the matrix, and after its columns are divided by their largest
+    # elements
     condition: float
     scaled_condition: float
-    growth: float
-    order: tuple[int, ...]
-    pivoting: tuple[float, float]
-    residual: float
-    forward: float
-    increment: float
-    increment_error: float
-    yardstick: float
+    # largest row sum of abs(L) abs(U) over that of the matrix, columns scaled likewise
+    growth: float = math.nan
+    order: tuple[int, ...] = ()  # the rows in the order in which they became pivots
+    # how far the chosen pivots fall short of the largest candidates, and how far rounding may let
+    # them, both relative
+    pivoting: tuple[float, float] = (0.0, 0.0)
+    # errors over their bounds, the largest of all right-hand sides (Higham 2002, theorem 9.4): of A
+    # X = B, of each element of X, and of what X adds to an unknown over the step
+    residual: float = math.nan
+    forward: float = math.nan
+    increment: float = math.nan
+    increment_error: float = math.nan  # that last error over step times the largest right-hand side
+    yardstick: float = math.nan  # as `forward`, of `numpy.linalg.solve`
 
 
 def points(program: str, step: float) -> list[float]:
@@ -83,120 +61,97 @@ def points(program: str, step: float) -> list[float]:
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
-def right_hand_sides(count: int) -> list[list[float]]:
+def _right_hand_sides(count: int) -> Array:
     """Return six right-hand sides: constant, linear, alternating, and three of no pattern."""
-    generator = np.random.default_rng(count)
-    rough: list[list[float]] = generator.normal(size=(3, count)).tolist()
+    rough = np.random.default_rng(count).normal(size=(3, count))
     places = range(count)
-    return [[1.0] * count, [k / count for k in places], [(-1.0) ** k for k in places], *rough]
+    return np.array(
+        [[1.0] * count, [k / count for k in places], [(-1.0) ** k for k in places], *rough]
+    )
 
 
 def solved(program: str, step: float) -> Solved:
     """Solve one matrix: `step` is what the points are parts of (s)."""
     from pyharness.model.extension import extension
 
-    matrix = collocation_matrix(points(program, step))
-    sides = right_hand_sides(len(matrix))
+    matrix = collocation.collocation_matrix(points(program, step))
+    sides = _right_hand_sides(len(matrix))
     factors, found, ier = extension().solve_linear(
-        np.asfortranarray(matrix), np.asfortranarray(np.array(sides).T)
+        np.asfortranarray(matrix), np.asfortranarray(sides.T)
     )
-    twin, twin_ier = leqt1f(matrix, sides)
+    twin, twin_ier = leqt1f(matrix, sides.tolist())
     differing = int((np.array(twin) != found.T).sum()) + (ier != twin_ier)
     exact = fractions(matrix)
     solver = inverse(exact)
-    columns = [max(abs(row[j]) for row in exact) for j in range(len(exact))]
-    scaled = [[x / s for x, s in zip(row, columns, strict=True)] for row in exact]
-    scaled_inverse = [[x * s for x in row] for row, s in zip(solver, columns, strict=True)]
+    columns = abs(exact).max(axis=0)
+    scaled = exact / columns
     condition = float(norm(exact) * norm(solver))
-    scaled_condition = float(norm(scaled) * norm(scaled_inverse))
+    scaled_condition = float(norm(scaled) * norm(solver * columns[:, None]))
     if ier == SINGULAR:
-        nothing = float("nan")
-        return Solved(
-            ier, differing, condition, scaled_condition, nothing, (), (0.0, 0.0),
-            nothing, nothing, nothing, nothing, nothing,
-        )  # fmt: skip
-    lower, upper = _triangles(factors)
-    order = _order(exact, product(lower, upper))
-    sizes = product(magnitudes(lower), magnitudes(upper))
-    growth = norm([[x / s for x, s in zip(row, columns, strict=True)] for row in sizes])
+        return Solved(ier, differing, condition, scaled_condition)
+    lower = fractions(np.tril(factors, -1) + np.eye(len(factors)))
+    upper = fractions(np.triu(factors))
+    # Which row of the matrix each row of L U is.
+    order = tuple(int(abs(exact[:, 1] - row[1]).argmin()) for row in lower @ upper)
+    sizes = abs(lower) @ abs(upper)
+    growth = float(norm(sizes / columns) / norm(scaled))
     # The bounds are on the rows as they stand in the matrix.
-    sizes = [sizes[order.index(i)] for i in range(len(exact))]
-    yardstick = np.linalg.solve(np.array(matrix), np.array(sides).T)
-    judge = _Judge(exact, solver, sizes, step)
-    errors = [judge.errors(x, b) for x, b in zip(found.T.tolist(), sides, strict=True)]
-    usual = [judge.errors(x, b) for x, b in zip(yardstick.T.tolist(), sides, strict=True)]
-    residual, forward, increment, increment_error = np.array(errors).max(axis=0).tolist()
+    sizes = sizes[np.argsort(order)]
+
+    def errors(solutions: Array) -> list[float]:
+        pairs = zip(solutions.T, sides, strict=True)
+        every = [_errors(exact, solver, sizes, Fraction(step), x, b) for x, b in pairs]
+        largest: list[float] = np.array(every).max(axis=0).tolist()
+        return largest
+
+    residual, forward, increment, increment_error = errors(found)
+    _, yardstick, *_ = errors(np.linalg.solve(np.array(matrix), sides.T))
     return Solved(
-        ier, differing, condition, scaled_condition, float(growth / norm(scaled)), order,
-        _pivoting(exact, order, sizes), residual, forward, increment, increment_error,
-        max(each[1] for each in usual),
+        ier, differing, condition, scaled_condition, growth, order,
+        _pivoting(exact, order, sizes), residual, forward, increment, increment_error, yardstick,
     )  # fmt: skip
 
 
-def last_pivot(program: str) -> Fraction:
-    """Return the last scaled pivot over step**(n-1), at steps where 1 is the largest of a row."""
+def _small_step(program: str) -> tuple[Fraction, Fractions]:
+    """Return a step at which 1 is the largest of each row, and the matrix there."""
     step = Fraction(1, 1000)
-    parts = PARTS[program]
-    matrix = [[(j + 1) * (part * step) ** j for j in range(len(parts))] for part in parts]
-    *_, (chosen, candidates) = _columns(matrix)
-    return candidates[chosen] / step ** (len(parts) - 1)
+    return step, collocation_matrix([part * step for part in PARTS[program]])
 
 
 def solver_roundings(program: str) -> tuple[float, float]:
     """Return how far solving moves the result of a step, in units of 2**-53 of step times rate.
 
     By 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4), which no step
-    changes as long as 1 is the largest of each row.
-
-    Returns
-    -------
-    constant, varying : float
-        For a rate that is the same at all points, where only c1 is not zero, and for each
-        whole by which rates at the points may differ from it.
+    changes as long as 1 is the largest of each row. The first number is for a rate that is the
+    same at all points, where only c1 is not zero, the second for each whole by which rates at the
+    points may differ from it.
     """
-    step = Fraction(1, 1000)
-    parts = PARTS[program]
-    count = len(parts)
-    matrix = [[(j + 1) * (part * step) ** j for j in range(count)] for part in parts]
-    reach = magnitudes(inverse(matrix))
-    powers = [step**k for k in range(1, count + 1)]
-    sizes = product(reach, _factor_sizes(matrix))
-    constant = dot(powers, [row[0] for row in sizes])
-    varying = dot(powers, [sum(row, Fraction(0)) for row in product(sizes, reach)])
+    step, matrix = _small_step(program)
+    count = len(matrix)
+    reach = abs(inverse(matrix))
+    powers = np.array([step**k for k in range(1, count + 1)], dtype=object)
+    factor_sizes = np.zeros_like(matrix)
+    for j, (chosen, candidates, rows) in enumerate(_columns(matrix)):
+        for i in candidates:
+            factor_sizes[i] += abs(rows[i, j] / rows[chosen, j] * rows[chosen])
+    sizes = reach @ factor_sizes
+    constant, varying = powers @ sizes[:, 0], powers @ (sizes @ reach).sum(axis=1)
     return 3 * count * float(constant / step), 3 * count * float(varying / step)
-
-
-def _factor_sizes(matrix: Exact) -> Exact:
-    """Return abs(L) abs(U), the rows as they stand in the matrix."""
-    order = [chosen for chosen, _ in _columns(matrix)]
-    rows = [list(matrix[i]) for i in order]
-    sizes = [[Fraction(0)] * len(rows) for _ in rows]
-    for j, pivot in enumerate(rows):
-        for i in range(j, len(rows)):
-            factor = rows[i][j] / pivot[j]
-            for k in range(j, len(rows)):
-                sizes[order[i]][k] += abs(factor * pivot[k])
-            if i > j:
-                rows[i] = [x - factor * y for x, y in zip(rows[i], pivot, strict=True)]
-    return sizes
 
 
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the step at and below which LEQT1F must declare singular (s).
 
     N + pivot equals N up to half a unit in the last place of N, and a tie goes to N, which is
-    even. N is a power of 2, whose last place is 2**(1 - bits) of it.
-
-    Parameters
-    ----------
-    program : str
-        A collocation program.
-    bits : int
-        Of the significand, in an arithmetic that rounds to nearest.
+    even. N is a power of 2, whose last place is 2**(1 - bits) of it, in an arithmetic of so many
+    bits that rounds to nearest. The last scaled pivot goes with step**(n-1).
     """
-    count = len(PARTS[program])
+    step, matrix = _small_step(program)
+    count = len(matrix)
+    *_, (chosen, candidates, _) = _columns(matrix)
+    last_pivot = candidates[chosen] / step ** (count - 1)
     half_unit = count * Fraction(1, 2**bits)
-    return math.pow(half_unit / last_pivot(program), 1.0 / (count - 1))
+    return math.pow(half_unit / last_pivot, 1.0 / (count - 1))
 
 
 def declared_singular_below(program: str) -> float:
@@ -204,7 +159,7 @@ def declared_singular_below(program: str) -> float:
     from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
-        matrix = collocation_matrix(points(program, step))
+        matrix = collocation.collocation_matrix(points(program, step))
         *_, ier = extension().solve_linear(
             np.asfortranarray(matrix), np.ones((len(matrix), 1), order="F")
         )
@@ -219,97 +174,65 @@ def declared_singular_below(program: str) -> float:
     return low
 
 
-class _Judge:
-    """Errors of solutions of one system over their bounds."""
-
-    def __init__(self, matrix: Exact, solver: Exact, sizes: Exact, step: float) -> None:
-        count = len(matrix)
-        self._matrix, self._solver, self._sizes = matrix, solver, sizes
-        self._gamma = gamma(3 * count)
-        # Up to three roundings in a power, one in its product with c, n in the sum.
-        self._adding = gamma(count + 4)
-        self._step = Fraction(step)
-        self._powers = [self._step**k for k in range(1, count + 1)]
-
-    def errors(self, found: Sequence[float], side: Sequence[float]) -> tuple[float, ...]:
-        """Return residual, forward and increment over their bounds, and the increment's error."""
-        x = [Fraction(each) for each in found]
-        b = [Fraction(each) for each in side]
-        allowed = [self._gamma * each for each in times(self._sizes, absolute(x))]
-        left = [abs(p - q) for p, q in zip(times(self._matrix, x), b, strict=True)]
-        truth = times(self._solver, b)
-        wrong = [abs(p - q) for p, q in zip(truth, x, strict=True)]
-        reach = times(magnitudes(self._solver), allowed)
-        total = 0.0
-        power = h = float(self._step)
-        for c in found:
-            total, power = total + c * power, power * h
-        wanted = sum(p * q for p, q in zip(self._powers, truth, strict=True))
-        bound = sum(
-            p * (r + self._adding * abs(q)) for p, q, r in zip(self._powers, x, reach, strict=True)
-        )
-        missed = abs(Fraction(total) - wanted)
-        size = self._step * max(absolute(b))
-        return (
-            _largest_share(left, allowed),
-            _largest_share(wrong, reach),
-            _share(missed, Fraction(bound)),
-            float(missed / size),
-        )
+def _errors(
+    matrix: Fractions,
+    solver: Fractions,
+    sizes: Fractions,
+    step: Fraction,
+    found: Array,
+    side: Array,
+) -> tuple[float, ...]:
+    """Return residual, forward and increment over their bounds, and the increment's error."""
+    count = len(matrix)
+    x, b = fractions(found), fractions(side)
+    truth = solver @ b
+    allowed = gamma(3 * count) * (sizes @ abs(x))
+    reach = abs(solver) @ allowed
+    total, power = 0.0, float(step)
+    for c in found:
+        total, power = total + c * power, power * float(step)
+    powers = np.array([step**k for k in range(1, count + 1)], dtype=object)
+    # Up to three roundings in a power, one in its product with c, n in the sum.
+    bound = powers @ (reach + gamma(count + 4) * abs(x))
+    missed = abs(Fraction(total) - powers @ truth)
+    return (
+        max(map(_share, abs(matrix @ x - b), allowed)),
+        max(map(_share, abs(truth - x), reach)),
+        _share(missed, bound),
+        float(missed / (step * abs(b).max())),
+    )
 
 
-def _pivoting(matrix: Exact, order: Sequence[int], sizes: Exact) -> tuple[float, float]:
+def _share(error: Fraction, bound: Fraction) -> float:
+    return 0.0 if not error else float(error / bound) if bound else math.inf
+
+
+def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
     """Follow the order in exact arithmetic; return the largest shortfall and what may be."""
     shortfall, allowed = Fraction(0), Fraction(0)
-    scale = _row_scales(matrix)
-    for j, (chosen, candidates) in enumerate(_columns(matrix, order)):
+    scale = 1 / abs(matrix).max(axis=1)
+    for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
         best = max(candidates.values())
         shortfall = max(shortfall, 1 - candidates[chosen] / best)
         # Two candidates, each wrong by the rounding of its sum and of its scale.
-        wrong = max(scale[i] * sizes[i][j] for i in candidates) * gamma(len(matrix) + 2)
+        wrong = max(scale[i] * sizes[i, j] for i in candidates) * gamma(len(matrix) + 2)
         allowed = max(allowed, 2 * wrong / best)
     return float(shortfall), float(allowed)
 
 
 def _columns(
-    matrix: Exact, order: Sequence[int] | None = None
-) -> Iterator[tuple[int, dict[int, Fraction]]]:
-    """Eliminate exactly; yield the pivot's row and all scaled candidates, column by column.
+    matrix: Fractions, order: Sequence[int] | None = None
+) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
+    """Eliminate exactly; yield pivot row, all scaled candidates and the rows, column by column.
 
     Rows become pivots in the order given, or by the rule of LEQT1F.
     """
-    rows = [list(row) for row in matrix]
-    scale = _row_scales(matrix)
+    rows = matrix.copy()
+    scale = 1 / abs(matrix).max(axis=1)
     left = list(range(len(rows)))
     for j in range(len(rows)):
-        candidates = {i: scale[i] * abs(rows[i][j]) for i in left}
+        candidates = {i: scale[i] * abs(rows[i, j]) for i in left}
         chosen = order[j] if order else max(left, key=candidates.__getitem__)
-        yield chosen, candidates
+        yield chosen, candidates, rows
         left.remove(chosen)
-        for i in left:
-            factor = rows[i][j] / rows[chosen][j]
-            rows[i] = [x - factor * y for x, y in zip(rows[i], rows[chosen], strict=True)]
-
-
-def _row_scales(matrix: Exact) -> list[Fraction]:
-    return [1 / max(absolute(row)) for row in matrix]
-
-
-def _order(matrix: Exact, multiplied: Exact) -> tuple[int, ...]:
-    """Return which row of the matrix each row of L U is."""
-    return tuple(
-        min(range(len(matrix)), key=lambda i: abs(matrix[i][1] - row[1])) for row in multiplied
-    )
-
-
-def _triangles(factors: Array) -> tuple[Exact, Exact]:
-    lower = np.tril(factors, -1) + np.eye(len(factors))
-    return fractions(lower.tolist()), fractions(np.triu(factors).tolist())
-
-
-def _share(error: Fraction, bound: Fraction) -> float:
-    return 0.0 if not error else float(error / bound) if bound else float("inf")
-
-
-def _largest_share(errors: Sequence[Fraction], bounds: Sequence[Fraction]) -> float:
-    return max(_share(e, b) for e, b in zip(errors, bounds, strict=True))
+        rows[left] -= np.outer(rows[left, j] / rows[chosen, j], rows[chosen])

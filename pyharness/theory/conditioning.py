@@ -25,44 +25,24 @@ _MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class Conditioning:
-    """How errors made on the way reach the end.
+    """How errors made on the way reach the end."""
 
-    Attributes
-    ----------
-    amplification : float
-        Largest factor by which an error of any omega made on the way reaches the end, at least 1.
-    rounding : float
-        Error at the end over `largest` if every term of the right-hand side, the start and the
-        result are wrong by a few roundings, each of its own size, in the worst direction.
-    storing : float
-        The same if omega is rounded once a step, for each step.
-    unamplified : float
-        Sum over the way of what `rounding` counts, as it was made: what the invariants see.
-    largest : float
-        Largest abs(omega) of any component on the way (rad/s).
-    """
-
+    # largest factor by which an error of any omega made on the way reaches the end, at least 1
     amplification: float
+    # error at the end over `largest` if every term of the right-hand side, the start and the result
+    # are wrong by a few roundings, each of its own size, in the worst direction
     rounding: float
-    storing: float
+    storing: float  # the same if omega is rounded once a step, for each step
+    # sum over the way of what `rounding` counts, as it was made: what the invariants see
     unamplified: float
-    largest: float
+    largest: float  # largest abs(omega) of any component on the way (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the error that a method may have, over `largest`.
+        """Return the error that a method may have, over `largest`; 2 says nothing.
 
-        Parameters
-        ----------
-        made : float
-            Sum of the errors that the method makes on the way, over `largest`, as its tolerance
-            or its order tells.
-        steps : float
-            Steps after which it rounds omega; 0 where it carries on what rounding took off.
-
-        Returns
-        -------
-        float
-            2, which says nothing, where it would be more.
+        `made` is the sum of the errors that it makes on the way, over `largest`, as its tolerance
+        or its order tells, `steps` after how many it rounds omega: 0 where it carries on what
+        rounding took off.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # What is no number allows nothing.
@@ -72,11 +52,7 @@ class Conditioning:
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Follow the linearised flow along the solution from 0 to `time` (s).
 
-    Raises
-    ------
-    InputError
-        Where the solution leaves every bound before, or so long a time would need too many
-        nodes.
+    InputError where it leaves every bound before, or so long a time would need too many nodes.
     """
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
@@ -88,19 +64,8 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     """Follow the linearised flow along a solution that is known.
 
-    Parameters
-    ----------
-    scene : Scene
-        What it solves.
-    times : ndarray, shape (n,)
-        From 0 (s); omega turns by a small angle from each to the next.
-    omega : ndarray, shape (n, 3)
-        The solution there, rad/s.
-
-    Raises
-    ------
-    InputError
-        Where the flow amplifies beyond binary64.
+    It has omega, shape (n, 3), at `times` from 0 (s), and turns by a small angle from each to the
+    next; InputError where the flow amplifies beyond binary64.
     """
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
@@ -170,8 +135,8 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     A wave counts with its angle: a rounding of frequency times t is a rounding of that many
     radians.
     """
-    products = np.abs(np.array(scene.euler_coefficients)) * np.abs(
-        np.column_stack([omega[:, (i + 1) % 3] * omega[:, (i + 2) % 3] for i in range(3)])
+    products = np.abs(scene.euler_coefficients) * np.abs(
+        np.roll(omega, -1, 1) * np.roll(omega, -2, 1)
     )
     law = scene.torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))

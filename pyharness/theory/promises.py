@@ -10,8 +10,7 @@ has no larger terms than it has for y' = a y**2.
 import math
 from functools import cache
 
-import numpy as np
-from numpy.polynomial import polynomial
+from numpy.polynomial import Polynomial
 
 from pyharness.methods.plan import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, REGISTRY, SCIPY_METHODS
@@ -57,27 +56,17 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 @cache
 def _series(name: str) -> tuple[float, ...]:
     """Return the method's own series in the angle for y' = y**2, y(0) = 1."""
-    y, step = np.array([1.0]), np.array([0.0, 1.0])
-
-    def square(x: np.ndarray) -> np.ndarray:
-        return np.asarray(polynomial.polymul(x, x))
-
-    def onward(slope: np.ndarray, part: float) -> np.ndarray:
-        return np.asarray(polynomial.polyadd(y, part * polynomial.polymul(step, slope)))
-
     if name == "taylor-3":
         return 1.0, 1.0, 1.0
-    first = square(y)
+    y, h = Polynomial([1.0]), Polynomial([0.0, 1.0])
+    first = y * y
     if name == "improved-euler":
-        second = square(onward(first, 1.0))
-        total = onward(polynomial.polyadd(first, second), 0.5)
+        result = y + 0.5 * h * (first + (y + h * first) ** 2)
     else:
-        second = square(onward(first, 0.5))
-        third = square(onward(second, 0.5))
-        fourth = square(onward(third, 1.0))
-        middle = 2.0 * polynomial.polyadd(second, third)
-        total = onward(polynomial.polyadd(polynomial.polyadd(first, middle), fourth), 1.0 / 6.0)
-    return tuple(float(c) for c in total)
+        second = (y + 0.5 * h * first) ** 2
+        third = (y + 0.5 * h * second) ** 2
+        result = y + 1.0 / 6.0 * (h * (first + 2.0 * (second + third) + (y + h * third) ** 2))
+    return tuple(result.coef.tolist())
 
 
 def finest(name: str, scene: Scene, time: float) -> float:
@@ -100,14 +89,10 @@ def tolerances(name: str, least: float, radians: float, amplification: float) ->
         for each in sorted({least, *LADDER})
         if least <= each <= LADDER[-1] and _cost(name, each, radians, amplification) <= _most(name)
     ]
-    chosen = {*allowed[:1], *({COARSE} & set(allowed))}
-    if (
-        not chosen
-        and least <= LADDER[-1]
-        and _cost(name, LADDER[-1], radians, amplification) <= _PATIENCE * _most(name)
-    ):
-        chosen = {LADDER[-1]}
-    return sorted(chosen)
+    if not allowed and least <= (coarsest := LADDER[-1]):
+        is_borne = _cost(name, coarsest, radians, amplification) <= _PATIENCE * _most(name)
+        return [coarsest] if is_borne else []
+    return sorted({*allowed[:1], *({COARSE} & set(allowed))})
 
 
 def _most(name: str) -> float:

@@ -1,30 +1,36 @@
-"""Linear algebra in fractions: what is exactly true where binary64 rounds."""
+"""Linear algebra in fractions, as arrays of objects: what is exactly true where binary64 rounds."""
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 Exact = list[list[Fraction]]
+Fractions = NDArray[np.object_]
 
 _UNIT = Fraction(1, 2**53)
 
 
-def inverse(matrix: Exact) -> Exact:
+def inverse(matrix: Fractions) -> Fractions:
     """Return the inverse of a regular matrix."""
     count = len(matrix)
-    rows = [[*row, *(Fraction(int(i == j)) for j in range(count))] for i, row in enumerate(matrix)]
+    rows = np.hstack([matrix, np.eye(count, dtype=object)])
     for j in range(count):
-        pivot = max(range(j, count), key=lambda i: abs(rows[i][j]))
-        rows[j], rows[pivot] = rows[pivot], rows[j]
-        rows[j] = [x / rows[j][j] for x in rows[j]]
-        for i in range(count):
-            if i != j:
-                rows[i] = [x - rows[i][j] * y for x, y in zip(rows[i], rows[j], strict=True)]
-    return [row[count:] for row in rows]
+        pivot = j + int(abs(rows[j:, j]).argmax())
+        rows[[j, pivot]] = rows[[pivot, j]]
+        rows[j] = rows[j] / rows[j, j]
+        others = np.arange(count) != j
+        rows[others] -= np.outer(rows[others, j], rows[j])
+    return rows[:, count:]
 
 
-def fractions(matrix: Sequence[Sequence[float]]) -> Exact:
-    """Return a matrix of floats, exactly."""
-    return [[Fraction(x) for x in row] for row in matrix]
+def fractions(floats: ArrayLike) -> Fractions:
+    """Return an array of floats, exactly."""
+    exact: Any = np.vectorize(Fraction, otypes=[object])
+    found: Fractions = exact(floats)
+    return found
 
 
 def gamma(count: int) -> Fraction:
@@ -32,32 +38,13 @@ def gamma(count: int) -> Fraction:
     return count * _UNIT / (1 - count * _UNIT)
 
 
-def absolute(values: Sequence[Fraction]) -> list[Fraction]:
-    """Return the size of each element."""
-    return [abs(x) for x in values]
-
-
-def magnitudes(matrix: Exact) -> Exact:
-    """Return the size of each element."""
-    return [absolute(row) for row in matrix]
-
-
-def norm(matrix: Exact) -> Fraction:
+def norm(matrix: Fractions) -> Fraction:
     """Return the largest row sum of sizes."""
-    return max(sum(absolute(row), Fraction(0)) for row in matrix)
+    largest: Fraction = abs(matrix).sum(axis=1).max()
+    return largest
 
 
-def product(first: Exact, second: Exact) -> Exact:
-    """Return the product of two matrices."""
-    columns = list(zip(*second, strict=True))
-    return [[dot(row, column) for column in columns] for row in first]
-
-
-def times(matrix: Exact, vector: Sequence[Fraction]) -> list[Fraction]:
-    """Return matrix times vector."""
-    return [dot(row, vector) for row in matrix]
-
-
-def dot(first: Sequence[Fraction], second: Sequence[Fraction]) -> Fraction:
-    """Return the sum of products."""
-    return sum((x * y for x, y in zip(first, second, strict=True)), Fraction(0))
+def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
+    """Return the matrix of equation 36."""
+    rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
+    return np.array(rows, dtype=object)

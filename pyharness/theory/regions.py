@@ -17,42 +17,24 @@ _HIDDEN = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """One matrix over the plane and along the imaginary axis.
+    """One matrix over the plane and along the imaginary axis."""
 
-    Attributes
-    ----------
-    name : str
-        Whose it is.
-    radius : ndarray, shape (imaginary, real)
-        Largest eigenvalue over the plane, of what does not merely stay.
-    growth : ndarray
-        Largest eigenvalue less 1 on the imaginary axis, at the distances; 0 where rounding hides
-        it.
-    """
-
-    name: str
+    name: str  # whose it is
+    # shape (imaginary, real); largest eigenvalue over the plane, of what does not merely stay
     radius: Array
+    # largest eigenvalue less 1 on the imaginary axis, at the distances; 0 where rounding hides it
     growth: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """All regions on the same grids.
+    """All regions on the same grids."""
 
-    Attributes
-    ----------
-    real, imaginary : ndarray
-        Of z, over the plane.
-    distances : ndarray
-        Of z from 0, along the imaginary axis.
-    regions : tuple of Region
-        In the order in which they are drawn.
-    """
-
+    # of z, over the plane
     real: Array
     imaginary: Array
-    distances: Array
-    regions: tuple[Region, ...]
+    distances: Array  # of z from 0, along the imaginary axis
+    regions: tuple[Region, ...]  # in the order in which they are drawn
 
 
 def matrices() -> dict[str, Amplification]:

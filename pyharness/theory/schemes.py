@@ -16,7 +16,7 @@ from numpy.polynomial import legendre
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.theory.collocation_matrices import PARTS
-from pyharness.theory.rational import inverse
+from pyharness.theory.rational import collocation_matrix, inverse
 
 # Powers of the step that are kept of a series.
 TERMS = 24
@@ -62,9 +62,7 @@ class Series:
 
     def times_step(self, x: Array) -> Array:
         """Return the step times x."""
-        result = np.zeros(x.shape)
-        result[1:] = x[:-1]
-        return result
+        return np.concatenate([np.zeros_like(x[:1]), x[:-1]])
 
     def solution(self, omega: Array) -> Array:
         """Return the series of the solution through omega of shape (..., 3)."""
@@ -80,24 +78,12 @@ Scheme = Callable[[Arithmetic, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A method with a fixed step.
+    """A method with a fixed step."""
 
-    Attributes
-    ----------
-    name : str
-        Of the program or method.
-    order : int
-        The power of the step with which its error falls.
-    scheme : callable
-        ``scheme(arithmetic, omega)`` returns omega after a step.
-    roundings : float
-        Units of 2**-53 of omega by which a step may be wrong for its last additions.
-    """
-
-    name: str
-    order: int
-    scheme: Scheme
-    roundings: float
+    name: str  # of the program or method
+    order: int  # the power of the step with which its error falls
+    scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
+    roundings: float  # units of 2**-53 of omega by which a step may be wrong for its last additions
 
 
 def constant(omega: Array) -> Array:
@@ -110,9 +96,7 @@ def constant(omega: Array) -> Array:
 def collocation(program: str) -> Scheme:
     """Return that of a collocation program."""
     parts = PARTS[program]
-    matrix = [[(j + 1) * part**j for j in range(len(parts))] for part in parts]
-    solver = inverse(matrix)
-    weights = [float(sum(row[i] for row in solver)) for i in range(len(parts))]
+    weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
     def scheme(on: Arithmetic, omega: Array) -> Array:
         slope = on.times_step(on.rate(omega))
@@ -195,65 +179,41 @@ def gauss(stages: int) -> Scheme:
     matrix = integrals @ np.linalg.inv(powers)
 
     def scheme(on: Arithmetic, omega: Array) -> Array:
-        states = [omega] * stages
+        def moved(row: Array, slopes: list[Array]) -> Array:
+            return np.asarray(omega + sum(a * k for a, k in zip(row, slopes, strict=True)))
+
+        slopes = [on.times_step(on.rate(omega))] * stages
         for _ in range(TERMS):
-            slopes = [on.times_step(on.rate(state)) for state in states]
-            states = [
-                omega + sum(a * slope for a, slope in zip(row, slopes, strict=True))
-                for row in matrix
-            ]
-        slopes = [on.times_step(on.rate(state)) for state in states]
-        return np.asarray(omega + sum(b * k for b, k in zip(weights, slopes, strict=True)))
+            slopes = [on.times_step(on.rate(moved(row, slopes))) for row in matrix]
+        return moved(weights, slopes)
 
     return scheme
 
 
-SCHEMES = {
-    each.name: each
-    for each in (
-        FixedStep("two-term", 2, collocation("two-term"), 2.0),
-        FixedStep("four-term", 2, collocation("four-term"), 4.0),
-        FixedStep("runge-kutta", 4, runge_kutta_4, 1.0),
-        FixedStep("improved-euler", 2, improved_euler, 1.0),
-        FixedStep("taylor-3", 2, taylor_3, 1.0),
-        FixedStep("rk4", 4, runge_kutta_4, 1.0),
-        FixedStep("gauss-1", 2, gauss(1), 1.0),
-        FixedStep("gauss-2", 4, gauss(2), 1.0),
-        FixedStep("gauss-4", 8, gauss(4), 1.0),
-    )
-}
+_ALL = (
+    FixedStep("two-term", 2, collocation("two-term"), 2.0),
+    FixedStep("four-term", 2, collocation("four-term"), 4.0),
+    FixedStep("runge-kutta", 4, runge_kutta_4, 1.0),
+    FixedStep("improved-euler", 2, improved_euler, 1.0),
+    FixedStep("taylor-3", 2, taylor_3, 1.0),
+    FixedStep("rk4", 4, runge_kutta_4, 1.0),
+    FixedStep("gauss-1", 2, gauss(1), 1.0),
+    FixedStep("gauss-2", 4, gauss(2), 1.0),
+    FixedStep("gauss-4", 8, gauss(4), 1.0),
+)
+SCHEMES = {each.name: each for each in _ALL}
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return what a step from omega misses, as a series of the step.
-
-    Parameters
-    ----------
-    scheme : callable
-        See `FixedStep`.
-    scene : Scene
-        Constant torque.
-    omega : ndarray, shape (n, 3)
-        Where the step begins (rad/s).
-
-    Returns
-    -------
-    ndarray, shape (TERMS, n, 3)
-        Result of the step less the solution.
-    """
+    """Return what a step from omega (rad/s), shape (n, 3), misses: a series, (TERMS, n, 3)."""
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
 
 
 def spacing(count: int) -> Sequence[Fraction]:
-    """Return weights of the central first difference with `count` pairs of neighbours.
-
-    Exact for polynomials of degree 2 count.
-    """
-    square = math.factorial(count) ** 2
+    """Return weights of the first difference, exact to degree 2 count, with so many pairs."""
+    middle = math.comb(2 * count, count)
     return [
-        Fraction(
-            (-1) ** (i + 1) * square, i * math.factorial(count - i) * math.factorial(count + i)
-        )
+        (-1) ** (i + 1) * Fraction(math.comb(2 * count, count + i), i * middle)
         for i in range(1, count + 1)
     ]

@@ -28,33 +28,15 @@ _CONVERGED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution, and what the flow makes until the end of an error made on the way.
+    """The solution, and what the flow makes until the end of an error made on the way."""
 
-    Attributes
-    ----------
-    scene : Scene
-        Torque constant.
-    times : ndarray, shape (n,)
-        s, from 0 to the end.
-    omega : ndarray, shape (n, 3)
-        rad/s.
-    propagators : ndarray, shape (n, 3, 3)
-        From each time to the end.
-    flow : Conditioning
-        Of the same scene and time.
-    turned : float
-        Integral over time of the largest row sum of the Jacobian.
-    fastest : float
-        Largest of these row sums (1/s).
-    """
-
-    scene: Scene
-    times: Array
-    omega: Array
-    propagators: Array
-    flow: Conditioning
-    turned: float
-    fastest: float
+    scene: Scene  # torque constant
+    times: Array  # shape (n,), s: from 0 to the end
+    omega: Array  # shape (n, 3), rad/s
+    propagators: Array  # shape (n, 3, 3); from each time to the end
+    flow: Conditioning  # of the same scene and time
+    turned: float  # integral over time of the largest row sum of the Jacobian
+    fastest: float  # largest of these row sums (1/s)
 
     @property
     def norms(self) -> Array:
@@ -68,34 +50,16 @@ class Path:
 
 @dataclass(frozen=True)
 class Forecast:
-    """Errors at the end over the largest omega.
+    """Errors at the end over the largest omega."""
 
-    Attributes
-    ----------
-    truncation : float
-        To be expected; the largest component.
-    bound : float
-        Of truncation and rounding; infinite where steps are too large to say.
-    rounding : float
-        Of rounding alone, at the worst.
-    wandering : float
-        Rounding to be expected.
-    """
-
-    truncation: float
-    bound: float
-    rounding: float
-    wandering: float
+    truncation: float  # to be expected; the largest component
+    bound: float  # of truncation and rounding; infinite where steps are too large to say
+    rounding: float  # of rounding alone, at the worst
+    wandering: float  # rounding to be expected
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Follow the solution and its linearised flow.
-
-    Raises
-    ------
-    InputError
-        Where the solution leaves every bound before `time` (s).
-    """
+    """Follow the solution to `time` (s); InputError where it leaves every bound before."""
     from pyharness.methods.solve import solve
 
     flow = conditioning(scene, time)
@@ -130,10 +94,8 @@ class Forecaster:
         h = float(here.times[-1]) / steps
         largest = here.flow.largest
         singular = self.method.name in PARTS and h <= singular_below(self.method.name)
-        order, missed = (1, self._missed(True)) if singular else (
-            self.method.order, self._missed(False),
-        )  # fmt: skip
-        terms = missed * (h ** np.arange(TERMS))[:, None, None]
+        order = 1 if singular else self.method.order
+        terms = self._missed(singular) * (h ** np.arange(TERMS))[:, None, None]
         local = terms.sum(axis=0)
         carried = np.einsum("nij,nj->ni", here.propagators, local)
         truncation = float(np.abs(here.over_time(carried)).max()) / h / largest
@@ -150,21 +112,15 @@ class Forecaster:
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
     def crossing(self, smallest: float) -> float:
-        """Return the step (s) at which expected truncation falls below expected rounding.
-
-        No less than `smallest`.
-        """
+        """Return the step (s) from `smallest` at which truncation falls below expected rounding."""
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
         low = 1
         while high > low + 1:
-            middle = round(math.sqrt(low * high))
-            middle = min(max(middle, low + 1), high - 1)
+            middle = min(max(round(math.sqrt(low * high)), low + 1), high - 1)
             found = self.at(middle)
-            if found.truncation > found.wandering:
-                low = middle
-            else:
-                high = middle
+            is_above = found.truncation > found.wandering
+            low, high = (middle, high) if is_above else (low, middle)
         return time / high
 
     def _of_one_step(self) -> float:
@@ -198,11 +154,10 @@ class Forecaster:
         return total
 
     def _series(self, singular: bool) -> Array:
-        here = self._path
         scheme, order = self.method.scheme, self.method.order
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
-        missed = local_error(scheme, here.scene, here.omega)
+        missed = local_error(scheme, self._path.scene, self._path.omega)
         # Zero by the order of the scheme; what stands there is rounding.
         missed[: order + 1] = 0.0
         return missed

@@ -17,41 +17,23 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """What a correction does on the unit interval; in form it is a Runge-Kutta scheme.
+    """What a correction does on the unit interval; in form it is a Runge-Kutta scheme."""
 
-    Attributes
-    ----------
-    nodes : ndarray, shape (m,)
-        Where f is wanted, in parts of the step: the points of collocation, or those of the
-        quadrature of the weighted integrals.
-    matrix : ndarray, shape (m, m)
-        The next estimate at the nodes is omega(0) + h matrix f.
-    weights : ndarray, shape (m,)
-        The result of the step is omega(0) + h weights f.
-    """
-
+    # shape (m,); where f is wanted, in parts of the step: the points of collocation, or those of
+    # the quadrature of the weighted integrals
     nodes: Array
-    matrix: Array
-    weights: Array
+    matrix: Array  # shape (m, m); the next estimate at the nodes is omega(0) + h matrix f
+    weights: Array  # shape (m,); the result of the step is omega(0) + h weights f
 
 
 @cache
 def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
-    """Solve the weighted residual conditions on the unit interval.
+    """Solve the weighted residual conditions of a `Member` on the unit interval.
 
-    Parameters
-    ----------
-    weighting, terms, points
-        As in `Member`.
-
-    Returns
-    -------
-    Tableau
-        The quadrature is exact where torques are constant: along a trial function the products
-        of equations 13-15 have degree 2n, the weights have n (Galerkin), n - 1 (least squares)
-        or, in each subdomain, 0; m points of Gauss and Legendre integrate degree 2m - 1. With
-        torques that vary it is in error by the power 2n + 1 of the step or a higher one, which
-        is above every order of the family.
+    The quadrature is exact where torques are constant: along a trial function the products of
+    equations 13-15 have degree 2n, the weights have n (Galerkin), n - 1 (least squares) or, in each
+    subdomain, 0; m points of Gauss and Legendre integrate degree 2m - 1. With torques that vary it
+    is in error by the power 2n + 1 of the step or a higher one, above every order of the family.
     """
     n = terms
     if weighting == "collocation":

@@ -11,22 +11,13 @@ from decimal import Decimal
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.truth.decimal_functions import sine_cosine
+from pyharness.truth.decimal_series import Row
 
 DIGITS = 50
 
-Row = list[Decimal]
-
 
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
-    """Return omega of a body with I1 = I2 whose torque acts along axis 3 alone.
-
-    The spin is the integral of the torque; the other two turn by the integral of the spin.
-
-    Raises
-    ------
-    InputError
-        For any other scene.
-    """
+    """Return omega of a body with I1 = I2, its torque along axis 3; InputError for any other."""
     law, moments = scene.torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
     if moments is None or moments[0] != moments[1] or any(v[0] or v[1] for v in vectors):
@@ -41,30 +32,20 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
             t = Decimal(each)
             spin = Decimal(law.constant[2]) * t + Decimal(law.rate[2]) * t * t / 2
             angle = Decimal(law.constant[2]) * t**2 / 2 + Decimal(law.rate[2]) * t**3 / 6
-            for sign, (amplitude, frequency) in (
-                *((1, wave) for wave in law.sines),
-                *((0, wave) for wave in law.cosines),
-            ):
-                size, rate = Decimal(amplitude[2]), Decimal(frequency)
-                if rate == 0:
-                    spin += 0 if sign else size * t
-                    angle += 0 if sign else size * t * t / 2
-                    continue
-                sine, cosine = sine_cosine(rate * t)
-                if sign:
+            for amplitude, frequency in law.sines:
+                if frequency:
+                    size, rate = Decimal(amplitude[2]), Decimal(frequency)
+                    sine, cosine = sine_cosine(rate * t)
                     spin += size * (1 - cosine) / rate
                     angle += size * (t - sine / rate) / rate
-                else:
-                    spin += size * sine / rate
-                    angle += size * (1 - cosine) / (rate * rate)
+            for amplitude, frequency in law.cosines:
+                size, rate = Decimal(amplitude[2]), Decimal(frequency)
+                sine, cosine = sine_cosine(rate * t)
+                spin += size * (sine / rate if rate else t)
+                angle += size * ((1 - cosine) / (rate * rate) if rate else t * t / 2)
             sine, cosine = sine_cosine(ratio * (third * t + angle / moment))
-            rows.append(
-                [
-                    first * cosine + second * sine,
-                    second * cosine - first * sine,
-                    third + spin / moment,
-                ]
-            )
+            turned = [first * cosine + second * sine, second * cosine - first * sine]
+            rows.append([*turned, third + spin / moment])
     return rows
 
 

@@ -2,6 +2,7 @@
 
 import decimal
 from decimal import Decimal
+from functools import cache
 
 
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
@@ -12,33 +13,30 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
         halvings = 8
         x = angle / 2**halvings
         square = x * x
-        sine, term, n = x, x, 1
-        while abs(term) > Decimal(1).scaleb(-context.prec):
-            n += 2
-            term = -term * square / (n * (n - 1))
-            sine += term
+        sine = _alternating(x, square, 1)
         # versine 1 - cos keeps its digits where cos is near 1
-        versine, term, n = square / 2, square / 2, 2
-        while abs(term) > Decimal(1).scaleb(-context.prec):
-            n += 2
-            term = -term * square / (n * (n - 1))
-            versine += term
+        versine = _alternating(square / 2, square, 2)
         for _ in range(halvings):
             sine, versine = 2 * sine * (1 - versine), 2 * versine * (2 - versine)
         cosine = 1 - versine
     return +sine, +cosine
 
 
-_PI: dict[int, Decimal] = {}
+def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
+    """Return the sum of x**n / n! from a term on, every second one, of alternating signs."""
+    total = term
+    while abs(term) > Decimal(1).scaleb(-decimal.getcontext().prec):
+        n += 2
+        term = -term * square / (n * (n - 1))
+        total += term
+    return total
 
 
+@cache
 def _pi(digits: int) -> Decimal:
     """Return pi by Machin's formula."""
-    if digits not in _PI:
-        with decimal.localcontext() as context:
-            context.prec = digits + 5
-            _PI[digits] = 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)
-    return _PI[digits]
+    with decimal.localcontext(prec=digits + 5):
+        return 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)
 
 
 def _arctan_inverse(n: int) -> Decimal:

@@ -12,25 +12,18 @@ from decimal import Decimal
 
 from pyharness.model.scene import Scene
 from pyharness.truth.decimal_functions import sine_cosine
+from pyharness.truth.decimal_series import Row
 from pyharness.truth.reference import exact_coefficients
 
 # Beside those that small components take by their squares.
 _DIGITS = 90
 
-Row = list[Decimal]
-
 
 def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
     """Return omega of a scene without torque at `time` (s), in rad/s.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without torque; its motion has to be bounded, as it is where A, B and C belong to moments.
-    time : float
-        s.
-    rounded : bool
-        Whether A, B and C are those that binary64 holds, and not the exact ones.
+    Its motion has to be bounded, as it is where A, B and C belong to moments; `rounded` takes
+    those that binary64 holds, and not the exact ones.
     """
     with decimal.localcontext() as context:
         context.prec = _DIGITS
@@ -139,9 +132,6 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
     levels.append(k1)
     for k1 in reversed(levels):
         square = k1 * sn * sn
-        sn, cn, dn = (
-            (1 + k1) * sn / (1 + square),
-            cn * dn / (1 + square),
-            (1 - square) / (1 + square),
-        )
+        sn, cn = (1 + k1) * sn / (1 + square), cn * dn / (1 + square)
+        dn = (1 - square) / (1 + square)
     return sn, cn, dn

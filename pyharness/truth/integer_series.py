@@ -20,7 +20,7 @@ BITS = 160
 _ORDER = 36
 _LAST = 60  # bits of the last terms of a step: 2**-100 of the unit
 _CLOCK = 64  # steps are multiples of 2**-64 of the time asked for
-_MOST_STEPS = 20_000
+_MOST_STEPS = 20_000  # each takes a third of a millisecond
 # The unit of omega is guessed; so many powers of two beside the largest omega it will do.
 _ABOVE, _BELOW = 8, 24
 _MOST_GUESSES = 16
@@ -32,24 +32,12 @@ Series = list[int]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The true solution, at the times asked for and on the way to them.
+    """The true solution, at the times asked for and on the way to them."""
 
-    Attributes
-    ----------
-    time : ndarray, shape (n,)
-        As asked for, s.
-    omega : ndarray, shape (n, 3)
-        Rounded to binary64, rad/s.
-    nodes : ndarray, shape (m,)
-        Times from 0 to the last one, close to each other, s.
-    way : ndarray, shape (m, 3)
-        omega at the nodes, in binary64 arithmetic, rad/s.
-    """
-
-    time: Array
-    omega: Array
-    nodes: Array
-    way: Array
+    time: Array  # shape (n,); as asked for, s
+    omega: Array  # shape (n, 3); rounded to binary64, rad/s
+    nodes: Array  # shape (m,); times from 0 to the last one, close to each other, s
+    way: Array  # shape (m, 3); omega at the nodes, in binary64 arithmetic, rad/s
 
 
 class _OtherUnitError(Exception):
@@ -60,33 +48,17 @@ class _OtherUnitError(Exception):
         self.power = power
 
 
-def integer_series(scene: Scene, times: Sequence[float], most_steps: int = _MOST_STEPS) -> Path:
-    """Return the true solution of a scene.
+def integer_series(scene: Scene, times: Sequence[float]) -> Path:
+    """Return the true solution of a scene at `times`; its step size plays no part.
 
-    Parameters
-    ----------
-    scene : Scene
-        What to solve; its step size plays no part.
-    times : sequence of float, shape (n,)
-        Strictly monotonic, away from 0 on one side, none of them 0 (s).
-    most_steps : int
-        Each takes a third of a millisecond.
-
-    Returns
-    -------
-    Path
-        Before rounding good to some 1e-29 of the largest omega, times the growth of a small
-        difference.
-
-    Raises
-    ------
-    InputError
-        Where omega leaves every bound before, or too many steps would be needed.
+    They are strictly monotonic, away from 0 on one side, none of them 0 (s). Before rounding it is
+    good to some 1e-29 of the largest omega, times the growth of a small difference. InputError
+    where omega leaves every bound before, or too many steps would be needed.
     """
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):
         try:
-            return _march(scene, times, power, most_steps)
+            return _march(scene, times, power)
         except _OtherUnitError as other:
             power += other.power
     raise InputError("integer series: omega leaves every bound")
@@ -107,7 +79,7 @@ def _power_of(size: Fraction) -> int:
     return size.numerator.bit_length() - size.denominator.bit_length() if size else 0
 
 
-def _march(scene: Scene, times: Sequence[float], power: int, most_steps: int) -> Path:
+def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
     """Step from 0 to the last time with omega in units of 2**power rad/s."""
     span = Fraction(times[-1])
     wanted = [Fraction(t) / span for t in times]
@@ -120,7 +92,7 @@ def _march(scene: Scene, times: Sequence[float], power: int, most_steps: int) ->
     inside = np.arange(1, _INSIDE + 1) / _INSIDE
     powers = inside[:, None] ** np.arange(_ORDER + 1)
     largest = max(map(abs, state[:3]))
-    for _ in range(most_steps):
+    for _ in range(_MOST_STEPS):
         length = min(length, whole - begin)
         while True:
             terms = equations.expand(state, begin, length)
@@ -154,7 +126,7 @@ def _march(scene: Scene, times: Sequence[float], power: int, most_steps: int) ->
                 raise InputError("integer series: omega is beyond binary64") from None
             return Path(np.array(times, dtype=float), omega, np.hstack(nodes), np.vstack(way))
         length = int(length * 2.0 ** min(1.0, -excess - 0.02)) or 1
-    raise InputError(f"integer series: more than {most_steps} steps would be needed")
+    raise InputError(f"integer series: more than {_MOST_STEPS} steps would be needed")
 
 
 def _at(terms: Series, part: Fraction) -> Fraction:
@@ -209,16 +181,13 @@ class _Equations:
             for amplitude, f in law.cosines:
                 if abs(f) == frequency:
                     cosines = [x + Fraction(a) for x, a in zip(cosines, amplitude, strict=True)]
-            on_sine = [x * p * (angle if slow else 1) for x, p in zip(sines, push, strict=True)]
-            on_cosine = [x * p for x, p in zip(cosines, push, strict=True)]
-            self._waves.append(
-                _Wave(
-                    _fixed(Fraction(1) if slow else angle),
-                    _fixed(-angle * angle if slow else -angle),
-                    [_fixed(x) for x in on_sine],
-                    [_fixed(x) for x in on_cosine],
-                )
+            wave = _Wave(
+                _fixed(Fraction(1) if slow else angle),
+                _fixed(-angle * angle if slow else -angle),
+                [_fixed(x * p * (angle if slow else 1)) for x, p in zip(sines, push, strict=True)],
+                [_fixed(x * p) for x, p in zip(cosines, push, strict=True)],
             )
+            self._waves.append(wave)
         self.acts = not law.is_zero
         self.start = [_fixed(Fraction(w) / unit) for w in scene.omega]
         self.start += [0, 1 << BITS] * len(self._waves)
@@ -229,7 +198,7 @@ class _Equations:
         def stepped(x: int) -> int:
             return x * length >> _CLOCK
 
-        a, b, c = map(stepped, self._products)
+        factors = list(map(stepped, self._products))
         series = [[x] for x in state]
         torques = [
             [stepped(m + (r * begin >> _CLOCK)), stepped(stepped(r))]
@@ -249,16 +218,12 @@ class _Equations:
                         m[k] += (s * sine[k] + t * cosine[k]) >> BITS
         x, y, z = series[:3]
         for k in range(_ORDER):
-            backward = z[::-1]
-            yz, xz, xy = (
-                sum(map(mul, y, backward)),
-                sum(map(mul, x, backward)),
-                sum(map(mul, x, y[::-1])),
+            y_backward, z_backward = y[::-1], z[::-1]
+            products = (
+                sum(map(mul, y, z_backward)),
+                sum(map(mul, x, z_backward)),
+                sum(map(mul, x, y_backward)),
             )
-            for each, factor, total, m in (
-                (x, a, yz, torques[0]),
-                (y, b, xz, torques[1]),
-                (z, c, xy, torques[2]),
-            ):
+            for each, factor, total, m in zip((x, y, z), factors, products, torques, strict=True):
                 each.append(((factor * total >> 2 * BITS) + m[k]) // (k + 1))
         return series

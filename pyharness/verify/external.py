@@ -7,8 +7,9 @@ itself may be wrong by, plus what rounding the numbers of the problem to binary6
 import math
 import shlex
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,9 +24,9 @@ from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.verify.external_file import UNITS, Problem, Value, problems, read_problem
+from pyharness.verify.external_file import UNITS, Problem, Value, problems
 
-__all__ = ["Problem", "external_checks", "problems", "read_problem"]
+__all__ = ["external_checks", "problems"]
 
 # The finest that a method claims, except where no one would wait for it.
 _TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
@@ -44,34 +45,15 @@ _MAY_NOT_REFUSE = ("auto", "closed-form")
 _Row = TypeVar("_Row")
 
 
-@dataclass(frozen=True)
-class _Result:
-    """What a method gives at one time (rad/s): omega, and by how much each may be wrong."""
-
-    omega: Array
-    error: Array
+# What a method gives at one time (rad/s): omega, and by how much each may be wrong.
+_Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Hold every method that can take a problem against its published figures.
 
-    Parameters
-    ----------
-    problems : sequence of Problem
-        From `problems` or `read_problem`.
-    only : sequence of str
-        Names of checks, or their leading parts; all where none is given.
-
-    Yields
-    ------
-    Check
-        ``external/<problem>/<time>/<method>``; value and limit in the problem's unit, of the
-        component that is worst against its limit.
-
-    Raises
-    ------
-    NotBuiltError
-        Where the extension is not built.
+    Checks are ``external/<problem>/<time>/<method>``; value and limit are in the problem's unit, of
+    the component that is worst against its limit.
     """
     for problem in problems:
         # Times on one side are solved together: a replay of one gives the same bits.
@@ -93,7 +75,7 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
         ids = [f"external/{problem.name}/{value.time}/{method}" for value in values]
         if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
             continue
-        results, refusal = _as_far_as_solved(_solver(problem, method), values)
+        results, refusal = _as_far_as_solved(partial(_results, problem, method), values)
         for row, (id, value) in enumerate(zip(ids, values, strict=True)):
             if not selected(id, only):
                 continue
@@ -136,19 +118,11 @@ def _as_far_as_solved(
     return rows, ""
 
 
-def _solver(problem: Problem, method: str) -> Callable[[Sequence[Value]], list[_Result | None]]:
-    """Return what solves a problem by a method, to the times of the values that it is given."""
-    scene = problem.scene
-
-    def solve(values: Sequence[Value]) -> list[_Result | None]:
-        if method in PROGRAMS:
-            return [
-                _program(scene, float(value.time), method, _accuracy(problem, value))
-                for value in values
-            ]
-        return [*_solved(scene, [float(value.time) for value in values], method)]
-
-    return solve
+def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
+    """Solve a problem by a method, to the times of the values."""
+    if method in PROGRAMS:
+        return [_program(problem, value, method) for value in values]
+    return [*_solved(problem.scene, [float(value.time) for value in values], method)]
 
 
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
@@ -162,25 +136,27 @@ def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
 
 def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Result]:
     tolerance = _TOLERANCES.get(method, 0.0)
-    if method != "quick":
-        tolerance = max(tolerance, finest(method, scene, times[-1]))
     if method == "quick":
         ends = [called(method, tolerance).end(scene, time) for time in times]
         if refused := next((end.ended for end in ends if end.is_refused), ""):
             raise InputError(f"{method} {refused}")
         rows = np.array([end.omega for end in ends])
     else:
+        tolerance = max(tolerance, finest(method, scene, times[-1]))
         rows = solved(method, tolerance).rows(scene, times).omega
     for omega in rows:
-        yield _Result(omega, np.full(3, tolerance * _scale(scene, omega)))
+        yield omega, tolerance * _scale(scene, omega)
 
 
-def _program(scene: Scene, time: float, program: str, accuracy: float) -> _Result | None:
+def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Run a corrected program in steps that are halved until the print is met or rounding reigns.
 
     The error is taken from the last halving, and twice that for safety; rounding may add half a
     unit in the last place a step. None where no step is long enough for its linear equations.
     """
+    scene, time = problem.scene, float(value.time)
+    finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
+    accuracy = finest_print * UNITS[problem.unit]
     run = listed(corrected(program), may_stop=False, velocity=False).rows
     order = PROGRAM_REGISTRY[program].order
     result, before, steps, ended = None, None, _FEWEST_STEPS, ""
@@ -197,7 +173,7 @@ def _program(scene: Scene, time: float, program: str, accuracy: float) -> _Resul
         if omega is not None and before is not None:
             halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
             rounding = steps * _HALF_ULP * _scale(scene, omega)
-            result = _Result(omega, np.full(3, halving + rounding))
+            result = omega, halving + rounding
             # Two coarse runs may agree by accident: only where halving helps is it believed.
             if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
                 break
@@ -213,23 +189,18 @@ def _check(
     id: str, unit: str, value: Value, result: _Result, rounding: Array, replay: str
 ) -> Check:
     factor = UNITS[unit]
+    omega, error = result
     judged = []
     for axis, figure in enumerate(value.omega):
         if figure is not None:
             # Subtracted in decimals: the print may have more digits than binary64.
-            distance = abs(float(Decimal(float(result.omega[axis]) / factor) - figure.value))
-            limit = figure.accuracy + float(result.error[axis] + rounding[axis]) / factor
+            distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
+            limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
     # NaN is the worst of all, and no comparison shows it.
     worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     distance, limit, note = worst
     return bounded(id, distance, limit, replay, note)
-
-
-def _accuracy(problem: Problem, value: Value) -> float:
-    """Return the accuracy of the finest print (rad/s)."""
-    finest = min(figure.accuracy for figure in value.omega if figure is not None)
-    return finest * UNITS[problem.unit]
 
 
 def _scale(scene: Scene, omega: Array) -> float:
@@ -252,10 +223,8 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
             return [*_moves(scene, times, "auto")]
 
     rows, _ = _as_far_as_solved(solve, values)
-    nothing = np.zeros(3)
-    return {
-        value.time: rows[row] if row < len(rows) else nothing for row, value in enumerate(values)
-    }
+    rows += [np.zeros(3)] * (len(values) - len(rows))
+    return {value.time: row for value, row in zip(values, rows, strict=True)}
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
@@ -289,9 +258,8 @@ def _moved(scene: Scene) -> Iterator[Scene]:
     for name in ("sines", "cosines"):
         waves = getattr(law, name)
         for place, (amplitude, frequency) in enumerate(waves):
-            others = [(triple, frequency) for triple in _triples(amplitude)]
-            others.append((amplitude, frequency * (1.0 + _STEP_ASIDE)))
-            for wave in others:
+            faster = (amplitude, frequency * (1.0 + _STEP_ASIDE))
+            for wave in (*((triple, frequency) for triple in _triples(amplitude)), faster):
                 changed = (*waves[:place], wave, *waves[place + 1 :])
                 yield replace(scene, torque=_with(law, name, changed))
 
@@ -303,10 +271,9 @@ def _with(whole: Scene | TorqueLaw, name: str, part: object) -> Any:
 
 def _triples(triple: Triple | None) -> Iterator[Triple]:
     for axis, x in enumerate(triple or ()):
-        if x and triple:
-            changed = [*triple]
-            changed[axis] = x * (1.0 + _STEP_ASIDE)
-            yield changed[0], changed[1], changed[2]
+        if x:
+            first, second, third = np.array(triple) * (1.0 + _STEP_ASIDE * (np.arange(3) == axis))
+            yield float(first), float(second), float(third)
 
 
 def _replay(problem: Problem, id: str) -> str:

@@ -28,92 +28,44 @@ _LONGEST_PRINT = 100
 
 @dataclass(frozen=True)
 class Figure:
-    """A number as it is printed.
+    """A number as it is printed."""
 
-    Attributes
-    ----------
-    print : str
-        Its digits.
-    value : Decimal
-        What they say.
-    accuracy : float
-        How far it may be from the truth: half a unit of the last printed digit, or what the
-        source states where that is more.
-    """
-
-    print: str
-    value: Decimal
+    print: str  # its digits
+    value: Decimal  # what they say
+    # how far it may be from the truth: half a unit of the last printed digit, or what the source
+    # states where that is more
     accuracy: float
 
 
 @dataclass(frozen=True)
 class Value:
-    """What is published for one time.
+    """What is published for one time."""
 
-    Attributes
-    ----------
-    time : str
-        Time as given (s); exact.
-    omega : tuple of three Figure or None
-        Angular velocity in the unit of the problem, None where nothing is printed.
-    """
-
-    time: str
+    time: str  # time as given (s); exact
+    # angular velocity in the unit of the problem, None where nothing is printed
     omega: tuple[Figure | None, ...]
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A published problem.
+    """A published problem."""
 
-    Attributes
-    ----------
-    name : str
-        The name of its file.
-    title, source, where, conditions : str
-        What it is, who published it, where it stands there, what its figures belong to.
-    unit : str
-        Of the printed omega, one of `UNITS`.
-    scene : Scene
-        Its equations and start; the step size plays no part.
-    values : tuple of Value
-        The figures.
-    path : str or None
-        The user's file; None for a problem that comes with the package.
-    """
-
-    name: str
+    name: str  # the name of its file
+    # what it is, who published it, where it stands there, what its figures belong to
     title: str
     source: str
     where: str
     conditions: str
-    unit: str
-    scene: Scene
-    values: tuple[Value, ...]
-    path: str | None = None
+    unit: str  # of the printed omega, one of `UNITS`
+    scene: Scene  # its equations and start; the step size plays no part
+    values: tuple[Value, ...]  # the figures
+    path: str | None = None  # the user's file; None for a problem that comes with the package
 
 
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
-    """Return a printed number and how far it reaches.
+    """Return a printed number and how far it reaches; its source admits an error of `good_to`.
 
-    Parameters
-    ----------
-    where : str
-        What to name in an error.
-    text : str
-        The digits, with or without an exponent of ten.
-    good_to : float
-        The error that the source admits.
-
-    Raises
-    ------
-    InputError
-        Where that is no number in text, or too large for binary64.
-
-    Examples
-    --------
-    >>> figure("", "0.606").accuracy
-    0.0005
+    InputError, naming `where`, for what is no number in text, or too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")
@@ -132,10 +84,7 @@ def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
 def read_problem(path: str | Path) -> Problem:
     """Return the problem of a user's file, in the form that docs/external.md describes.
 
-    Raises
-    ------
-    InputError
-        Where the file can't be read, or something in it is missing, unknown or no number.
+    InputError where it can't be read, or something in it is missing, unknown or no number.
     """
     return _read(path, str(path))
 

@@ -11,6 +11,7 @@ import shlex
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -37,27 +38,13 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the record.
+    """A trajectory of the record."""
 
-    Attributes
-    ----------
-    source : str
-        The program or method, which names its file.
-    name : str
-        The rest of the name of its check, as in ``case-3/original``.
-    command : str
-        What prints it.
-    scene : Scene
-        What it solves.
-    tolerance : float or None
-        Of a method that states its error; None where every bit counts.
-    """
-
-    source: str
-    name: str
-    command: str
-    scene: Scene
-    tolerance: float | None
+    source: str  # the program or method, which names its file
+    name: str  # the rest of the name of its check, as in ``case-3/original``
+    command: str  # what prints it
+    scene: Scene  # what it solves
+    tolerance: float | None  # of a method that states its error; None where every bit counts
 
     def run(self) -> Trajectory:
         """Compute the trajectory."""
@@ -71,21 +58,17 @@ def recorded() -> Iterator[Recorded]:
     """Return what the record holds."""
     for case in case_numbers():
         scene = case_scene(case)
-        for program in PROGRAMS:
-            for label in ("original", "corrected"):
-                command = (
-                    f"python -m pyharness run --case {case} --program {program} --listing {label}"
-                )
-                yield Recorded(program, f"case-{case}/{label}", command, scene, None)
+        command = f"python -m pyharness run --case {case}"
+        for program, label in product(PROGRAMS, ("original", "corrected")):
+            printed = f"{command} --program {program} --listing {label}"
+            yield Recorded(program, f"case-{case}/{label}", printed, scene, None)
         for name in _RECORDED_METHODS:
             if name == "closed-form" and closed_form(scene) is None:
                 continue
             tolerance = max(METHODS[name].finest, _TOLERANCE)
-            command = (
-                f"python -m pyharness run --case {case} --method {name} --tolerance {tolerance:g}"
-            )
+            printed = f"{command} --method {name} --tolerance {tolerance:g}"
             stated = None if tolerance == 1.0 else tolerance
-            yield Recorded(name, f"case-{case}", command, scene, stated)
+            yield Recorded(name, f"case-{case}", printed, scene, stated)
 
 
 def golden(chosen: Selection) -> Iterator[Check]:
@@ -105,14 +88,12 @@ def golden(chosen: Selection) -> Iterator[Check]:
         id = f"golden/{each.source}/{each.name}"
         if not chosen.asks(id):
             continue
-        entry = entries.get(each.command)
-        if entry is None:
+        if entry := entries.get(each.command):
+            yield _check(id, _again(id, chosen), each, entry, libraries == {mathematics()})
+        else:
             note = "is not recorded; verify --update records it"
             yield Check(id, False, None, None, _again(id, chosen), note)
-            continue
-        yield _check(id, _again(id, chosen), each, entry, libraries == {mathematics()})
-    produced = {each.command for each in due}
-    for command in sorted(set(entries) - produced):
+    for command in sorted(set(entries) - {each.command for each in due}):
         name = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
         source = next(s for s, file in known.items() if entries[command] in file["trajectory"])
         id = f"golden/{source}/{name}"
@@ -201,10 +182,8 @@ def mathematics() -> str:
 
 
 def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
-    columns = [run.time[:, None], run.recorded_time[:, None], run.omega]
-    if run.velocity is not None:
-        columns.append(run.velocity)
-    rows = np.hstack(columns)
+    columns = [run.time, run.recorded_time, run.omega, run.velocity]
+    rows = np.column_stack([column for column in columns if column is not None])
     n = len(rows)
     shown = sorted({step for step in (*_STEPS, n) if 1 <= step <= n})
     stop = run.stop
@@ -215,7 +194,7 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
         "evaluations": run.evaluations,
         "stop": "" if stop is None else f"{stop.step} {stop.variable} {stop.quotient.hex()}",
         "digest": _digest(rows, run),
-        "rows": [[str(step), *map(_hex, rows[step - 1])] for step in shown],
+        "rows": [[str(step), *map(float.hex, rows[step - 1].tolist())] for step in shown],
     }
 
 
@@ -225,10 +204,6 @@ def _digest(rows: Array, run: Trajectory) -> str:
     if run.ier is not None:
         digest.update(run.ier.astype("<i4").tobytes())
     return digest.hexdigest()[:32]
-
-
-def _hex(value: float) -> str:
-    return float(value).hex()
 
 
 def _rows(entry: dict[str, Any]) -> Array:

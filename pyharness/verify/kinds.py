@@ -1,32 +1,15 @@
 """Verify: bits between languages, error against the truth, and what changed since it was recorded.
 
-Each kind of check is the first part of its name:
-
-cells
-    program x case x listing x reading: Fortran against twin, bit for bit over the whole
-    trajectory, counters and stop.
-schemes
-    every step of the corrected programs against its scheme, to rounding.
-stops
-    where and why the Runge-Kutta program stops, against the formula of its test.
-methods, prepared
-    modern methods against the reference, within the tolerance that they were given.
-orders
-    corrected programs against `solve_ivp`, fixed-step methods against the reference: the power with
-    which the error falls as the step is halved.
-random
-    all of these in scenes drawn from a seed, half of them nasty.
-external
-    published figures that nobody here computed.
-golden
-    trajectories as they were recorded.
+The first part of a check's name is its kind.
 """
 
 from collections.abc import Callable, Iterator
+from itertools import chain
 
 from pyharness.compare.checks import Check
 from pyharness.model.errors import InputError
-from pyharness.verify.external import external_checks, problems
+from pyharness.verify.external import external_checks
+from pyharness.verify.external_file import problems
 from pyharness.verify.golden import golden
 from pyharness.verify.methods import methods, orders, prepared
 from pyharness.verify.programs import cells, random_programs
@@ -34,11 +17,6 @@ from pyharness.verify.random_methods import random_methods
 from pyharness.verify.schemes import schemes
 from pyharness.verify.selection import Selection, replay
 from pyharness.verify.stops import stops
-
-
-def _random(chosen: Selection) -> Iterator[Check]:
-    yield from random_programs(chosen)
-    yield from random_methods(chosen)
 
 
 def _external(chosen: Selection) -> Iterator[Check]:
@@ -53,18 +31,26 @@ _THIN_EXTERNAL = [
 ]
 
 KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
+    # Program x case x listing x reading: Fortran against twin, bit for bit over the whole
+    # trajectory, counters and stop.
     "cells": cells,
+    # Every step of the corrected programs against its scheme, to rounding.
     "schemes": schemes,
+    # Where and why the Runge-Kutta program stops, against the formula of its test.
     "stops": stops,
+    # Modern methods against the reference, within the tolerance that they were given.
     "methods": methods,
     "prepared": prepared,
+    # Corrected programs against `solve_ivp`, fixed-step methods against the reference: the power
+    # with which the error falls as the step is halved.
     "orders": orders,
-    "random": _random,
+    # All of these in scenes drawn from a seed, half of them nasty.
+    "random": lambda chosen: chain(random_programs(chosen), random_methods(chosen)),
+    # Published figures that nobody here computed.
     "external": _external,
+    # Trajectories as they were recorded.
     "golden": golden,
 }
-
-
 # What these read is the user's.
 _OF_THE_USER = ("external", "golden")
 

@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cache, partial
+from itertools import product
 
 import numpy as np
 
@@ -39,38 +41,22 @@ _PAIRS = 4
 _ORDER_SLACK = 0.2
 
 
-@dataclass(frozen=True, eq=False)
-class Standard:
-    """The truth at some times, and what no method can be blamed for.
-
-    Attributes
-    ----------
-    truth : Reference
-        Its last time is the furthest from 0.
-    flow : Conditioning
-        What becomes of small errors, the truth's own among them.
-    """
-
-    truth: Reference
-    flow: Conditioning
+# The truth at some times, the last one the furthest from 0, and what no method can be blamed for:
+# what becomes of small errors, the truth's own among them.
+Standard = tuple[Reference, Conditioning]
 
 
 def methods(chosen: Selection) -> Iterator[Check]:
     """Hold every method that states an error against the reference, in every case."""
     for case in (4, 5) if chosen.thin else case_numbers():
-        names = [
-            (name, tolerance, id)
-            for name, method in METHODS.items()
-            if method.finest < 1.0 and name != "reference"
-            for tolerance in _tolerances(name, method.finest, chosen.thin)
-            if chosen.asks(id := f"methods/{name}/case-{case}/{tolerance:.1e}")
-        ]
-        if names:
-            scene = case_scene(case)
-            # All results of the case, close together, and one far from them.
-            standard = _standard(scene, (*scene.times(), _LATER))
-            for name, tolerance, id in names:
-                yield _held(id, replay(id), scene, name, tolerance, standard)
+        scene = case_scene(case)
+        # All results of the case, close together, and one far from them.
+        standard = cache(partial(_standard, scene, (*scene.times(), _LATER)))
+        for name, method in METHODS.items():
+            if method.finest < 1.0 and name != "reference":
+                for tolerance in _tolerances(name, method.finest, chosen.thin):
+                    if chosen.asks(id := f"methods/{name}/case-{case}/{tolerance:.1e}"):
+                        yield _held(id, scene, name, tolerance, standard())
 
 
 def prepared(chosen: Selection) -> Iterator[Check]:
@@ -79,17 +65,11 @@ def prepared(chosen: Selection) -> Iterator[Check]:
         scene = case_scene(case)
         forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
         for t_end in _ENDS:
-            names = [
-                (name, tolerance, id)
-                for name in forms
-                for tolerance in ((1e-6,) if chosen.thin else _TOLERANCES)
-                if not (name == "quick" and tolerance < FEW_DIGITS)
-                and chosen.asks(id := f"prepared/{name}/case-{case}/{t_end:g}/{tolerance:.1e}")
-            ]
-            if names:
-                standard = _standard(scene, (t_end,))
-                for name, tolerance, id in names:
-                    yield _held_prepared(id, replay(id), scene, name, tolerance, standard)
+            standard = cache(partial(_standard, scene, (t_end,)))
+            for name, tolerance in product(forms, (1e-6,) if chosen.thin else _TOLERANCES):
+                id = f"prepared/{name}/case-{case}/{t_end:g}/{tolerance:.1e}"
+                if chosen.asks(id) and not (name == "quick" and tolerance < FEW_DIGITS):
+                    yield _held_prepared(id, scene, name, tolerance, standard())
         yield from _same_steps(chosen, scene, case)
 
 
@@ -104,10 +84,8 @@ def _same_steps(chosen: Selection, scene: Scene, case: int) -> Iterator[Check]:
         if name in FIXED_STEP:
             wanted = solved(name, 1.0).end(scene, time).omega
         else:
-            stages = int(name.partition("-")[2])
-            rows = extension().gauss_solution(
-                *normalized(scene), scene.omega, [time], stages, scene.step_size
-            )[0]
+            way = int(name.partition("-")[2]), scene.step_size
+            rows, *_ = extension().gauss_solution(*normalized(scene), scene.omega, [time], *way)
             wanted = rows[:, 0]
         yield bounded(id, ulps(found, np.ascontiguousarray(wanted)), 0.0, replay(id))
 
@@ -120,29 +98,23 @@ def orders(chosen: Selection) -> Iterator[Check]:
     """
     for case in (5,) if chosen.thin else case_numbers():
         scene = case_scene(case)
-        asks = {name: chosen.asks(f"orders/{name}/case-{case}") for name in _ORDERED}
-        if any(asks[name] for name in PROGRAMS):
-            truth = _by_ivp(scene)
-            for name in filter(asks.get, PROGRAMS):
+        by_ivp = cache(partial(_by_ivp, scene))
+        by_reference = cache(partial(reference, scene, scene.times()))
+        for name in PROGRAMS:
+            if chosen.asks(id := f"orders/{name}/case-{case}"):
                 program = PROGRAM_REGISTRY[name]
-                found = measured_order(scene, program, corrected(name), truth, _PAIRS)
-                yield _order(f"orders/{name}/case-{case}", found)
-        moves = {name: chosen.asks(f"orders/{name}/case-{case}/velocity") for name in PROGRAMS}
-        if any(moves.values()):
-            truth = reference(scene, scene.times(), velocity=True)
-            for name in filter(moves.get, PROGRAMS):
-                due = PROGRAM_REGISTRY[name].order
+                found = measured_order(scene, program, corrected(name), by_ivp(), _PAIRS)
+                yield _order(id, found)
+        for name in PROGRAMS:
+            if chosen.asks(id := f"orders/{name}/case-{case}/velocity"):
+                truth, due = by_reference(velocity=True), PROGRAM_REGISTRY[name].order
                 found = order_of(scene, _velocity_of(name), due, truth, "velocity", _PAIRS)
-                yield _order(f"orders/{name}/case-{case}/velocity", found)
-        if any(asks[name] for name in FIXED_STEP):
-            truth = reference(scene, scene.times())
-            for name in filter(asks.get, FIXED_STEP):
+                yield _order(id, found)
+        for name in FIXED_STEP:
+            if chosen.asks(id := f"orders/{name}/case-{case}"):
                 due = METHODS[name].order
-                found = order_of(scene, _steps_of(name), due, truth, pairs=_PAIRS)
-                yield _order(f"orders/{name}/case-{case}", found)
-
-
-_ORDERED = (*PROGRAMS, *FIXED_STEP)
+                found = order_of(scene, _steps_of(name), due, by_reference(), pairs=_PAIRS)
+                yield _order(id, found)
 
 
 def _standard(scene: Scene, times: Sequence[float]) -> Standard:
@@ -154,18 +126,17 @@ def _standard(scene: Scene, times: Sequence[float]) -> Standard:
     # The reference's steps are good to 1e-22: where the flow amplifies more, more is asked.
     truth = reference(scene, times, precise=flow.amplification > 1e3)
     rounding = flow.rounding + truth.error / flow.largest
-    return Standard(truth, replace(flow, amplification=1.0, rounding=rounding))
+    return truth, replace(flow, amplification=1.0, rounding=rounding)
 
 
-def _held(
-    id: str, again: str, scene: Scene, name: str, tolerance: float, standard: Standard
-) -> Check:
+def _held(id: str, scene: Scene, name: str, tolerance: float, standard: Standard) -> Check:
     """Return the check that a method keeps a tolerance at all times of the truth.
 
     A closed form has to refuse where there is none.
     """
+    truth, flow = standard
     has_form = name != "closed-form" or closed_form(scene) is not None
-    times = standard.truth.time
+    times, again = truth.time, replay(id)
     try:
         run = solved(name, tolerance).rows(scene, times.tolist())
     except InputError as refusal:
@@ -174,22 +145,21 @@ def _held(
         return Check(id, False, None, None, again, "solved what has no closed form")
     if run.ended != "complete" or not np.array_equal(run.time, times):
         return Check(id, False, None, None, again, f"{run.ended}, other times than asked for")
-    error = float(np.abs(run.omega - standard.truth.omega).max()) / standard.flow.largest
-    return bounded(id, error, standard.flow.limit(tolerance), again)
+    error = float(np.abs(run.omega - truth.omega).max()) / flow.largest
+    return bounded(id, error, flow.limit(tolerance), again)
 
 
-def _held_prepared(
-    id: str, again: str, scene: Scene, name: str, tolerance: float, standard: Standard
-) -> Check:
+def _held_prepared(id: str, scene: Scene, name: str, tolerance: float, standard: Standard) -> Check:
     """Return the check that a prepared solver keeps a tolerance at the end."""
-    end = called(name, tolerance, primed=True).end(scene, float(standard.truth.time[-1]))
+    truth, flow = standard
+    end = called(name, tolerance, primed=True).end(scene, float(truth.time[-1]))
     if name == "quick" and end.is_refused:
         # Its unknowns need three products.
         may = end.ended == "refused" and not all(scene.euler_coefficients)
-        return Check(id, may, None, None, again, f"{REFUSED}{end.ended}")
-    error = float(np.abs(end.omega - standard.truth.omega[-1]).max()) / standard.flow.largest
+        return Check(id, may, None, None, replay(id), f"{REFUSED}{end.ended}")
+    error = float(np.abs(end.omega - truth.omega[-1]).max()) / flow.largest
     note = end.ended if math.isnan(error) else ""
-    return bounded(id, error, standard.flow.limit(tolerance), again, note)
+    return bounded(id, error, flow.limit(tolerance), replay(id), note)
 
 
 def _tolerances(name: str, finest: float, thin: bool) -> list[float]:
@@ -208,10 +178,7 @@ def _order(id: str, found: Order) -> Check:
 
 
 def _steps_of(name: str) -> Callable[[Scene], Array]:
-    def run(scene: Scene) -> Array:
-        return solved(name, 1.0).rows(scene).omega
-
-    return run
+    return lambda scene: solved(name, 1.0).rows(scene).omega
 
 
 def _velocity_of(program: str) -> Callable[[Scene], Array]:
@@ -225,8 +192,7 @@ def _velocity_of(program: str) -> Callable[[Scene], Array]:
 
 def _by_ivp(scene: Scene) -> Reference:
     """Return what `solve_ivp` takes for the truth, good to its tolerance."""
-    times = scene.times()
-    tolerance = 1.01 * finest(_IVP, scene, times[-1])
+    tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = solved(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())
     return Reference(run.time, run.omega, None, "solve_ivp", tolerance * largest)

@@ -1,6 +1,7 @@
 """Fortran against twin: the same bits in every cell, and in scenes drawn at random."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.model.trajectory import Trajectory
 from pyharness.original.cells import all_cells, cell_name
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.verify.selection import Selection, replay
@@ -30,10 +30,7 @@ def cells(chosen: Selection) -> Iterator[Check]:
         id = f"cells/{name}"
         if not chosen.asks(id) or (chosen.thin and not _is_thin(listing, case)):
             continue
-        scene = case_scene(case)
-        program = PROGRAM_REGISTRY[listing.program]
-        compiled, twin = program.run(scene, listing), program.run(scene, listing, "python")
-        yield agreement(id, replay(id), listing.program, scene, compiled, twin, name in listed)
+        yield _agreement(id, replay(id), listing, case_scene(case), name in listed)
 
 
 def random_programs(chosen: Selection) -> Iterator[Check]:
@@ -43,32 +40,25 @@ def random_programs(chosen: Selection) -> Iterator[Check]:
         if not chosen.asks(id):
             continue
         drawn = draw(chosen.seed, number)
-        program = PROGRAM_REGISTRY[drawn.listing.program]
-        compiled, twin = (
-            program.run(drawn.scene, drawn.listing, language, drawn.lipschitz, drawn.may_stop)
-            for language in ("fortran", "python")
-        )
         again = chosen.replay_of_draw(id)
-        yield agreement(id, again, drawn.listing.program, drawn.scene, compiled, twin)
+        yield _agreement(
+            id, again, drawn.listing, drawn.scene, False, drawn.lipschitz, drawn.may_stop
+        )
 
 
-def agreement(
-    id: str,
-    again: str,
-    program: str,
-    scene: Scene,
-    compiled: Trajectory,
-    twin: Trajectory,
-    is_listed: bool = False,
+def _agreement(
+    id: str, again: str, listing: Listing, scene: Scene, is_listed: bool, *options: Any
 ) -> Check:
-    """Return the check that two implementations of a program agree to the last bit.
+    """Return the check that both implementations of a program agree to the last bit.
 
     A listed divergence that no longer occurs fails, as an unexpected one does.
     """
+    run = PROGRAM_REGISTRY[listing.program].run
+    compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
     found = differences(compiled, twin)
     if not np.array_equal(compiled.time, np.arange(1, compiled.steps + 1) * scene.step_size):
         found.append("time is not n h")
-    evaluations = _EVALUATIONS[program] * (compiled.steps + (compiled.ended == "overflow"))
+    evaluations = _EVALUATIONS[listing.program] * (compiled.steps + (compiled.ended == "overflow"))
     if compiled.evaluations != evaluations:
         found.append(f"{compiled.evaluations} right-hand sides, due {evaluations}")
     note = ", ".join(found)

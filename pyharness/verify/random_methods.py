@@ -5,8 +5,9 @@ of them. Where small differences grow K times on the way, rounding alone makes 1
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -39,24 +40,12 @@ _EARLIER = 0.4  # of the last time: rows on the way are held to it too
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The second reference in one draw.
+    """The second reference in one draw."""
 
-    Attributes
-    ----------
-    times : list of float
-        s.
-    omega : ndarray, shape (n, 3)
-        rad/s.
-    largest : float
-        Largest abs(omega) of any component from 0 to the last time, rad/s.
-    growth : float
-        Largest factor by which a small difference on the way reaches the end.
-    """
-
-    times: list[float]
-    omega: Array
-    largest: float
-    growth: float
+    times: list[float]  # s
+    omega: Array  # shape (n, 3), rad/s
+    largest: float  # largest abs(omega) of any component from 0 to the last time, rad/s
+    growth: float  # largest factor by which a small difference on the way reaches the end
 
     def error(self, omega: Array) -> float:
         """Return the largest error of rows, relative to the largest omega; NaN where one is."""
@@ -82,21 +71,15 @@ def truth_of(drawn: Draw) -> Truth:
     return Truth(times, path.omega, largest, growth)
 
 
-def entrances(
-    drawn: Draw, number: int, thin: bool = False
-) -> dict[str, Callable[[Draw, Truth], "Answer"]]:
-    """Return the entrances that are tried in a draw, by the name that their check has.
-
-    Where they are to be `thin`, the compiled ones alone.
-    """
-    has_form = closed_form(drawn.scene) is not None
-    forms = ["closed-form"] if has_form else []
+def _entrances(drawn: Draw, number: int, thin: bool) -> Mapping[str, Callable[[Truth], "Answer"]]:
+    """Return what is tried in a draw, by the name of its check; where `thin`, what is compiled."""
+    forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:
         names += [*SCIPY_METHODS, "reference"]
-    found = {f"solve-{name}": _solved(name) for name in names}
-    return found | {
-        f"prepare-{name}": _prepared(name) for name in ["auto", "taylor", "quick", *forms]
+    again = ["auto", "taylor", "quick", *forms]
+    return {f"solve-{name}": partial(_solved, name, drawn) for name in names} | {
+        f"prepare-{name}": partial(_prepared, name, drawn) for name in again
     }
 
 
@@ -110,29 +93,23 @@ class Answer:
     why: str = ""
 
 
-def _solved(name: str) -> Callable[[Draw, Truth], Answer]:
-    def answer(drawn: Draw, truth: Truth) -> Answer:
-        tolerance = drawn.tolerance(REGISTRY[name].finest)
-        try:
-            run = solved(name, tolerance).rows(drawn.scene, truth.times)
-        except InputError as refusal:
-            return Answer(name, tolerance, None, f"{REFUSED}{refusal}")
-        if run.ended != "complete" or run.time.tolist() != truth.times:
-            return Answer(name, tolerance, None, f"{run.ended}, other times than asked for")
-        return Answer(name, tolerance, run.omega)
-
-    return answer
+def _solved(name: str, drawn: Draw, truth: Truth) -> Answer:
+    tolerance = drawn.tolerance(REGISTRY[name].finest)
+    try:
+        run = solved(name, tolerance).rows(drawn.scene, truth.times)
+    except InputError as refusal:
+        return Answer(name, tolerance, None, f"{REFUSED}{refusal}")
+    if run.ended != "complete" or run.time.tolist() != truth.times:
+        return Answer(name, tolerance, None, f"{run.ended}, other times than asked for")
+    return Answer(name, tolerance, run.omega)
 
 
-def _prepared(name: str) -> Callable[[Draw, Truth], Answer]:
-    def answer(drawn: Draw, truth: Truth) -> Answer:
-        tolerance = drawn.tolerance(REGISTRY[name].finest)
-        end = called(name, tolerance, primed=True).end(drawn.scene, truth.times[-1])
-        if end.ended != "complete":
-            return Answer(name, tolerance, None, f"{REFUSED}{end.ended}")
-        return Answer(name, tolerance, end.omega[None, :])
-
-    return answer
+def _prepared(name: str, drawn: Draw, truth: Truth) -> Answer:
+    tolerance = drawn.tolerance(REGISTRY[name].finest)
+    end = called(name, tolerance, primed=True).end(drawn.scene, truth.times[-1])
+    if end.ended != "complete":
+        return Answer(name, tolerance, None, f"{REFUSED}{end.ended}")
+    return Answer(name, tolerance, end.omega[None, :])
 
 
 def random_methods(chosen: Selection) -> Iterator[Check]:
@@ -143,7 +120,7 @@ def random_methods(chosen: Selection) -> Iterator[Check]:
         drawn = draw(chosen.seed, number)
         asked = {
             f"random/{number}/{name}": entrance
-            for name, entrance in entrances(drawn, number, chosen.thin).items()
+            for name, entrance in _entrances(drawn, number, chosen.thin).items()
             if chosen.asks(f"random/{number}/{name}")
         }
         if not asked:
@@ -158,13 +135,12 @@ def random_methods(chosen: Selection) -> Iterator[Check]:
             yield Check(id, may, None, None, again, f"{drawn.scene.name}: {refusal}")
             continue
         for id, entrance in asked.items():
-            yield _held(id, chosen.replay_of_draw(id), drawn, truth, entrance(drawn, truth))
+            yield _held(id, chosen.replay_of_draw(id), drawn, truth, entrance(truth))
 
 
 def _held(id: str, again: str, drawn: Draw, truth: Truth, answer: Answer) -> Sample:
     """Return the check that an answer is as near to the truth as it has to be."""
-    error = limit = None
-    passed = False
+    error, limit, passed = None, None, False
     if answer.omega is not None:
         error, limit = truth.error(answer.omega), truth.limit(answer.method, answer.tolerance)
         passed = error <= limit

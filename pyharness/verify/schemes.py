@@ -25,19 +25,12 @@ _ROUNDINGS = 32.0
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One stage of every step; columns are U1 ... U3, V1 ... V3.
+    """One stage of every step; columns are U1 ... U3, V1 ... V3."""
 
-    Attributes
-    ----------
-    state, rate : ndarray, shape (n, 6)
-        Where the right-hand sides are taken (rad/s, m/s), and what they are.
-    rounding : ndarray, shape (n, 6)
-        By how much the rate of another who computes it may differ.
-    """
-
+    # shape (n, 6); where the right-hand sides are taken (rad/s, m/s), and what they are
     state: Array
     rate: Array
-    rounding: Array
+    rounding: Array  # shape (n, 6); by how much the rate of another who computes it may differ
 
 
 def schemes(chosen: Selection) -> Iterator[Check]:

@@ -18,30 +18,15 @@ RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 
 @dataclass(frozen=True)
 class Selection:
-    """What to verify.
+    """What to verify."""
 
-    Attributes
-    ----------
-    only : sequence of str
-        Leading parts of names, as in ``cells/two-term``; all where empty.
-    seed : str
-        Of the random draws; by default the week.
-    draws : int
-        How many of them.
-    record : Path
-        The folder of the golden record, by default that of the checkout.
-    problems : sequence of Problem or None
-        With published figures; None for those that come with the project.
-    thin : bool
-        A part that touches every kind, for `verify --self-test`.
-    """
-
-    only: Sequence[str] = ()
-    seed: str = field(default_factory=weekly_seed)
-    draws: int = DRAWS
-    record: Path = RECORD
+    only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; all where empty
+    seed: str = field(default_factory=weekly_seed)  # of the random draws; by default the week
+    draws: int = DRAWS  # how many of them
+    record: Path = RECORD  # the folder of the golden record, by default that of the checkout
+    # with published figures; None for those that come with the project
     problems: Sequence["Problem"] | None = None
-    thin: bool = False
+    thin: bool = False  # a part that touches every kind, for `verify --self-test`
 
     def asks(self, id: str) -> bool:
         """Whether the check of that name is asked for."""

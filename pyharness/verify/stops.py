@@ -25,21 +25,11 @@ _PROGRAM = "runge-kutta"
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """Change of K over change of U in every step, in the order in which the program looks.
+    """Change of K over change of U in every step, in the order in which the program looks."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (n, m)
-        In 1/s.
-    rounding : ndarray, shape (n, m)
-        By how much those of another who computes them may differ.
-    names : list of str
-        What the m of a step are called.
-    """
-
-    values: Array
-    rounding: Array
-    names: list[str]
+    values: Array  # shape (n, m), 1/s
+    rounding: Array  # shape (n, m); by how much those of another who computes them may differ
+    names: list[str]  # what the m of a step are called
 
 
 def stops(chosen: Selection) -> Iterator[Check]:

@@ -129,7 +129,7 @@ NEAR = {
     "pyharness/truth/reference": ("truth/reference", "methods/slow_waves", "model/effort"),
     "pyharness/model/scene.py": ("model/scene", "model/values", "original/programs"),
     "pyharness/model/scene_file": ("model/scene", "fuzz/fuzz", "cli/main"),
-    "pyharness/truth/decimal_functions": ("truth/reference",),
+    "pyharness/truth/decimal": ("truth/reference",),
     "pyharness/verify/external": ("verify/external", "slack/slack"),
     "pyharness/verify/": ("slack/slack", "verify/kinds", "verify/plants"),
     "pyharness/model/errors": ("model/scene", "methods/prepared", "cli/main"),

@@ -1,0 +1,201 @@
+"""The Taylor series of equations 13-15 in decimal arithmetic, of exact coefficients."""
+
+from collections.abc import Sequence
+from decimal import Decimal
+from operator import mul
+
+from pyharness.model.effort import advice, checked_effort, waves
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.truth.decimal_functions import sine_cosine
+
+_MOST_STEPS = 100_000  # some 30 seconds, more with waves
+# Of a series where an effort is given: some ten seconds. A wave costs a fifth of a step.
+_ORDINARY_STEPS = 20_000
+# After so many, a small part of a second, their pace tells whether the rest is out of reach; the
+# motion may become slower by so much.
+_FIRST_STEPS = 100
+_PACE_SLACK = 3.0
+# A power of time with which steps grow, above what they only happen to.
+_GROWING = Decimal("1.3")
+
+Row = list[Decimal]
+
+
+def taylor_series(
+    scene: Scene,
+    coefficients: Row,
+    times: Sequence[Decimal],
+    velocity: bool,
+    order: int,
+    tolerance: Decimal,
+    effort: float | None,
+) -> list[Row]:
+    """Return omega (and velocity) at `times` by Taylor steps; fewer rows where it blows up.
+
+    `coefficients` are A, B, C of the scene; `tolerance` is relative to omega, of each step.
+    """
+    equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
+    state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
+    begin = Decimal(0)
+    rows: list[Row] = []
+    step = 0
+    while True:
+        series = equations.expand(begin, state, order)
+        rest = abs(times[-1] - begin)
+        length = _step(series, tolerance, rest).copy_sign(times[-1])
+        if begin + length == begin and rest:
+            return rows
+        limit.check(step, begin, length, rest)
+        while len(rows) < len(times) and abs(times[len(rows)]) <= abs(begin + length):
+            rows.append(_evaluate(series, times[len(rows)] - begin))
+        if len(rows) == len(times):
+            return rows
+        state = _evaluate(series, length)
+        begin += length
+        step += 1
+
+
+class _Limit:
+    """How many steps a series may take, and the forecast of how many it needs."""
+
+    def __init__(self, scene: Scene, effort: float | None) -> None:
+        self._effort = None if effort is None else checked_effort(effort)
+        self._ordinary = _ORDINARY_STEPS * 5.0 / (5 + waves(scene))
+        self._most = _MOST_STEPS if effort is None else self._ordinary * effort
+        self._next = max(2, _FIRST_STEPS * 5 // (5 + waves(scene)))
+        self._before: tuple[int, Decimal] = (0, Decimal(0))
+
+    def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
+        """Raise InputError before a step, where it or the rest of them would be too many."""
+        if step == 0:
+            # From the first step alone, but for what is hopeless, no one can tell.
+            if rest > 10 * Decimal(self._most) * abs(length):
+                self._refuse(rest / abs(length))
+        elif step >= self._most:
+            self._refuse(self._forecast(step, abs(begin), rest))
+        elif self._effort is not None and 2 * step >= self._next:
+            if step >= self._next:
+                needed = self._forecast(step, abs(begin), rest)
+                # Steps that shrink end at an omega without bound; their mean says nothing.
+                shrinks = 10 * abs(length) * step < abs(begin)
+                if needed > Decimal(_PACE_SLACK * self._most) and not shrinks:
+                    self._refuse(needed)
+                self._next = 2 * step
+            if 2 * step - self._next in (0, 1):
+                self._before = step, abs(begin)
+
+    def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
+        """Return the steps to the end: as many a second as so far, or more as the motion grows."""
+        step_before, begin_before = self._before
+        power = Decimal(1)
+        if 0 < step_before < step:
+            growth = (Decimal(step) / step_before).ln() / (begin / begin_before).ln()
+            if growth > _GROWING:
+                power = min(growth, Decimal(3))
+        return step * (1 + rest / begin) ** power
+
+    def _refuse(self, needed: Decimal) -> None:
+        steps = float(min(Decimal("1e300"), needed))
+        instead = "take a shorter time, slower motion or slower torques"
+        if self._effort is not None:
+            instead = advice(instead, self._effort, steps / self._ordinary)
+        raise InputError(
+            f"reference: more than {self._most:.0f} Taylor steps would be needed, some "
+            f"{steps:.2g}; {instead}"
+        )
+
+
+def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal) -> Decimal:
+    """Return the step for which the last two terms of every series are small beside omega.
+
+    Of a body at rest, beside what the first terms make of it until then.
+    """
+    order = len(coefficients[0]) - 1
+    begun = next((j for j in range(order - 1) if _size(coefficients, j, 3)), None)
+    length = rest
+    for k in (order - 1, order):
+        size = _size(coefficients, k)
+        if size and begun is not None:
+            lengths = [
+                # The root needs few digits; the exponent range is Decimal's.
+                ((tolerance * before / size).ln() / (k - j)).exp()
+                for j in range(begun, 1 if begun == 0 else begun + 4)
+                if (before := _size(coefficients, j, 3))
+            ]
+            length = min(length, max(lengths))
+    return length
+
+
+def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
+    """Return the largest coefficient k of the first so many unknowns, of all by default."""
+    return max(abs(series[k]) for series in coefficients[:unknowns])
+
+
+def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
+    totals = [Decimal(0)] * len(coefficients)
+    for terms in reversed(list(zip(*coefficients, strict=True))):
+        totals = [total * t + term for total, term in zip(totals, terms, strict=True)]
+    return totals
+
+
+class _Equations:
+    """Equations 13-15, and dV/dt = F/m - omega x V, as recurrences of Taylor coefficients."""
+
+    def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
+        self._abc = coefficients
+        self._torque = scene.torque
+        self._moments = [Decimal(i) for i in scene.moments or (1, 1, 1)]
+        self._velocity = velocity
+        self._acceleration = [
+            Decimal(f) / Decimal(m) for f, m in zip(scene.forces, scene.masses, strict=True)
+        ]
+
+    def expand(self, time: Decimal, state: Row, order: int) -> list[Row]:
+        """Return the Taylor coefficients 0 ... order of every unknown around `time`."""
+        series = [[x] for x in state]
+        torque = self._torque_series(time, order)
+        for k in range(order):
+            # Cauchy products of the coefficients 0 ... k.
+            backward = [list(reversed(each)) for each in series]
+            rates = [
+                self._abc[i] * _product(series[(i + 1) % 3], backward[(i + 2) % 3]) + torque[i][k]
+                for i in range(3)
+            ]
+            if self._velocity:
+                for i in range(3):
+                    j, m = (i + 1) % 3, (i + 2) % 3
+                    rate = _product(series[3 + j], backward[m])
+                    rate -= _product(series[3 + m], backward[j])
+                    rates.append(rate + (self._acceleration[i] if k == 0 else 0))
+            for each, rate in zip(series, rates, strict=True):
+                each.append(rate / (k + 1))
+        return series
+
+    def _torque_series(self, time: Decimal, order: int) -> list[Row]:
+        """Return the Taylor coefficients of the normalized torque around `time`."""
+        law = self._torque
+        series = [
+            [Decimal(constant) + Decimal(rate) * time, Decimal(rate), *[Decimal(0)] * (order - 2)]
+            for constant, rate in zip(law.constant, law.rate, strict=True)
+        ]
+        waves = [(wave, 0) for wave in law.sines] + [(wave, 1) for wave in law.cosines]
+        for (amplitude, frequency), quarter in waves:
+            rate = Decimal(frequency)
+            sine, cosine = sine_cosine(rate * time)
+            # Derivatives of sin run sin, cos, -sin, -cos; those of cos start one later.
+            cycle = [sine, cosine, -sine, -cosine]
+            factor = Decimal(1)
+            for k in range(order):
+                term = cycle[(k + quarter) % 4] * factor
+                for axis in range(3):
+                    series[axis][k] += Decimal(amplitude[axis]) * term
+                factor = factor * rate / (k + 1)
+        return [
+            [term / moment for term in terms]
+            for terms, moment in zip(series, self._moments, strict=True)
+        ]
+
+
+def _product(x: Row, reversed_y: Row) -> Decimal:
+    return sum(map(mul, x, reversed_y), Decimal(0))

@@ -1,10 +1,12 @@
 """Fixtures of more than one file."""
 
 import os
-from collections.abc import Iterator
+import shlex
+from collections.abc import Callable, Iterator
 
 import pytest
 
+from pyharness.cli.main import main
 from pyharness.model.extension import extension
 from tests.instruction_sets import BEST, LEVELS, level_here
 from tests.traps import guard
@@ -12,6 +14,19 @@ from tests.traps import guard
 # `make cross-check` asks for this; each call of a kernel takes some microseconds longer.
 if os.environ.get("PYHARNESS_TRAPS"):
     assert guard(extension()) > 0
+
+Printed = Callable[[str], str]
+
+
+@pytest.fixture
+def printed(capsys: pytest.CaptureFixture[str]) -> Printed:
+    """Return what runs a command line that ends well, and returns what it prints."""
+
+    def run(command: str) -> str:
+        assert main(shlex.split(command)) == 0
+        return capsys.readouterr().out
+
+    return run
 
 
 @pytest.fixture(params=range(len(LEVELS)), ids=LEVELS)

@@ -64,14 +64,9 @@ def _mypy(folder: Path, *scripts: Path) -> tuple[set[tuple[str, int]], str]:
     packages = Path(sysconfig.get_path("purelib", vars=paths))
     others = Path(np.__file__).parent.parent
     (packages / "here.pth").write_text(f"{folder / 'lib'}\n{others}\n")
-    python = str(folder / "env/bin/python")
-    done = subprocess.run(
-        [
-            sys.executable, "-m", "mypy", "--strict", "--config-file=",
-            "--python-executable", python, "--cache-dir", str(folder / "cache"), *map(str, scripts),
-        ],
-        cwd=folder, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file=", "--cache-dir", "cache"]
+    command += ["--python-executable", "env/bin/python", *map(str, scripts)]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.stderr == ""
     found = re.findall(r"^([^:\n]+):(\d+): error", done.stdout, re.MULTILINE)
     return {(Path(name).name, int(line)) for name, line in found}, done.stdout
@@ -81,9 +76,8 @@ def test_types_accept_what_runs_and_refuse_what_does_not(tmp_path: Path) -> None
     mistakes = tmp_path / "mistakes.py"
     names = "Listing, Scene, TorqueLaw, case_scene, prepare, read_scene, solve, subset"
     mistakes.write_text(f"import pyharness; from pyharness import {names}{MISTAKES}")
-    script = tmp_path / "user_script.py"
-    script.write_text(SCRIPT.read_text())
-    found, text = _mypy(tmp_path, script, mistakes)
+    script = shutil.copy(SCRIPT, tmp_path)
+    found, text = _mypy(tmp_path, Path(script), mistakes)
     lines = mistakes.read_text().splitlines()
     assert found == {("mistakes.py", n) for n in range(2, len(lines) + 1)}, text
 
@@ -134,9 +128,7 @@ def test_the_citation_is_that_of_the_project() -> None:
     assert citation["license"] == PROJECT["license"]
     assert citation["abstract"].split() == PROJECT["description"].split()
     assert citation["keywords"] == PROJECT["keywords"]
-    assert [each["name"] for each in citation["authors"]] == [
-        each["name"] for each in PROJECT["authors"]
-    ]
+    assert citation["authors"] == [{"name": each["name"]} for each in PROJECT["authors"]]
     (thesis,) = citation["references"]
     readme = " ".join((ROOT / "README.md").read_text().split())
     assert f"*{thesis['title']}*" in readme

@@ -4,9 +4,8 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 
-from pyharness.cli.stderr import say
+from pyharness.cli import say
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
 # Each verb is a module of pyharness.cli.verbs, loaded when it is called for.
@@ -81,10 +80,8 @@ def _run(arguments: list[str]) -> int:
         raise unknown("verb", verb, VERBS)
     from pyharness.cli.options import Parser
 
-    module = import_module(f"pyharness.cli.verbs.{verb}")
     parser = Parser(verb, VERBS[verb])
-    module.declare(parser)
-    code: int = module.run(parser.read(verb, rest))
+    code: int = parser.module.run(parser.read(verb, rest))
     return code
 
 

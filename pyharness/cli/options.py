@@ -6,9 +6,10 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from typing import Any, NoReturn
 
-from pyharness.cli.stderr import say
+from pyharness.cli import say
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset
@@ -17,14 +18,31 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene, read_scene
 
 FORMATS = ("table", "json", "csv", "markdown")
+# Options of several verbs, and what they say of themselves; without a word for a value, a switch.
+SCENE = {
+    "--case N": "a case of Table 1, 1 to 7",
+    "--scene FILE": "a scene file (TOML)",
+    "--omega0 A,B,C": "initial angular velocity, rad/s",
+    "--step-size H": "step, s",
+    "--steps N": "number of steps",
+}
+LISTING = {
+    "--listing L": "original or corrected",
+    "--fix NAME,...": "correct these defects",
+    "--keep NAME,...": "keep these; alone: correct all others",
+    "--reading NAME,...": "select readings not adopted",
+    "--lipschitz L": "constant of the stop test (default 500)",
+    "--no-stop": "run on where the stop test would end the run",
+}
+EFFORT = {"--effort F": "factor on the work that is done before giving up (default 1)"}
 _NEGATIVE = re.compile(r"-[.\d]")
 
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, with the nearest name."""
 
-    def __init__(self, verb: str, description: str) -> None:
-        """Start with no options."""
+    def __init__(self, verb: str, description: str = "") -> None:
+        """Declare the OPTIONS of a verb's module, which has FORMATS where it has not the usual."""
         super().__init__(
             prog=f"pyharness {verb}",
             description=description,
@@ -32,7 +50,14 @@ class Parser(argparse.ArgumentParser):
             # Given a width, argparse need not ask the terminal, which costs it an import.
             formatter_class=lambda prog: argparse.HelpFormatter(prog, width=100),
         )
-        self.formats: Sequence[str] = ()
+        self.module = import_module(f"pyharness.cli.verbs.{verb}")
+        for option, told in self.module.OPTIONS.items():
+            name, _, metavar = option.partition(" ")
+            if not metavar:
+                self.add_argument(name, action="store_true", help=told)
+            else:
+                nargs = None if name.startswith("--") else "?"
+                self.add_argument(name, nargs=nargs, metavar=metavar, help=told)
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError in place of printing the usage."""
@@ -51,7 +76,7 @@ class Parser(argparse.ArgumentParser):
             # What argparse makes of `--name=--`.
             if isinstance(value, list):
                 raise InputError(f"--{name.replace('_', '-')}: '--' is no value; give one")
-        check_format(getattr(options, "format", None), self.formats)
+        check_known("format", options.format, getattr(self.module, "FORMATS", FORMATS))
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
@@ -65,32 +90,11 @@ class Parser(argparse.ArgumentParser):
         return result
 
 
-def add_scene_options(parser: Parser) -> None:
-    """Declare what chooses and changes the scene."""
-    parser.add_argument("--case", metavar="N", help="a case of Table 1, 1 to 7")
-    parser.add_argument("--scene", metavar="FILE", help="a scene file (TOML)")
-    parser.add_argument("--omega0", metavar="A,B,C", help="initial angular velocity, rad/s")
-    parser.add_argument("--step-size", metavar="H", help="step, s")
-    parser.add_argument("--steps", metavar="N", help="number of steps")
-
-
-def add_listing_options(parser: Parser) -> None:
-    """Declare what chooses the defects, the readings and the stop test."""
-    parser.add_argument("--listing", metavar="L", help="original or corrected")
-    parser.add_argument("--fix", metavar="NAME,...", help="correct these defects")
-    parser.add_argument("--keep", metavar="NAME,...", help="keep these; alone: correct all others")
-    parser.add_argument("--reading", metavar="NAME,...", help="select readings not adopted")
-    parser.add_argument("--lipschitz", metavar="L", help="constant of the stop test (default 500)")
-    parser.add_argument(
-        "--no-stop", action="store_true", help="run on where the stop test would end the run"
-    )
-
-
-def add_effort_option(parser: Parser) -> None:
-    """Declare what lifts the limits."""
-    parser.add_argument(
-        "--effort", metavar="F", help="factor on the work that is done before giving up (default 1)"
-    )
+def outputs(formats: Sequence[str] = FORMATS, plot: str = "draw a picture") -> dict[str, str]:
+    """Return where results go, and in what form; `plot` is empty where nothing is drawn."""
+    picture = {"--plot FILE": f"{plot}, with its numbers as CSV"} if plot else {}
+    out = {"--out FILE": "write to this file, not to the terminal"}
+    return {"--format F": ", ".join(formats), **picture, **out}
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
@@ -98,21 +102,19 @@ def chosen_effort(options: argparse.Namespace) -> float:
     return positive(options.effort, "--effort", 1.0)
 
 
-def add_output_options(
-    parser: Parser, formats: Sequence[str] = FORMATS, plot: str = "draw a picture"
-) -> None:
-    """Declare where results go, and in what form; `plot` is empty where nothing is drawn."""
-    parser.formats = formats
-    parser.add_argument("--format", metavar="F", help=", ".join(formats))
-    if plot:
-        parser.add_argument("--plot", metavar="FILE", help=f"{plot}, with its numbers as CSV")
-    parser.add_argument("--out", metavar="FILE", help="write to this file, not to the terminal")
+def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
+    """Refuse what is given by the option of that name and not allowed."""
+    if name is not None and name not in allowed:
+        raise unknown(what, name, allowed, f"--{what}")
 
 
-def check_format(form: str | None, allowed: Sequence[str]) -> None:
-    """Refuse a form that is given and not allowed."""
-    if form is not None and form not in allowed:
-        raise unknown("format", form, allowed, "--format")
+def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
+    """Return what --only names, as in kind/check; InputError where a kind is unknown."""
+    only = names(text)
+    for each in only:
+        if each.partition("/")[0] not in allowed:
+            raise unknown(what, each.partition("/")[0], allowed, "--only")
+    return only
 
 
 def chosen_scene(options: argparse.Namespace) -> Scene:
@@ -120,9 +122,7 @@ def chosen_scene(options: argparse.Namespace) -> Scene:
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
     if options.case is not None:
-        known = [str(each) for each in case_numbers()]
-        if options.case not in known:
-            raise unknown("case", options.case, known, "--case")
+        check_known("case", options.case, [str(each) for each in case_numbers()])
         scene = case_scene(int(options.case))
     else:
         scene = read_scene(options.scene)
@@ -142,10 +142,15 @@ def chosen_scene(options: argparse.Namespace) -> Scene:
     return scene
 
 
+def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
+    """Return the one program asked for, or all."""
+    check_known("program", options.program, PROGRAMS)
+    return PROGRAMS if options.program is None else (options.program,)
+
+
 def chosen_listing(options: argparse.Namespace) -> Listing:
     """Return the listing of the one program asked for."""
-    if options.program not in PROGRAMS:
-        raise unknown("program", options.program, PROGRAMS, "--program")
+    chosen_programs(options)
     return subset(
         options.program,
         options.listing,
@@ -155,12 +160,6 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
     )
 
 
-def check_base(options: argparse.Namespace) -> None:
-    """Refuse a listing of another name."""
-    if options.listing not in (None, "original", "corrected"):
-        raise unknown("listing", options.listing, ("original", "corrected"), "--listing")
-
-
 def listing_text(listing: Listing) -> str:
     """Say a listing in a line."""
     active = ", ".join(sorted(listing.defects)) or "no defects"
@@ -168,9 +167,16 @@ def listing_text(listing: Listing) -> str:
     return f"{listing.label} listing: {active}{readings}"
 
 
-def default_lipschitz() -> float:
-    """Return the constant of the decks (1/s)."""
-    return float(facts("cases")["deck"]["lipschitz"])
+def chosen_lipschitz(options: argparse.Namespace) -> float:
+    """Return the constant of the stop test (1/s), by default that of the decks.
+
+    InputError for what means nothing to a program without the test, or without a stop.
+    """
+    if options.program not in (None, "runge-kutta"):
+        refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
+    if options.no_stop:
+        refuse(options, "--no-stop", ("lipschitz",))
+    return positive(options.lipschitz, "--lipschitz", facts("cases")["deck"]["lipschitz"])
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
@@ -264,25 +270,21 @@ def show(
     form = options.format or FORMATS[0]
     content = own[form]() if own and form in own else render(report, form)
     if getattr(options, "plot", None) is not None:
+        from pyharness.cli.output import write_files
         from pyharness.views.pictures import saved
 
         assert report.pictures is not None
         (draw,) = report.pictures.values()
-        write(saved(draw(), options.plot), "--plot")
+        write_files(saved(draw(), options.plot), "--plot")
     emit(content, options.out)
-
-
-def write(contents: dict[str, bytes], option: str) -> None:
-    """Write files whole or not at all."""
-    from pyharness.cli.output import write_files
-
-    write_files(contents, option)
 
 
 def emit(content: str | bytes, out: str | None) -> None:
     """Write to the terminal, or to the file asked for."""
     if out is not None:
-        write({out: content if isinstance(content, bytes) else content.encode()}, "--out")
+        from pyharness.cli.output import write_files
+
+        write_files({out: content if isinstance(content, bytes) else content.encode()}, "--out")
     elif isinstance(content, bytes):
         sys.stdout.buffer.write(content)
     else:

@@ -4,7 +4,9 @@ import importlib.util
 import os
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+
+from pyharness.model.report import Line, Report
 
 OPTIONAL = {"matplotlib": "pictures: --plot"}
 
@@ -65,11 +67,6 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def missing(packages: Iterable[str] = OPTIONAL) -> list[str]:
-    """Return those of the optional packages that are not installed."""
-    return [name for name in packages if importlib.util.find_spec(name) is None]
-
-
 def _version(package: str) -> str | None:
     from importlib.metadata import PackageNotFoundError, version
 
@@ -77,3 +74,26 @@ def _version(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
+
+
+def doctor_report(build: Build) -> Report:
+    """Report what is built, with what, and which of the optional packages are missing."""
+    rows = {
+        "pyharness": build.version,
+        "extension": build.extension or "not built: 'make compare', or 'pip install .'",
+        "Fortran compiler": build.compiler or "unknown, for nothing is built",
+        "Fortran flags": build.flags or "unknown, for nothing is built",
+        "Python": build.python,
+        "NumPy": build.numpy or "missing",
+        "SciPy": build.scipy or "missing",
+        "platform": build.platform,
+    }
+    missing = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
+    for package, purpose in OPTIONAL.items():
+        state = f"missing: 'pip install {package}'" if package in missing else "installed"
+        rows[package] = f"{state} ({purpose})"
+    return Report(
+        "doctor",
+        text=[[Line(f"{name:18s}{told}") for name, told in rows.items()]],
+        record=lambda: {"missing": missing, "build": asdict(build)},
+    )

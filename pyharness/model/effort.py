@@ -13,14 +13,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, number
 
-# Of a forecast: the pace so far is not that of the rest.
-_SLACK = 2.0
-# Of an effort that was advised, and rounded.
-_ROUNDING = 1.0 + 1e-9
-# Where there is no forecast.
-_UNFORESEEN = 10.0
-
-
+_SLACK = 2.0  # of a forecast: the pace so far is not that of the rest
+_ROUNDING = 1.0 + 1e-9  # of an effort that was advised
+_UNFORESEEN = 10.0  # where there is no forecast
 # Steps of a program without waves, some 30 s of the slowest; and what a wave costs of such a step.
 _MOST_STEPS = {"fortran": 1e8, "python": 5e5}
 _A_WAVE = {"fortran": 1.0, "python": 0.05}
@@ -44,16 +39,9 @@ def checked_effort(effort: Number) -> float:
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return what to do where a limit ended the work, as the end of a message.
+    """Return how a message ends where a limit ended the work: what would help `instead`.
 
-    Parameters
-    ----------
-    instead : str
-        What else would help, as in "take a shorter time".
-    effort : float
-        The factor on the limit.
-    needed : float, optional
-        What it should have been, as far as can be told.
+    `effort` is the factor on the limit, `needed` what it should have been, as far as can be told.
     """
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
@@ -74,13 +62,7 @@ def waves(scene: Scene) -> int:
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
-    """Refuse a scene that takes a program longer than anyone waits who was not asked.
-
-    Raises
-    ------
-    InputError
-        It names the option that lifts the limit, and how far; or for an unknown implementation.
-    """
+    """Refuse a scene that takes a program longer than anyone waits who was not asked."""
     if implementation not in _MOST_STEPS:
         raise unknown("implementation", implementation, _MOST_STEPS)
     cost = 1.0 + _A_WAVE[implementation] * waves(scene)

@@ -21,13 +21,7 @@ class InputError(ValueError):
 
 
 class TimedError(InputError):
-    """One whose message has a time in it, which is in the units of whoever was asked.
-
-    Attributes
-    ----------
-    time : float
-        The time (s).
-    """
+    """One whose message has a `time` (s) in it, in the units of whoever was asked."""
 
     def __init__(self, message: str, time: float) -> None:
         """Put the time where ``{time}`` stands."""
@@ -77,18 +71,9 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the error for a name that is not among those allowed, with the nearest one.
+    """Return the error for a name not among those allowed, with the nearest one.
 
-    Parameters
-    ----------
-    what : str
-        What the name should name, for instance ``"case"``.
-    name : object
-        What was given, which may be no name at all.
-    allowed : iterable of str
-        What would have been right.
-    where : str
-        Where it was given, for instance ``"--fix"``.
+    `what` it should name, as in "case"; `where` it was given, as in "--fix".
     """
     import difflib
 

@@ -10,13 +10,7 @@ PATIENCE = 10.0  # s, until the other end of a pipe must have said or taken some
 
 
 def read_some(path: str, limit: int) -> bytes:
-    """Return what a file holds, `limit` bytes at the most.
-
-    Raises
-    ------
-    OSError
-        Where it can't be read, or is a pipe into which no one writes.
-    """
+    """Return what a file holds, `limit` bytes at the most; OSError where no one writes it."""
     # Without O_NONBLOCK, opening a pipe waits for someone who writes.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
@@ -34,13 +28,7 @@ def read_some(path: str, limit: int) -> bytes:
 
 
 def write_waiting(path: str, content: bytes) -> None:
-    """Write to a device, or to a pipe once someone reads from it.
-
-    Raises
-    ------
-    OSError
-        Where it can't be written to, or is a pipe from which no one reads.
-    """
+    """Write to a device, or to a pipe once someone reads from it; OSError where no one does."""
     end = time.monotonic() + PATIENCE
     while True:
         try:

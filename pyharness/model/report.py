@@ -49,31 +49,15 @@ def counted(number: int, what: str) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table, and how its values are written.
-
-    Attributes
-    ----------
-    head : str
-        What stands above it.
-    write : callable
-        Writes a value for people.
-    left : bool
-        Whether it stands to the left; numbers stand to the right.
-    unit : str
-        Of the values, which `write` may scale.
-    name, full : str, callable
-        Its head, and what writes a value, where numbers are given in full; `head` where empty.
-    fit : {"", "wrap", "cut"}
-        What becomes of a last column that is too wide.
-    """
+    """A column of a table: `head` for people, `name` where numbers are given in full."""
 
     head: str
     write: Callable[[Any], str] = plain
-    left: bool = False
-    unit: str = ""
-    name: str = ""
+    left: bool = False  # words stand to the left, numbers to the right
+    unit: str = ""  # of the values, which `write` may scale
+    name: str = ""  # `head` where empty
     full: Callable[[Any], str] = exact
-    fit: str = ""
+    fit: str = ""  # "wrap" or "cut": what becomes of a last column that is too wide
 
 
 def words(heads: str) -> list[Column]:
@@ -89,18 +73,16 @@ class Table(NamedTuple):
 
     def written(self) -> list[list[str]]:
         """Return the heads and all cells as people read them."""
-        return self._cells(
-            [each.head for each in self.columns], [each.write for each in self.columns]
-        )
+        return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
         """Return the heads and all cells, numbers in full."""
-        heads = [each.name or each.head for each in self.columns]
-        return self._cells(heads, [each.full for each in self.columns])
+        return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
-    def _cells(self, heads: list[str], writers: list[Callable[[Any], str]]) -> list[list[str]]:
+    def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
+        heads, writers = zip(*columns, strict=True)
         rows = ([write(x) for write, x in zip(writers, row, strict=True)] for row in self.rows)
-        return [heads, *rows]
+        return [list(heads), *rows]
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
@@ -138,30 +120,12 @@ Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
-    """What a finding has to say.
+    """What a finding has to say."""
 
-    Attributes
-    ----------
-    title : str
-        The verb that asked.
-    text : sequence of sections
-        What stands in the terminal; empty sections do not count.
-    record : callable
-        Returns what JSON gives.
-    data : Table or None
-        The table that CSV gives, in full.
-    page : sequence of sections or None
-        What Markdown gives; None for `data`.
-    cases : sequence of Case
-        What JUnit gives.
-    pictures : mapping
-        By name what makes a picture.
-    """
-
-    title: str
-    text: Sequence[Section]
-    record: Callable[[], dict[str, Any]]
-    data: Table | None = None
-    page: Sequence[Section] | None = None
-    cases: Sequence[Case] = ()
+    title: str  # the verb that asked
+    text: Sequence[Section]  # in the terminal; empty sections do not count
+    record: Callable[[], dict[str, Any]]  # JSON
+    data: Table | None = None  # CSV, in full
+    page: Sequence[Section] | None = None  # Markdown; None for `data`
+    cases: Sequence[Case] = ()  # JUnit
     pictures: Mapping[str, Callable[[], Picture]] | None = None

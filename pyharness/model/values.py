@@ -21,13 +21,7 @@ _THREE_FLOATS = [float, float, float]
 
 
 def number(where: str, value: object) -> float:
-    """Return a real number as a float, which may be infinite or NaN.
-
-    Raises
-    ------
-    InputError
-        Which begins with `where`, for anything else, and for a number too large for binary64.
-    """
+    """Return a real number as a float, any; InputError, which begins with `where`, for no such."""
     found = converted(value)
     if isinstance(found, float):
         return found
@@ -61,13 +55,7 @@ def is_no_number(value: object) -> bool:
 
 
 def three(where: str, values: object) -> Triple:
-    """Return three finite numbers.
-
-    Raises
-    ------
-    InputError
-        Which begins with `where`, for anything else.
-    """
+    """Return three finite numbers; InputError, which begins with `where`, for anything else."""
     found = three_floats(where, values)
     for each in found:
         if not math.isfinite(each):
@@ -101,13 +89,7 @@ def _not_finite(where: str, value: float) -> InputError:
 
 
 def several(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over what has an order: no text, no set, no mapping.
-
-    Raises
-    ------
-    InputError
-        ``where: what it is; allowed``.
-    """
+    """Return an iterator over what has an order; InputError for text, a set, a mapping."""
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
             return iter(values)  # type: ignore[call-overload, no-any-return]

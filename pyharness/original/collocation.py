@@ -1,4 +1,4 @@
-"""One interval of the collocation of IV.2, for up to five terms.
+"""Collocation as in IV.2, for up to five terms: an interval, and the march of the two programs.
 
 Every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34) whose derivative meets the
 right-hand side at as many points as there are terms (eq. 36). The right-hand side needs the
@@ -6,36 +6,58 @@ unknowns themselves: a first estimate takes it constant, one correction takes it
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
-from pyharness.original.equations import Vector
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.original.equations import Record, Vector, all_finite
 from pyharness.original.linear_solver import leqt1f
 
 Rates = Callable[[int, Vector], list[float]]
 """Right-hand sides of all unknowns at point k (0 is the interval's beginning)."""
 
 
+def march(
+    scene: Scene,
+    listing: Listing,
+    points_of: Callable[[float], list[float]],
+    rates: Callable[[Sequence[Vector], int, Vector], list[float]],
+) -> Trajectory:
+    """Run a program whose points lie in a step as `points_of` says.
+
+    `rates` gets the torques at the beginning and at the points, k, and the unknowns there.
+    """
+    h = scene.step_size
+    dt = h
+    time = 0.0
+    state = [*scene.omega, 0.0, 0.0, 0.0]
+    n_rates = 1 + len(points_of(dt))
+    record = Record(scene, evaluations_per_step=n_rates)
+
+    for step in range(scene.steps):
+        begin = step * h
+        time = time + dt
+        points = points_of(dt)
+        if listing.has("torque-held"):
+            torques = [scene.normalized_torque(time)] * n_rates
+        else:
+            torques = [scene.normalized_torque(begin + t) for t in (0.0, *points)]
+        state, ier = interval(state, points, h, partial(rates, torques))
+        if not all_finite(state[:3]):
+            return record.trajectory("overflow")
+        record.add(time, state[:3], state[3:], ier)
+        if listing.has("dt-accumulates"):
+            dt = dt + h
+    return record.trajectory()
+
+
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Advance all unknowns by one interval.
+    """Advance all unknowns to `end`; return them, and IER of the second solution.
 
-    Parameters
-    ----------
-    start : sequence of float
-        The unknowns at the interval's beginning.
-    points : sequence of float
-        Times of collocation, from the interval's beginning (s).
-    end : float
-        The time at which the result is wanted, from the interval's beginning (s).
-    rates : callable
-        ``rates(k, x)``: right-hand sides at point k = 0 (the beginning), 1, 2, ...
-
-    Returns
-    -------
-    list of float
-        The unknowns at `end`.
-    int
-        IER of the second solution.
+    The points of collocation and the end are in s from the interval's beginning.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))

@@ -9,21 +9,9 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Solve A x = b for every b.
+    """Return x of A x = b for every b, and IER; neither A nor any b is changed.
 
-    Parameters
-    ----------
-    matrix : list of n rows of n floats
-        A; not changed.
-    right_hand_sides : list of m lists of n floats
-        Each b; not changed.
-
-    Returns
-    -------
-    solutions : list of m lists of n floats
-        Each x; where A is algorithmically singular, each b as it was.
-    ier : int
-        0, or 129 where A is algorithmically singular.
+    Where A is algorithmically singular each b comes back as it was, with `SINGULAR`; else 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)

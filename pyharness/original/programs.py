@@ -7,25 +7,17 @@ from typing import Any
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import number, truth
+from pyharness.original import compiled
 
 IMPLEMENTATIONS = ("fortran", "python")
 
 
 @dataclass(frozen=True)
 class Program:
-    """A program of the appendix.
-
-    Attributes
-    ----------
-    name : str
-        As in `pyharness.model.listing.PROGRAMS`.
-    order : int
-        The power of the step with which the error of the corrected program falls.
-    source : str
-        Where it stands.
-    """
+    """A program of the appendix; its corrected error falls with `order` of the step."""
 
     name: str
     order: int
@@ -41,39 +33,13 @@ class Program:
         velocity: bool = True,
         effort: float = 1.0,
     ) -> Trajectory:
-        """Run the program.
-
-        Parameters
-        ----------
-        scene : Scene
-            What to integrate.
-        listing : Listing
-            Its active defects and readings.
-        implementation : {"fortran", "python"}
-            The compiled program or its twin; both give the same bits.
-        lipschitz : float
-            Constant of the stop test (1/s).
-        may_stop : bool
-            Whether the stop test may end the run.
-        velocity : bool
-            Whether the velocity is wanted; the compiled program then computes it only if its
-            stop test needs it.
-        effort : float
-            Factor on the steps, times waves, that are run without being asked for.
-
-        Raises
-        ------
-        InputError
-            For what is no scene, a listing of another program, an unknown implementation, or more
-            steps than `effort` allows.
-        NotBuiltError
-            Where the compiled program is asked for and not built.
-        """
-        from pyharness.original import compiled
-
-        lipschitz, may_stop, velocity = compiled.checked_run(
-            scene, listing, lipschitz, may_stop, velocity
-        )
+        """Run the program: what `run_program` takes and raises, for its own listings alone."""
+        checked_scene(scene)
+        checked_listing(listing)
+        lipschitz = number("lipschitz", lipschitz)
+        if not lipschitz >= 0.0:
+            raise InputError(f"lipschitz is {lipschitz:g}; allowed: a number from 0")
+        may_stop, velocity = truth("may_stop", may_stop), truth("velocity", velocity)
         if listing.program != self.name:
             raise InputError(f"program {self.name}: the listing is that of {listing.program}")
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
@@ -85,8 +51,6 @@ class Program:
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
         """Compute what was checked; the options are those of `run`, but for the effort."""
-        from pyharness.original import compiled
-
         if implementation == "fortran":
             return compiled.run(scene, listing, *options)
         lipschitz, may_stop, _ = options
@@ -112,6 +76,33 @@ def run_program(
     velocity: bool = True,
     effort: float = 1.0,
 ) -> Trajectory:
-    """Run the program of a listing: `Program.run`, with what it takes and raises."""
+    """Run the program of a listing.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to integrate.
+    listing : Listing
+        The program, its active defects and readings.
+    implementation : {"fortran", "python"}
+        The compiled program or its twin; both give the same bits.
+    lipschitz : float
+        Constant of the stop test (1/s), which only the Runge-Kutta program has.
+    may_stop : bool
+        Whether the stop test may end the run.
+    velocity : bool
+        Whether the velocity is wanted; the compiled program then computes it only if its
+        stop test needs it. No other bit depends on this.
+    effort : float
+        Factor on the steps, times waves, that are run without being asked for.
+
+    Raises
+    ------
+    InputError
+        For what is no scene or listing, an unknown implementation, or more steps than `effort`
+        allows.
+    NotBuiltError
+        Where the compiled program is asked for and not built.
+    """
     program = PROGRAM_REGISTRY[checked_listing(listing).program]
     return program.run(scene, listing, implementation, lipschitz, may_stop, velocity, effort)

@@ -10,13 +10,7 @@ from collections.abc import Mapping
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
-from pyharness.original.equations import (
-    Record,
-    Vector,
-    accelerations,
-    all_finite,
-    velocity_rate,
-)
+from pyharness.original.equations import Record, Vector, accelerations, all_finite, velocity_rate
 
 
 def run(
@@ -98,17 +92,15 @@ def lipschitz_test(
 ) -> tuple[str, float] | None:
     """Return the variable that breaks the condition of eq. 19 and its quotient, or None."""
     velocity_counts = listing.has("lipschitz-tests-velocity")
-    if listing.has("lipschitz-per-component"):
-        order = [3, 4, 5, 0, 1, 2] if velocity_counts else [0, 1, 2]
-        for index in order:
-            if change_k[index] > change_u[index] * lipschitz:
-                return STOP_VARIABLES[index], _quotient(change_k[index], change_u[index])
-        return None
     last = 6 if velocity_counts else 3
-    norm_k = _norm(change_k[:last])
-    norm_u = _norm(change_u[:last])
-    if norm_k > norm_u * lipschitz:
-        return ("UV" if velocity_counts else "U"), _quotient(norm_k, norm_u)
+    if listing.has("lipschitz-per-component"):
+        found = [*zip(STOP_VARIABLES[:last], change_k, change_u, strict=False)]
+        tests = found[3:] + found[:3]  # the velocity first
+    else:
+        tests = [("UV" if velocity_counts else "U", _norm(change_k[:last]), _norm(change_u[:last]))]
+    for variable, change, by in tests:
+        if change > by * lipschitz:
+            return variable, change / by if by else math.inf
     return None
 
 
@@ -121,7 +113,3 @@ def _norm(x: Vector) -> float:
     for each in x:
         total = total + each * each
     return math.sqrt(total)
-
-
-def _quotient(change_k: float, change_u: float) -> float:
-    return change_k / change_u if change_u else math.inf

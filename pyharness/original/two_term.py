@@ -8,15 +8,8 @@ from collections.abc import Sequence
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.collocation import interval
-from pyharness.original.equations import (
-    Record,
-    Vector,
-    accelerations,
-    all_finite,
-    omega_rate,
-    velocity_rate,
-)
+from pyharness.original.collocation import march
+from pyharness.original.equations import Vector, accelerations, omega_rate, velocity_rate
 
 
 def run(
@@ -26,35 +19,15 @@ def run(
     a, b, c = scene.euler_coefficients
     unset_c1 = 0.0
     acceleration = accelerations(scene)
-    h = scene.step_size
-    dt = h
-    time = 0.0
-    state = [*scene.omega, 0.0, 0.0, 0.0]
-    record = Record(scene, evaluations_per_step=3)
 
-    for step in range(scene.steps):
-        begin = step * h
-        time = time + dt
-        points = [dt / 3.0, 2.0 * dt / 3.0]
-        if listing.has("torque-held"):
-            torques = [scene.normalized_torque(time)] * 3
-        else:
-            torques = [scene.normalized_torque(begin + t) for t in (0.0, *points)]
+    def rates(torques: Sequence[Vector], k: int, x: Vector) -> list[float]:
+        coefficients = (a, b, c)
+        forces = acceleration
+        if k == 0 and listing.has("c1-for-c"):
+            coefficients = (a, b, unset_c1)
+        if k == 2 and listing.has("x3-reads-acl2"):
+            forces = [acceleration[1], acceleration[1], acceleration[2]]
+        u, v = x[:3], x[3:]
+        return omega_rate(coefficients, torques[k], u) + velocity_rate(forces, u, v)
 
-        def rates(k: int, x: Vector, torques: Sequence[Vector] = torques) -> list[float]:
-            coefficients = (a, b, c)
-            forces = acceleration
-            if k == 0 and listing.has("c1-for-c"):
-                coefficients = (a, b, unset_c1)
-            if k == 2 and listing.has("x3-reads-acl2"):
-                forces = [acceleration[1], acceleration[1], acceleration[2]]
-            u, v = x[:3], x[3:]
-            return omega_rate(coefficients, torques[k], u) + velocity_rate(forces, u, v)
-
-        state, ier = interval(state, points, h, rates)
-        if not all_finite(state[:3]):
-            return record.trajectory("overflow")
-        record.add(time, state[:3], state[3:], ier)
-        if listing.has("dt-accumulates"):
-            dt = dt + h
-    return record.trajectory()
+    return march(scene, listing, lambda dt: [dt / 3.0, 2.0 * dt / 3.0], rates)

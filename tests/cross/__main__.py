@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 from pyharness.compare.checks import Check
@@ -20,17 +20,26 @@ from tests.instruction_sets import fuses_here
 
 FOLDER = ROOT / "build" / "cross"
 # The kernels that answer to the truth, not to bits.
-MODERN = [
+MODERN = (
     "tests/original/test_linear_solver.py",
     *(
         f"tests/methods/test_{name}.py"
         for name in ("closed_form", "fixed_step", "gauss", "quick", "prepared", "taylor")
     ),
-]
-# The rooms that call kernels: what other rooms do with the results is the same in every build.
-CALLING = tuple(
-    f"tests/{room}"
-    for room in ("compare", "fuzz", "methods", "model", "original", "stress", "theory", "truth")
+)
+# What calls the kernels, each in ways of its own, and itself; what the other tests do with the
+# results is the same in every build.
+CALLING = (
+    "tests/fuzz",
+    "tests/methods",
+    "tests/model",
+    "tests/original",
+    "tests/compare/test_candidates.py",
+    "tests/stress/test_motions.py::test_bounds_hold",
+    "tests/stress/test_run.py::test_bounds_hold",
+    # Every digest has been computed by then, with traps where there are any.
+    "--deselect=tests/original/test_programs.py::test_every_cell_agrees",
+    "--deselect=tests/original/test_programs.py::test_nasty_scenes_agree",
 )
 # Recursion: the entries release the lock, so that two threads may well be in one of them.
 CHECKED = (
@@ -48,69 +57,44 @@ FAULTS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Job:
-    """A build, and what is done with it after its bits are compared.
-
-    Attributes
-    ----------
-    build : Build
-        How it is made.
-    faulty : bool
-        Whether it is to be caught at its faults, and nothing else.
-    tests : tuple of str or None
-        The tests to run.
-    """
-
-    build: Build
-    faulty: bool = False
-    tests: tuple[str, ...] | None = None
-
-
 def main() -> int:
     """Run the builds named on the command line, or all."""
-    jobs, skipped = _jobs()
-    chosen = sys.argv[1:] or [job.build.name for job in jobs]
+    builds, skipped = _builds()
+    chosen = sys.argv[1:] or [build.name for build in builds]
     for name in chosen:
-        if name not in {job.build.name for job in jobs}:
+        if name not in {build.name for build in builds}:
             print(f"cross-check: no build '{name}'; skipped: {skipped}", file=sys.stderr)
             return 2
     FOLDER.mkdir(parents=True, exist_ok=True)
     environment(FOLDER / "environment")
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        # The longest first.
-        ordered = sorted(
-            (job for job in jobs if job.build.name in chosen),
-            key=lambda job: job.tests != CALLING,
-        )
+        wanted = [build for build in builds if build.name in chosen]
+        wanted.sort(key=lambda build: not build.checked)  # the longest first
         twin = pool.submit(_twin)
-        checks = [
-            check
-            for found in pool.map(lambda job: list(_checked(job, twin.result())), ordered)
-            for check in found
-        ]
+        found = pool.map(lambda build: list(_checked(build, twin.result())), wanted)
+        checks = [check for each in found for check in each]
     report = checks_report("cross", checks, summary(skipped, checks, 2))
     print(render(report, "table"), end="")
     return 0 if all(check.passed for check in checks) else 1
 
 
-def _jobs() -> tuple[list[Job], list[str]]:
+def _builds() -> tuple[list[Build], list[str]]:
     """Return what can be made here, and in words what can't."""
     gfortran = os.environ.get("FC", "gfortran")
-    modern = tuple(MODERN)
     faults = tuple((ORIGINAL + file, old, new) for _, (file, old, new), _ in FAULTS.values())
-    jobs = [
-        Job(Build("gfortran-O0", gfortran, "gcc", "0"), tests=modern),
-        Job(Build("gfortran-O2", gfortran, "gcc", "2"), tests=modern),
-        Job(Build("debug", gfortran, "gcc", "0", CHECKED, checked=True), tests=CALLING),
-        Job(Build("faulty", gfortran, "gcc", "0", CHECKED, checked=True, plants=faults), True),
+    debug = Build("debug", gfortran, "gcc", "0", CHECKED, checked=True, tests=CALLING)
+    builds = [
+        debug,
+        replace(debug, name="faulty", plants=faults, faulty=True, tests=()),
+        Build("gfortran-O0", gfortran, "gcc", "0", tests=MODERN),
+        Build("gfortran-O2", gfortran, "gcc", "2", tests=MODERN),
     ]
     skipped = []
     native = native_flag(gfortran)
     if native is None:
         skipped.append(f"skipped: gfortran -O3 for this processor: {gfortran} has no such option")
     else:
-        jobs.append(Job(Build("gfortran-O3-native", gfortran, "gcc", "3", (native,)), tests=modern))
+        builds.append(Build("gfortran-O3-native", gfortran, "gcc", "3", (native,), tests=MODERN))
         fused = (
             "meson.build",
             "'-nostdinc', '-ffp-contract=off'",
@@ -118,7 +102,7 @@ def _jobs() -> tuple[list[Job], list[str]]:
         )
         contracted = Build("contracted", gfortran, "gcc", "3", (native,), "fast", plants=(fused,))
         if fuses_here():
-            jobs.append(Job(contracted))
+            builds.append(contracted)
         else:
             skipped.append("skipped: contracted: this processor has no fused multiply-add")
     found = subprocess.run(
@@ -127,9 +111,8 @@ def _jobs() -> tuple[list[Job], list[str]]:
     if found.returncode:
         skipped.append(f"skipped: flang: {(found.stderr.splitlines() or ['?'])[-1]}")
     else:
-        flang = Build("flang-O2", found.stdout.strip(), "llvm-flang", "2")
-        jobs.append(Job(flang, tests=modern))
-    return jobs, skipped
+        builds.append(Build("flang-O2", found.stdout.strip(), "llvm-flang", "2", tests=MODERN))
+    return builds, skipped
 
 
 def _twin() -> dict[str, str]:
@@ -141,39 +124,40 @@ def _twin() -> dict[str, str]:
     return digests
 
 
-def _checked(job: Job, twin: dict[str, str]) -> Iterator[Check]:
-    name = job.build.name
+def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
+    name = build.name
     replay = f"make cross-check ARGS={name}"
     begin = time.monotonic()
     try:
-        tree = make(job.build, FOLDER)
+        tree = make(build, FOLDER)
     except RuntimeError as error:
         yield Check(f"build/{name}", False, None, None, replay, str(error))
         return
     built = time.monotonic()
-    if job.faulty:
+    if build.faulty:
         yield from _faults(tree)
         _tell(name, begin, built, built)
         return
-    done = _run(tree, ["-m", "tests.cross.digests", "fortran", "digests.json"])
+    arguments = ["-m", "tests.cross.digests", "fortran", "digests.json"]
+    done = _run(tree, arguments, traps=build.checked)
     if done.returncode:
         yield Check(f"build/{name}", False, None, None, replay, done.stdout[-1000:])
         return
     record = json.loads((tree / "digests.json").read_text())
-    wrong = false_claims(job.build, tree, record)
+    wrong = false_claims(build, tree, record)
     yield Check(f"build/{name}", not wrong, None, None, replay, "; ".join(wrong))
     entries = facts("divergences")["divergence"]
     listed = {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
     bits = list(compared(name, record["digests"], twin, listed))
-    if job.build.contract != "off":
+    if build.contract != "off":
         seen = sum(not check.passed for check in bits)
         note = f"{seen} of {len(bits)} cells differ" if seen else "the comparison sees no fault"
         yield Check("fault/contraction", seen > 0, None, None, replay, note)
     else:
         yield from bits
     compared_at = time.monotonic()
-    if job.tests is not None:
-        yield _suite(job, tree)
+    if build.tests:
+        yield _suite(build, tree)
     _tell(name, begin, built, compared_at)
 
 
@@ -185,16 +169,16 @@ def _tell(name: str, begin: float, built: float, compared_at: float) -> None:
     )
 
 
-def _suite(job: Job, tree: Path) -> Check:
+def _suite(build: Build, tree: Path) -> Check:
     """Run tests in the tree of a build, with traps where it has run-time checks."""
-    name = job.build.name
+    name = build.name
     # With -s the last words of a process that a test ends are not held back.
-    processes = ["-n", "2", "--dist", "worksteal"] if job.build.checked else []
-    arguments = ["pytest", "-sq", *processes, "-p", "no:cacheprovider", *(job.tests or ())]
-    done = _run(tree, ["-m", *arguments], traps=job.build.checked)
+    processes = ["-n", "2", "--dist", "worksteal"] if build.checked else []
+    arguments = ["pytest", "-sq", *processes, "-p", "no:cacheprovider", *build.tests]
+    done = _run(tree, ["-m", *arguments], traps=build.checked)
     log = FOLDER / f"{name}.log"
     log.write_text(done.stdout)
-    traps = "PYHARNESS_TRAPS=1 " if job.build.checked else ""
+    traps = "PYHARNESS_TRAPS=1 " if build.checked else ""
     replay = inside(name, " ".join(arguments), traps)
     note = ""
     if done.returncode:

@@ -16,46 +16,25 @@ NOT_COPIED = shutil.ignore_patterns(".*_cache", ".git", ".venv", "build", "dist"
 
 @dataclass(frozen=True)
 class Build:
-    """One way to compile the project.
+    """One way to compile the project, and what is done with it after its bits are compared."""
 
-    Attributes
-    ----------
-    name : str
-        Also that of its folder.
-    compiler : str
-        The command.
-    family : str
-        What meson calls such a compiler.
-    optimization : str
-        Meson's word: 0, 2, 3.
-    flags : tuple of str
-        What is asked of the compiler beyond that.
-    contract : str
-        What the original programs are to be compiled with: ``off``, or ``fast`` for the build
-        that shows that the comparison sees a compiler's fault.
-    checked : bool
-        Whether this is a build with run-time checks, which needs the compiler's library.
-    plants : tuple
-        File, what stands there, the fault that takes its place.
-    """
-
-    name: str
-    compiler: str
-    family: str
-    optimization: str
+    name: str  # also that of its folder
+    compiler: str  # the command
+    family: str  # what meson calls such a compiler
+    optimization: str  # meson's word: 0, 2, 3
     flags: tuple[str, ...] = ()
+    # Of the original programs: ``fast`` shows that the comparison sees a compiler's fault.
     contract: str = "off"
-    checked: bool = False
-    plants: tuple[tuple[str, str, str], ...] = ()
+    checked: bool = False  # with run-time checks, which need the compiler's library
+    plants: tuple[tuple[str, str, str], ...] = ()  # file, what stands there, the fault
+    faulty: bool = False  # to be caught at its faults, and nothing else
+    tests: tuple[str, ...] = ()
 
 
 def make(build: Build, folder: Path) -> Path:
     """Copy the checkout into `folder`, build there, and put the extensions into its package.
 
-    Raises
-    ------
-    RuntimeError
-        With the end of what the build said.
+    RuntimeError with the end of what the build said.
     """
     tree = folder / build.name
     shutil.rmtree(tree, ignore_errors=True)
@@ -67,10 +46,11 @@ def make(build: Build, folder: Path) -> Path:
         (tree / file).write_text(text.replace(old, new))
     if build.checked:
         _fill_results_with_nan(tree)
-    environment = dict(os.environ)
-    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
-    environment["FC"] = build.compiler
-    environment["FFLAGS"] = " ".join(build.flags)
+    environment = os.environ | {
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "FC": build.compiler,
+        "FFLAGS": " ".join(build.flags),
+    }
     options = [f"-Doptimization={build.optimization}", f"-Ddebug={str(build.checked).lower()}"]
     for command in (["meson", "setup", "build", *options], ["meson", "compile", "-C", "build"]):
         done = subprocess.run(
@@ -135,17 +115,14 @@ def _wrong_words(build: Build, words: Sequence[str]) -> list[str]:
     found = []
     if Path(words[0]).name != Path(build.compiler).name:
         found.append(f"meson ran {words[0]}, not {build.compiler}")
+    contract = ("-ffp-contract", f"-ffp-contract={build.contract}")
     # Of several, compilers take the last.
-    for beginning, expected in (("-O", f"-O{build.optimization}"), *_contract(build)):
+    for beginning, expected in (("-O", f"-O{build.optimization}"), contract):
         last = [word for word in words if word.startswith(beginning)][-1:]
         if last != [expected]:
             found.append(f"the original programs were compiled with {last}, not {expected}")
     found += [f"meson ran without {flag}" for flag in build.flags if flag not in words]
     return found
-
-
-def _contract(build: Build) -> tuple[tuple[str, str], ...]:
-    return (("-ffp-contract", f"-ffp-contract={build.contract}"),)
 
 
 def environment(folder: Path) -> Path:

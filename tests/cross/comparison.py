@@ -12,16 +12,9 @@ def compared(
     twin: Mapping[str, str],
     listed: Collection[tuple[str, str]] = (),
 ) -> Iterator[Check]:
-    """Yield a check for each cell of a build.
+    """Yield a check for each cell of a build: its digests against those of the Python twin.
 
-    Parameters
-    ----------
-    build : str
-        Its name.
-    digests, twin : mapping
-        Cell to digest, of the build and of the Python twin.
-    listed : collection of (str, str)
-        Build and cell of the divergences that are known; one that no longer occurs fails.
+    `listed` are build and cell of the divergences known; one that no longer occurs fails.
     """
     known_cells = {cell for name, cell in listed if name == build}
     for cell in sorted(digests.keys() | twin.keys() | known_cells):
@@ -32,12 +25,8 @@ def compared(
             note = "listed" if known else "not the bits of the twin"
         elif known:
             note = "a listed divergence that no longer occurs"
-        yield Check(f"bits/{build}/{cell}", differs == known, None, None, again(build, cell), note)
-
-
-def again(build: str, cell: str) -> str:
-    """Return the command that replays a cell in a build."""
-    return inside(build, replay(cell))
+        again = inside(build, replay(cell))
+        yield Check(f"bits/{build}/{cell}", differs == known, None, None, again, note)
 
 
 def inside(build: str, module: str, variables: str = "") -> str:

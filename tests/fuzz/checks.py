@@ -9,11 +9,10 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
@@ -30,17 +29,8 @@ from tests.fuzz.command_lines import CommandLine, command_line, furnish
 LONGEST = 20.0  # s of processor time for one input: longer is taken for ever
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A kind of input.
-
-    Attributes
-    ----------
-    make : callable
-        Returns an input, from a generator of random numbers.
-    check : callable
-        Tries an input in a folder of its own.
-    """
+class Kind(NamedTuple):
+    """How an input is made of random numbers, and tried in a folder of its own."""
 
     make: Callable[[Random], Any]
     check: Callable[[Any, Path], None]
@@ -134,44 +124,49 @@ def _listing(given: strategies.ListingInput, folder: Path) -> None:
 
 def _command(given: CommandLine, folder: Path) -> None:
     """In this process: exit code, what is written where, and no exception."""
-    furnish(folder, given.scene)
-    before = _files(folder)
     raw_out, raw_err = io.BytesIO(), io.BytesIO()
     out, err = (io.TextIOWrapper(each, "utf-8", newline="\n") for each in (raw_out, raw_err))
-    here = Path.cwd()
-    os.chdir(folder)
-    try:
-        with (
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
-            patch("pyharness.model.pipes.PATIENCE", 0.05),
-        ):
+    with (
+        _judged(given, folder) as found,
+        contextlib.chdir(folder),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        patch("pyharness.model.pipes.PATIENCE", 0.05),
+    ):
+        try:
             code: object = main(given.arguments)
-    except SystemExit as leave:
-        asked = {"-h", "--help"} & {each.strip() for each in given.arguments}
-        code = leave.code if asked else f"SystemExit({leave.code})"
-    finally:
-        os.chdir(here)
-    out.flush()
-    err.flush()
-    _judge(given, code, raw_out.getvalue(), raw_err.getvalue(), _files(folder) == before)
-    (folder / "out.txt").unlink(missing_ok=True)
+        except SystemExit as leave:
+            asked = {"-h", "--help"} & {each.strip() for each in given.arguments}
+            code = leave.code if asked else f"SystemExit({leave.code})"
+        out.flush()
+        err.flush()
+        found += [code, raw_out.getvalue(), raw_err.getvalue()]
 
 
 def _process(given: CommandLine, folder: Path) -> None:
     """In a process of its own, as a user calls it, in one of several languages."""
-    furnish(folder, given.scene)
-    before = _files(folder)
     command = [sys.executable, "-m", "pyharness"]
     arguments = [each.encode("utf-8", "surrogateescape") for each in given.arguments]
     encoding = ("utf-8", "ascii", "latin-1")[len(given.scene) % 3]
-    done = subprocess.run(
-        [*command, *(each.replace(b"\0", b"") for each in arguments)],
-        cwd=folder, capture_output=True, timeout=2 * LONGEST, check=False,
-        stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONIOENCODING": encoding},
-    )  # fmt: skip
-    assert done.returncode >= 0, f"ended by signal {-done.returncode}"
-    _judge(given, done.returncode, done.stdout, done.stderr, _files(folder) == before)
+    with _judged(given, folder) as found:
+        done = subprocess.run(
+            [*command, *(each.replace(b"\0", b"") for each in arguments)],
+            cwd=folder, capture_output=True, timeout=2 * LONGEST, check=False,
+            stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONIOENCODING": encoding},
+        )  # fmt: skip
+        assert done.returncode >= 0, f"ended by signal {-done.returncode}"
+        found += [done.returncode, done.stdout, done.stderr]
+
+
+@contextlib.contextmanager
+def _judged(given: CommandLine, folder: Path) -> Iterator[list[Any]]:
+    """Furnish the folder; judge exit code, stdout and stderr that are put into the list."""
+    furnish(folder, given.scene)
+    before = _files(folder)
+    found: list[Any] = []
+    yield found
+    code, out, err = found
+    _judge(given, code, out, err, _files(folder) == before)
     (folder / "out.txt").unlink(missing_ok=True)
 
 

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from random import Random
 
@@ -51,7 +50,7 @@ def command_line(random: Random) -> CommandLine:
         words = [mutated_word(random, verb), *(mutated_word(random, "x") for _ in range(2))]
         return CommandLine(tuple(each for each in words if each not in VERBS), content, False)
     arguments = [verb]
-    parser = _parser(verb)
+    parser = Parser(verb)
     for option in _usual(random, verb):
         arguments += _given(random, parser, option)
     names = [name for name in parser.option_names() if name != "--help"]
@@ -78,12 +77,6 @@ def furnish(folder: Path, content: bytes) -> None:
         (folder / "folder").mkdir()
         os.mkfifo(folder / "pipe")
         (folder / "locked").touch(mode=0)
-
-
-def _parser(verb: str) -> Parser:
-    parser = Parser(verb, "")
-    import_module(f"pyharness.cli.verbs.{verb}").declare(parser)
-    return parser
 
 
 def _usual(random: Random, verb: str) -> list[str]:

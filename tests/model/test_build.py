@@ -15,19 +15,15 @@ ROOT = Path(__file__).parent.parent.parent
 LIBRARIES = ("gfortran", "quadmath", "flang", "FortranRuntime", "ifcore", "imf")
 
 
-def _dependencies(path: str) -> str:
-    """Return the names of the libraries that a binary asks the loader for."""
-    command = ["otool", "-L", path] if sys.platform == "darwin" else ["readelf", "-d", path]
-    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
-    if sys.platform == "darwin":
-        return "\n".join(lines[1:])
-    return "\n".join(line for line in lines if "NEEDED" in line)
-
-
 @pytest.mark.external
 @pytest.mark.skipif("-fcheck" in (build().flags or ""), reason="run-time checks have messages")
 def test_extension_needs_no_fortran_library_at_run_time() -> None:
-    needed = _dependencies(extension.extension().__file__ or "")
+    on_mac = sys.platform == "darwin"
+    command = ["otool", "-L"] if on_mac else ["readelf", "-d"]
+    command.append(extension.extension().__file__ or "")
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()[1:]
+    needed = "\n".join(line for line in lines if on_mac or "NEEDED" in line)
     assert "lib" in needed
     for library in LIBRARIES:
         assert library not in needed
@@ -73,14 +69,12 @@ def test_setup_that_can_not_go_on_says_what_to_do(
     tools = tmp_path / "bin"
     tools.mkdir()
     for tool in ("sh", "id", "mkdir", "rm", "grep", "tail", "env"):
-        found = shutil.which(tool)
-        assert found is not None
-        (tools / tool).symlink_to(found)
+        (tools / tool).symlink_to(shutil.which(tool) or "")
     environment = {"PATH": str(tools), "INSTALL": "no", "HOME": os.environ.get("HOME", "/")}
+    command = [str(ROOT / ".ci/setup"), python, compiler]
     done = subprocess.run(
-        [str(ROOT / ".ci/setup"), python, compiler],
-        cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1
     assert words in done.stderr
     assert "meson" not in done.stderr

@@ -39,12 +39,7 @@ def test_every_key_of_a_scene_file_is_read(tmp_path: Path) -> None:
         name="spinning brick",
         omega=(0.0, 1.0, 1.0),
         moments=(40.0, 30.0, 20.0),
-        torque=TorqueLaw(
-            (1.0, 2.0, 3.0),
-            (0.0, 0.0, 1.0),
-            (((1.0, 0.0, 0.0), 100.0),),
-            (((0.0, 1.0, 0.0), 100.0),),
-        ),
+        torque=TorqueLaw((1, 2, 3), (0, 0, 1), [((1, 0, 0), 100)], [((0, 1, 0), 100)]),
         step_size=0.02,
         steps=7,
     )
@@ -107,20 +102,14 @@ def test_bad_scene_file_is_one_line_that_says_what_and_where(text: str, tmp_path
 
 
 def test_files_that_are_no_scene(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="No such file"):
-        read_scene(tmp_path / "missing.toml")
-    with pytest.raises(InputError, match="directory"):
-        read_scene(tmp_path)
-    binary = tmp_path / "binary.toml"
-    binary.write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(InputError, match="not UTF-8"):
-        read_scene(binary)
-    large = tmp_path / "large.toml"
-    large.write_bytes(b"#" * 1_000_001)
-    with pytest.raises(InputError, match="larger than"):
-        read_scene(large)
-    with pytest.raises(InputError, match="null"):
-        read_scene("a\0b")
+    path = tmp_path / "x.toml"
+    for content, words in ((b"\xff\xfe\x00\x01", "not UTF-8"), (b"#" * 1_000_001, "larger than")):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=words):
+            read_scene(path)
+    for other, words in (("missing", "No such file"), (".", "directory"), ("a\0b", "null")):
+        with pytest.raises(InputError, match=words):
+            read_scene(tmp_path / other)
 
 
 def test_cases_are_those_of_table_1() -> None:

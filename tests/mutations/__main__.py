@@ -13,6 +13,7 @@ import zlib
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 
@@ -43,10 +44,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.page:
         print(page(table), end="")
         return 0
-    if options.list:
-        for row in asked:
-            print(f"{row.id:60} {row.killer or row.lives or 'not yet tried'}")
-        return 0
     begin = time.perf_counter()
     processes = Processes()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
@@ -56,8 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted: the checkout is as it was", file=sys.stderr)
         return 130
-    seconds = time.perf_counter() - begin
-    return _score(asked, verdicts, seconds)
+    return _score(verdicts, time.perf_counter() - begin)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -68,14 +64,8 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--survivors", choices=("skip", "near", "all"), default="near",
         help="what rows with a reason to live are tried with (default: the tests near to them)",
     )  # fmt: skip
-    parser.add_argument(
-        "--reach", choices=("killer", "near", "all"), default="all",
-        help="how far to go where what caught a row before does not (default: all)",
-    )  # fmt: skip
     parser.add_argument("--all-checks", action="store_true", help="forget what caught them before")
-    parser.add_argument("--untried", action="store_true", help="only rows that nothing caught yet")
     parser.add_argument("--update", action="store_true", help="write down what caught each")
-    parser.add_argument("--list", action="store_true", help="show the table and end")
     parser.add_argument("--page", action="store_true", help="show the score of the record and end")
     parser.add_argument("--ci", action="store_true", help="four rows, for the gate")
     return parser.parse_args(arguments)
@@ -85,11 +75,11 @@ def _all(
     asked: list[Row], options: argparse.Namespace, folder: Path, processes: Processes
 ) -> list[Verdict]:
     """Try them, some side by side; one job begins with what is compiled, the next with the rest."""
-    if options.untried:
-        asked = [row for row in asked if row.killer is None]
+    if options.all_checks:
+        asked = [replace(row, killer=None) for row in asked]
     # In an order that has nothing to do with the outcome: those tried first are a fair sample.
     queue = deque(sorted(asked, key=lambda row: (not row.compiled, zlib.crc32(row.id.encode()))))
-    known = [] if options.all_checks else [row.killer for row in asked if row.killer]
+    known = [row.killer for row in asked if row.killer]
     unchanged = Tree(folder / "unchanged", processes)
     lock = Lock()
     verdicts: list[Verdict] = []
@@ -105,8 +95,7 @@ def _all(
                     return
                 row = queue.popleft() if job % 2 == 0 else queue.pop()
             begin = time.perf_counter()
-            reach = options.survivors if row.lives and options.reach == "all" else options.reach
-            killer = attempt(tree, unchanged, row, reach, not options.all_checks)
+            killer = attempt(tree, unchanged, row, options.survivors if row.lives else "all")
             verdict = Verdict(row, killer, time.perf_counter() - begin)
             with lock:
                 verdicts.append(verdict)
@@ -138,7 +127,7 @@ def _say(verdict: Verdict) -> None:
     print(what, flush=True)
 
 
-def _score(asked: list[Row], verdicts: list[Verdict], seconds: float) -> int:
+def _score(verdicts: list[Verdict], seconds: float) -> int:
     caught = sum(v.killer is not None for v in verdicts)
     alive = [v.row.id for v in verdicts if v.killer is None and v.row.lives is None]
     print(

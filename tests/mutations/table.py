@@ -13,28 +13,15 @@ REASONS = ("equivalent: ", "harmless: ", "open: ")
 
 @dataclass(frozen=True)
 class Row:
-    """A change.
+    """A change."""
 
-    Attributes
-    ----------
-    id : str
-        The file without its ending, and a name.
-    file : str
-        Relative to the checkout.
-    old, new : str
-        What stands there, exactly once, and what is put in its place.
-    lives : str or None
-        Why nothing catches it: one of REASONS, and the reason.
-    killer : str or None
-        The check that caught it: a test by pytest's name, or `verify` and the name of a check;
-        "time-out " before it where it never ended.
-    """
-
-    id: str
-    file: str
-    old: str
+    id: str  # the file without its ending, and a name
+    file: str  # relative to the checkout
+    old: str  # stands there exactly once
     new: str
-    lives: str | None = None
+    lives: str | None = None  # why nothing catches it: one of REASONS, and the reason
+    # The check that caught it: a test by pytest's name, or `verify` and the name of a check;
+    # "time-out " before it where it never ended.
     killer: str | None = None
 
     @property

@@ -107,7 +107,12 @@ class Tree:
         """Make the change; return what the compiler said where it does not take it."""
         path = self.folder / row.file
         path.write_text(row.applied(path.read_text()))
-        return self._changed(row)
+        if row.compiled:
+            self._stale = True
+            return self._compile()
+        self._forget(row)
+        self.ready()
+        return None
 
     def restore(self, row: Row) -> None:
         """Take the change back; what is compiled is built when it is next asked for."""
@@ -122,14 +127,6 @@ class Tree:
         if self._stale and (said := self._compile()):
             raise RuntimeError(said)
         self._stale = False
-
-    def _changed(self, row: Row) -> str | None:
-        if row.compiled:
-            self._stale = True
-            return self._compile()
-        self._forget(row)
-        self.ready()
-        return None
 
     def _forget(self, row: Row) -> None:
         # Two texts of one length within a second look the same to Python.

@@ -30,34 +30,33 @@ def test_random_unsymmetric_systems(n: int) -> None:
         np.testing.assert_allclose(x, np.linalg.solve(a, b), rtol=0, atol=bound * np.abs(x).max())
 
 
-def test_singular_matrix_leaves_the_right_hand_sides() -> None:
+@pytest.mark.parametrize(
+    "a",
+    [
+        [[1.0, 2.0], [2.0, 4.0]],
+        [[0.0, 0.0], [1.0, 1.0]],
+        [[1.0, 1e-17], [1.0, 0.0]],
+        # n + pivot must differ from n = 2, whose neighbour above is 4.4e-16 away.
+        [[1.0, 1.0], [1.0, 1.0 + 2.220446049250313e-16]],
+    ],
+    ids=range(4),
+)
+def test_singular_matrix_leaves_the_right_hand_sides(a: list[list[float]]) -> None:
     b = np.array([[1.0, 2.0], [3.0, 4.0]])
-    for a in ([[1.0, 2.0], [2.0, 4.0]], [[0.0, 0.0], [1.0, 1.0]], [[1.0, 1e-17], [1.0, 0.0]]):
-        x, ier = _both(np.array(a), b)
-        assert ier == SINGULAR
-        np.testing.assert_array_equal(x, b)
+    x, ier = _both(np.array(a), b)
+    assert ier == SINGULAR
+    np.testing.assert_array_equal(x, b)
 
 
 def test_small_pivot_just_above_the_working_precision_is_not_singular() -> None:
-    # n + pivot must differ from n = 2, whose neighbour above is 4.4e-16 away.
-    _, ier = _both(np.array([[1.0, 1.0], [1.0, 1.0 + 1e-15]]), np.ones((2, 1)))
-    assert ier == 0
-    _, ier = _both(np.array([[1.0, 1.0], [1.0, 1.0 + 2.220446049250313e-16]]), np.ones((2, 1)))
-    assert ier == SINGULAR
+    assert _both(np.array([[1.0, 1.0], [1.0, 1.0 + 1e-15]]), np.ones((2, 1)))[1] == 0
 
 
-def test_rows_are_scaled_before_the_pivot_is_chosen() -> None:
+def test_rows_are_scaled_and_the_first_of_equal_maxima_is_the_pivot() -> None:
     """Without scaling row 2 would be the pivot, and the small solution would be lost."""
-    a = np.array([[1.0, 1.0], [1e10, 1e25]])
-    x, ier = _both(a, np.array([[2.0], [1e25]]))
-    assert ier == 0
+    x, _ = _both(np.array([[1.0, 1.0], [1e10, 1e25]]), np.array([[2.0], [1e25]]))
     np.testing.assert_allclose(x[:, 0], [1.0, 1.0], rtol=1e-14)
-
-
-def test_first_of_equal_maxima_is_the_pivot() -> None:
-    """Equal candidates: no exchange; the factors show which row was taken."""
-    factors, _, ier = extension().solve_linear(
-        np.asfortranarray([[3.0, 1.0], [-3.0, 2.0]]), np.asfortranarray([[1.0], [1.0]])
-    )
-    assert ier == 0
+    # No exchange of equal candidates: the factors show which row was taken.
+    equal = np.asfortranarray([[3.0, 1.0], [-3.0, 2.0]])
+    factors, _, _ = extension().solve_linear(equal, np.ones((2, 1), order="F"))
     np.testing.assert_array_equal(factors, [[3.0, 1.0], [-1.0, 3.0]])

@@ -2,14 +2,12 @@
 
 A record is one file for each command: its exit code, what it prints (JSON wherever a verb has it,
 with sorted keys), and the digests of the files that it writes. What times are, and with what the
-extension was built, is left out. A comparison lists every difference, and those that the renames
-of `renames.toml` explain apart from the rest; 1 where there are others.
+extension was built, is left out. A comparison lists every difference; 1 where there is one.
 """
 
 import hashlib
 import json
 import os
-import re
 import shlex
 import subprocess
 import sys
@@ -98,27 +96,15 @@ def _steady(value: Any) -> Any:
 
 
 def _compare(before: Path, after: Path) -> int:
-    renames = tomllib.loads((HERE / "renames.toml").read_text())
-    strange = 0
+    wrong = []
     for name in sorted({path.stem for each in (before, after) for path in each.glob("*.json")}):
         old, new = (_leaves(each / f"{name}.json") for each in (before, after))
-        known = {
-            _renamed(_renamed(key, renames["keys"]), renames["texts"]): text
-            for key, text in old.items()
-        }
-        wrong = []
-        for key in known.keys() | new.keys():
-            one, other = (each.get(key, "absent") for each in (known, new))
-            # A longer word moves the columns of a table.
-            if _words(_renamed(one, renames["texts"])) != _words(other):
-                wrong.append(f"{name}: {key}: {one} -> {other}")
-        renamed = sum(old.get(key) != text for key, text in new.items()) - len(wrong)
-        if renamed > 0:
-            print(f"{name}: {renamed} differences that are renames")
-        print("".join(f"{each}\n" for each in sorted(wrong)), end="")
-        strange += len(wrong)
-    print(f"{strange} differences that no rename explains")
-    return 1 if strange else 0
+        for key in sorted(old.keys() | new.keys()):
+            one, other = (each.get(key, "absent") for each in (old, new))
+            if one != other:
+                wrong.append(f"{name}: {key}: {one} -> {other}\n")
+    print("".join(wrong), end=f"{len(wrong)} differences\n")
+    return 1 if wrong else 0
 
 
 def _leaves(path: Path) -> dict[str, str]:
@@ -132,16 +118,6 @@ def _walk(place: str, value: Any) -> Iterator[tuple[str, str]]:
             yield from _walk(f"{place}/{key}", each)
     else:
         yield place, json.dumps(value, ensure_ascii=False)
-
-
-def _renamed(text: str, renames: list[list[str]]) -> str:
-    for old, new in renames:
-        text = re.sub(old, new, text)
-    return text
-
-
-def _words(text: str) -> list[str]:
-    return text.replace("-" * 3, " ").split()
 
 
 if __name__ == "__main__":

@@ -48,8 +48,8 @@ TWIN_PLANTS = {
     ),
     "half a step": ("runge-kutta", "runge_kutta.py", "(dt / 6.0)", "(dt / 12.0)", True),
     "half an interval": (
-        "four-term", "four_term.py", "interval(state, points, h,", "interval(state, points, h / 2,",
-        True,
+        "four-term", "collocation.py", "interval(state, points, h,",
+        "interval(state, points, h / 2,", True,
     ),
     "a collocation point": ("two-term", "two_term.py", "2.0 * dt / 3.0", "2.1 * dt / 3.0", False),
     "one unit in the last place of a point": (

@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from pyharness.cli.main import main
 from pyharness.views import pictures as plots
+from tests.conftest import Printed
 
 pytest.importorskip("matplotlib")
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Capture = pytest.CaptureFixture[str]
+
+BODY = "[body]\nmoments=[3,2,1]\n[initial]\nomega=[0.1,1,0.2]\n"
 
 
 @pytest.fixture
@@ -43,44 +44,36 @@ def _ends(figure: "Figure") -> list[tuple[int, float, float]]:
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    "options",
     [
-        ["--case", "5", "--method", "auto"],
-        ["--case", "5", "--method", "taylor", "--times", "1"],
-        ["--case", "2", "--program", "runge-kutta"],
-        ["--case", "6", "--program", "two-term"],
+        "--case 5 --method auto",
+        "--case 5 --method taylor --times 1",
+        "--case 2 --program runge-kutta",
+        "--case 6 --program two-term",
+        "--scene long.toml --method auto",
     ],
 )
-def test_title_is_within_the_picture(arguments: list[str], drawn: "list[Figure]") -> None:
-    assert main(["run", *arguments, "--plot", "x.png", "--out", "x.txt"]) == 0
+def test_title_is_within_the_picture(options: str, drawn: "list[Figure]", printed: Printed) -> None:
+    Path("long.toml").write_text(f'name = "{"very " * 2000}"\n{BODY}')
+    printed(f"run {options} --plot x.png --out x.txt")
     box = drawn[0].texts[0].get_window_extent()
     assert box.x0 >= 0.0
     assert box.x1 <= drawn[0].bbox.x1
     assert max(axes.bbox.y1 for axes in drawn[0].axes) <= box.y0
-
-
-def test_name_of_any_length_leaves_room(drawn: "list[Figure]", tmp_path: Path) -> None:
-    path = tmp_path / "long.toml"
-    name = "very " * 2000
-    path.write_text(f'name = "{name}"\n[body]\nmoments=[3,2,1]\n[initial]\nomega=[0.1,1,0.2]\n')
-    assert main(["run", "--scene", str(path), "--method", "auto", "--plot", "x.png"]) == 0
     assert drawn[0].axes[0].bbox.height > 100.0
 
 
-def test_end_of_a_program_is_marked(drawn: "list[Figure]") -> None:
-    run = ["run", "--case", "2", "--program", "runge-kutta", "--plot", "x.png", "--out", "x.txt"]
-    assert main(run) == 0
+def test_end_of_a_program_is_marked(drawn: "list[Figure]", printed: Printed) -> None:
+    printed("run --case 2 --program runge-kutta --plot x.png --out x.txt")
     assert [(panel, time) for panel, time, _ in _ends(drawn[0])] == [
-        (0, 0.25),
-        (1, 0.25),
-        (2, 0.25),
+        (panel, 0.25) for panel in range(3)
     ]
     assert "x: stopped at step 25 by V2" in drawn[0].texts[0].get_text()
 
 
-def test_end_out_of_view_is_marked_at_the_edge(drawn: "list[Figure]") -> None:
+def test_end_out_of_view_is_marked_at_the_edge(drawn: "list[Figure]", printed: Printed) -> None:
     """Case 6: two-term original overflows at step 57, at 1e111."""
-    assert main(["compare", "--case", "6", "--plot", "x.png", "--out", "x.txt"]) == 0
+    printed("compare --case 6 --plot x.png --out x.txt")
     ends = _ends(drawn[0])
     assert sorted(panel for panel, _, _ in ends) == [0, 2, 3, 5, 6, 8]
     for panel, time, place in ends:
@@ -90,15 +83,15 @@ def test_end_out_of_view_is_marked_at_the_edge(drawn: "list[Figure]") -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    "command",
     [
-        ["run", "--case", "5", "--method", "auto", "--times", "1"],
-        ["run", "--case", "3", "--program", "four-term", "--steps", "1"],
-        ["compare", "--case", "3", "--steps", "1"],
+        "run --case 5 --method auto --times 1",
+        "run --case 3 --program four-term --steps 1",
+        "compare --case 3 --steps 1",
     ],
 )
-def test_one_row_is_a_mark(arguments: list[str], drawn: "list[Figure]") -> None:
-    assert main([*arguments, "--plot", "x.png", "--out", "x.txt"]) == 0
+def test_one_row_is_a_mark(command: str, drawn: "list[Figure]", printed: Printed) -> None:
+    printed(f"{command} --plot x.png --out x.txt")
     for axes in drawn[0].axes:
         lines = [line for line in axes.lines if len(np.asarray(line.get_xdata())) == 1]
         assert lines
@@ -107,11 +100,9 @@ def test_one_row_is_a_mark(arguments: list[str], drawn: "list[Figure]") -> None:
 
 @pytest.mark.parametrize("ending", plots.FORMATS)
 def test_letter_that_the_font_lacks_is_no_warning(
-    ending: str, tmp_path: Path, recwarn: pytest.WarningsRecorder
+    ending: str, tmp_path: Path, recwarn: pytest.WarningsRecorder, printed: Printed
 ) -> None:
     path = tmp_path / "rigid.toml"
-    text = 'name = "\u56de\u8ee2"\n[body]\nmoments=[3,2,1]\n[initial]\nomega=[0.1,1,0.2]\n'
-    path.write_text(text, encoding="utf-8")
-    picture = str(tmp_path / f"x.{ending}")
-    assert main(["run", "--scene", str(path), "--method", "auto", "--plot", picture]) == 0
+    path.write_text(f'name = "\u56de\u8ee2"\n{BODY}', encoding="utf-8")
+    printed(f"run --scene {path} --method auto --plot {tmp_path}/x.{ending}")
     assert [str(each.message) for each in recwarn] == []

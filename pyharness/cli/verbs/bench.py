@@ -13,23 +13,15 @@ from pyharness.model.scene_file import case_numbers
 
 # Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.
 _LONGEST = 1e3
-
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    parser.add_argument("--case", metavar="N", help="one case of Table 1 (default: 2 to 7)")
-    parser.add_argument(
-        "--horizon", metavar="T", help="go to this time, s (default: 3; Cases 3 and 4 also 100)"
-    )
-    parser.add_argument("--methods", metavar="A,B", help="these of ours only, or none")
-    parser.add_argument("--peers", metavar="X,Y", help="these peers or packages only, or none")
-    parser.add_argument(
-        "--plan", action="store_true", help="what each skip of the plan saves, with and without"
-    )
-    parser.add_argument(
-        "--growth", action="store_true", help="error of the Taylor method up to 1e5 s (Cases 3, 4)"
-    )
-    shared.add_output_options(parser)
+OPTIONS = {
+    "--case N": "one case of Table 1 (default: 2 to 7)",
+    "--horizon T": "go to this time, s (default: 3; Cases 3 and 4 also 100)",
+    "--methods A,B": "these of ours only, or none",
+    "--peers X,Y": "these peers or packages only, or none",
+    "--plan": "what each skip of the plan saves, with and without",
+    "--growth": "error of the Taylor method up to 1e5 s (Cases 3, 4)",
+    **shared.outputs(),
+}
 
 
 def run(options: argparse.Namespace) -> int:
@@ -40,9 +32,7 @@ def run(options: argparse.Namespace) -> int:
         shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
         shared.check_outputs(options)
         return _plan(options) if options.plan else _growth(options)
-    known = [str(each) for each in case_numbers()]
-    if options.case is not None and options.case not in known:
-        raise unknown("case", options.case, known, "--case")
+    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
     horizon = None
     if options.horizon is not None:
         horizon = shared.positive(options.horizon, "--horizon", 0.0)

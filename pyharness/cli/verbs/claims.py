@@ -6,21 +6,18 @@ from pyharness.cli import options as shared
 from pyharness.history.claims.ledger import assignments, claim, claims, judge
 from pyharness.history.claims.report import assignments_report, claims_report, explanation
 
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    parser.add_argument("--explain", metavar="ID", help="one claim, with its numbers")
-    parser.add_argument(
-        "--assignments", action="store_true", help="which initial conditions let all claims hold"
-    )
-    shared.add_output_options(parser, plot="")
+OPTIONS = {
+    "--explain ID": "one claim, with its numbers",
+    "--assignments": "which initial conditions let all claims hold",
+    **shared.outputs(plot=""),
+}
 
 
 def run(options: argparse.Namespace) -> int:
     """Judge and show."""
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain",))
-        shared.check_format(options.format, ("table", "json"))
+        shared.check_known("format", options.format, ("table", "json"))
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)
     if options.assignments:

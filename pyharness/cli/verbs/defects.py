@@ -6,12 +6,12 @@ from pyharness.cli import options as shared
 from pyharness.history.ablation import effects_of, entries, entry
 from pyharness.history.apparatus_report import apparatus_report, entry_report
 
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    parser.add_argument("name", nargs="?", metavar="NAME", help="an entry, with its effect")
-    parser.add_argument("--kind", metavar="K", help="only the entries of one kind")
-    shared.add_output_options(parser, ("table", "json"), plot="")
+FORMATS = ("table", "json")
+OPTIONS = {
+    "name NAME": "an entry, with its effect",
+    "--kind K": "only the entries of one kind",
+    **shared.outputs(FORMATS, plot=""),
+}
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,18 +9,14 @@ from pyharness.history.family.report import family_report
 
 _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
-
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    shared.add_scene_options(parser)
-    parser.add_argument("--weighting", metavar="W", help=f"one member: {', '.join(WEIGHTINGS)}")
-    parser.add_argument("--terms", metavar="N", help="one member: powers of t (default 2)")
-    parser.add_argument(
-        "--points", metavar="P", help="one member: thesis, gauss or a,b,... in parts of the step"
-    )
-    parser.add_argument("--corrections", metavar="K", help="one member: corrections (default 1)")
-    shared.add_output_options(parser, plot="")
+OPTIONS = {
+    **shared.SCENE,
+    "--weighting W": f"one member: {', '.join(WEIGHTINGS)}",
+    "--terms N": "one member: powers of t (default 2)",
+    "--points P": "one member: thesis, gauss or a,b,... in parts of the step",
+    "--corrections K": "one member: corrections (default 1)",
+    **shared.outputs(plot=""),
+}
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,12 +6,11 @@ from pyharness.cli import options as shared
 from pyharness.history import figures as room
 from pyharness.model.errors import InputError
 
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    parser.add_argument("--out", metavar="DIR", help="folder for SVG, PNG and CSV; made if missing")
-    parser.formats = ("table", "json")
-    parser.add_argument("--format", metavar="F", help="table (default) or json: of what was drawn")
+FORMATS = ("table", "json")
+OPTIONS = {
+    "--out DIR": "folder for SVG, PNG and CSV; made if missing",
+    "--format F": "table (default) or json: of what was drawn",
+}
 
 
 def run(options: argparse.Namespace) -> int:

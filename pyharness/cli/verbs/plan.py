@@ -6,27 +6,22 @@ from pyharness.cli import options as shared
 from pyharness.methods.plan import plan
 from pyharness.methods.prepared import PREPARED
 from pyharness.methods.report import plan_report
-from pyharness.model.errors import unknown
 
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    shared.add_scene_options(parser)
-    parser.add_argument("--method", metavar="M", help="auto (default), or a name")
-    parser.add_argument("--tolerance", metavar="E", help="relative (default 1e-12)")
-    parser.add_argument("--velocity", action="store_true", help="the velocity is wanted too")
-    parser.add_argument(
-        "--rows", action="store_true", help="results on the way are wanted too, as in run"
-    )
-    shared.add_output_options(parser, plot="")
+OPTIONS = {
+    **shared.SCENE,
+    "--method M": "auto (default), or a name",
+    "--tolerance E": "relative (default 1e-12)",
+    "--velocity": "the velocity is wanted too",
+    "--rows": "results on the way are wanted too, as in run",
+    **shared.outputs(plot=""),
+}
 
 
 def run(options: argparse.Namespace) -> int:
     """Show the decisions for a scene."""
     scene = shared.chosen_scene(options)
     method = options.method or "auto"
-    if method not in PREPARED:
-        raise unknown("method", method, PREPARED, "--method")
+    shared.check_known("method", method, tuple(PREPARED))
     tolerance = shared.positive(options.tolerance, "--tolerance", 1e-12)
     shared.check_outputs(options)
     found = plan(scene, method, tolerance, options.velocity, options.rows)

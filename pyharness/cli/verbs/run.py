@@ -5,32 +5,26 @@ import sys
 
 from pyharness.cli import options as shared
 from pyharness.methods.report import trajectory_report
-from pyharness.model.errors import InputError, unknown
+from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
+from pyharness.original.programs import IMPLEMENTATIONS, run_program
 
 # What only a program wrote: its printer page, and its tape.
 PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
-
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    shared.add_scene_options(parser)
-    parser.add_argument("--program", metavar="P", help=", ".join(PROGRAMS))
-    parser.add_argument("--implementation", metavar="I", help="fortran (default) or python")
-    parser.add_argument("--method", metavar="M", help="a method in place of a program")
-    shared.add_listing_options(parser)
-    parser.add_argument(
-        "--times", metavar="T1,T2,...", help="where results are wanted, s (methods)"
-    )
-    parser.add_argument(
-        "--tolerance", metavar="E", help="error at these times over the largest |omega| (methods)"
-    )
-    shared.add_effort_option(parser)
-    shared.add_output_options(parser, FORMATS)
+OPTIONS = {
+    **shared.SCENE,
+    "--program P": ", ".join(PROGRAMS),
+    "--implementation I": "fortran (default) or python",
+    "--method M": "a method in place of a program",
+    **shared.LISTING,
+    "--times T1,T2,...": "where results are wanted, s (methods)",
+    "--tolerance E": "error at these times over the largest |omega| (methods)",
+    **shared.EFFORT,
+    **shared.outputs(FORMATS),
+}
 
 
 def run(options: argparse.Namespace) -> int:
@@ -84,17 +78,11 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     shared.refuse(options, "--program", ("times", "tolerance"))
     listing = shared.chosen_listing(options)
     name = listing.program
-    if name != "runge-kutta":
-        shared.refuse(options, f"--program {name}", ("lipschitz", "no_stop"))
-    if options.no_stop:
-        shared.refuse(options, "--no-stop", ("lipschitz",))
+    lipschitz = shared.chosen_lipschitz(options)
     implementation = options.implementation or "fortran"
-    if implementation not in IMPLEMENTATIONS:
-        raise unknown("implementation", implementation, IMPLEMENTATIONS, "--implementation")
-    lipschitz = shared.positive(options.lipschitz, "--lipschitz", shared.default_lipschitz())
+    shared.check_known("implementation", implementation, IMPLEMENTATIONS)
     shared.check_outputs(options)
-    program = PROGRAM_REGISTRY[name]
-    trajectory = program.run(
+    trajectory = run_program(
         scene,
         listing,
         implementation,
@@ -114,8 +102,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     listing_options = ("implementation", "listing", "fix", "keep", "reading", "lipschitz")
     shared.refuse(options, "--method", (*listing_options, "no_stop"))
     name = options.method
-    if name not in METHODS:
-        raise unknown("method", name, METHODS, "--method")
+    shared.check_known("method", name, tuple(METHODS))
     default = max(1e-9, METHODS[name].finest)
     tolerance = shared.positive(options.tolerance, "--tolerance", default)
     times = scene.times()

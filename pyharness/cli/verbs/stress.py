@@ -9,25 +9,16 @@ from pyharness.stress.run import TRIALS, Outcome, stress, trial, worst
 
 FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
-
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    parser.add_argument(
-        "--only", metavar="ID,...", help=f"trials, or checks by name: {', '.join(TRIALS)}"
-    )
-    parser.add_argument(
-        "--save", metavar="DIR", help="where the worst inputs go, as scene files (default: worst)"
-    )
-    shared.add_output_options(parser, FORMATS, plot="draw one trial")
+OPTIONS = {
+    "--only ID,...": f"trials, or checks by name: {', '.join(TRIALS)}",
+    "--save DIR": "where the worst inputs go, as scene files (default: worst)",
+    **shared.outputs(FORMATS, plot="draw one trial"),
+}
 
 
 def run(options: argparse.Namespace) -> int:
     """Try and show; 1 where a bound does not hold."""
-    only = shared.names(options.only)
-    for each in only:
-        if each.partition("/")[0] not in TRIALS:
-            raise unknown("trial", each.partition("/")[0], TRIALS, "--only")
+    only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
         raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")
     shared.check_outputs(options)

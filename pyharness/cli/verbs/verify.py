@@ -6,7 +6,7 @@ from pathlib import Path
 from pyharness.cli import options as shared
 from pyharness.compare.checks import Check
 from pyharness.compare.checks_report import checks_report, samples, summary
-from pyharness.model.errors import InputError, unknown
+from pyharness.model.errors import InputError
 from pyharness.verify.kinds import KINDS, verify
 from pyharness.verify.random_methods import ROUNDING
 from pyharness.verify.selection import DRAWS, RECORD, Selection
@@ -14,28 +14,16 @@ from pyharness.verify.selection import DRAWS, RECORD, Selection
 FORMATS = ("table", "json", "junit")
 # Options that no other kind looks at.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
-
-
-def declare(parser: shared.Parser) -> None:
-    """Declare the options."""
-    parser.add_argument(
-        "--only", metavar="ID,...", help=f"kinds, or checks by name: {', '.join(KINDS)}"
-    )
-    parser.add_argument("--seed", metavar="S", help="of the random draws (default: the week)")
-    parser.add_argument("--draws", metavar="N", help=f"random draws (default {DRAWS})")
-    parser.add_argument(
-        "--external", metavar="FILE", help="a file of published figures, these alone"
-    )
-    parser.add_argument(
-        "--self-test",
-        action="store_true",
-        help="plant faults, and report which check catches which",
-    )
-    parser.add_argument("--update", action="store_true", help="write the golden record anew")
-    parser.add_argument(
-        "--record", metavar="DIR", help="the golden record (default: the checkout's)"
-    )
-    shared.add_output_options(parser, FORMATS, plot="")
+OPTIONS = {
+    "--only ID,...": f"kinds, or checks by name: {', '.join(KINDS)}",
+    "--seed S": "of the random draws (default: the week)",
+    "--draws N": f"random draws (default {DRAWS})",
+    "--external FILE": "a file of published figures, these alone",
+    "--self-test": "plant faults, and report which check catches which",
+    "--update": "write the golden record anew",
+    "--record DIR": "the golden record (default: the checkout's)",
+    **shared.outputs(FORMATS, plot=""),
+}
 
 
 def run(options: argparse.Namespace) -> int:
@@ -89,9 +77,7 @@ def _selection(options: argparse.Namespace) -> Selection:
             raise InputError(f"--only {options.only}: with --external, external/... is allowed")
         problems = [read_problem(options.external)]
         only = only or ["external"]
-    for each in only:
-        if each.partition("/")[0] not in KINDS:
-            raise unknown("kind", each.partition("/")[0], KINDS, "--only")
+    shared.chosen_names(options.only, "kind", tuple(KINDS))
     for kind, names in _OF_ONE_KIND.items():
         if only and not any(each.partition("/")[0] == kind for each in only):
             shared.refuse(options, f"--only {options.only}", names)

@@ -36,15 +36,7 @@ _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 @dataclass(frozen=True)
 class Probe:
-    """What was found, what was derived, and how far rounding may part them.
-
-    Attributes
-    ----------
-    found, derived : ndarray
-        Of one shape.
-    limit : float
-        Of the largest difference.
-    """
+    """What was found, what was derived, and how far rounding may part any two elements of them."""
 
     found: Array
     derived: Array
@@ -102,11 +94,8 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Follow a disturbance of a spinning top through the steps of a scene.
 
-    Parameters
-    ----------
-    scene : Scene
-        C and the torque zero, omega3 the spin and the others the disturbance: its equations are
-        linear, so that no disturbance is too large.
+    C and the torque are zero, omega3 the spin and the others the disturbance: the equations are
+    linear, so that no disturbance is too large.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -119,9 +108,9 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
         norms.append(float(np.abs(power).sum(axis=1).max()))
         sizes.append(float(np.abs(state).max()))
         state, power = one @ state, one @ power
-    moved = float(scene.steps) if listing.has("dt-accumulates") else 1.0
-    spin = abs(scene.omega[2])
-    unit = float(_units(scene, listing.program, np.array([1.0, 1.0, spin]), moved)[:2].max())
+    top = np.array([1.0, 1.0, abs(scene.omega[2])])
+    moved = _moved(listing, scene.steps)
+    unit = float(_units(scene, listing.program, top, moved)[:2].max())
     total = sum(n * s for n, s in zip(reversed(norms), sizes, strict=True))
     return Probe(found, state[-2:], ROUNDING * unit * total)
 
@@ -129,7 +118,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Run the twin's step on x' = z x, as in step number `step` of a run of steps of 1 s."""
     program = listing.program
-    moved = float(step) if listing.has("dt-accumulates") else 1.0
+    moved = _moved(listing, step)
 
     def rates(k: int, x: Sequence[float]) -> list[float]:
         return [z * each for each in x]  # type: ignore[misc]
@@ -139,8 +128,8 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     _, varying = solver_roundings(program)
     weights = _WEIGHTS[program]
     rate = abs(z) * (1.0 + moved * abs(z))
-    units = _LONGEST * (1.0 + weights * rate)
-    units += varying * (rate + weights * moved * abs(z) ** 2)
+    carried = varying * (rate + weights * moved * abs(z) ** 2)
+    units = _LONGEST * (1.0 + weights * rate) + carried
     return Probe(np.array([found]), np.array([derived]), ROUNDING * units)
 
 
@@ -178,6 +167,11 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     return Probe(np.array([high]), np.array([expected]), 2.0 * ROUNDING * unit / slope)
 
 
+def _moved(listing: Listing, step: int) -> float:
+    """Return how many steps from its beginning the points of a step are."""
+    return float(step) if listing.has("dt-accumulates") else 1.0
+
+
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     """Differentiate a step of the twin of a collocation program where the body is not steady.
 
@@ -185,7 +179,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     where the points are.
     """
     program, h = listing.program, scene.step_size
-    moved = float(step) if listing.has("dt-accumulates") else 1.0
+    moved = _moved(listing, step)
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
 
     def rates(k: int, x: Sequence[float]) -> list[float]:
@@ -197,23 +191,17 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[program] // 2)
     units = _units(scene, program, np.abs(np.array(scene.omega)) + reach, moved)
-    derived = _moving(scene, float(weight_of_squares(listing, step)))
-    return Probe(found, derived, amplified * ROUNDING * float(units.max()))
-
-
-def _moving(scene: Scene, weight: float) -> Array:
-    h, omega = scene.step_size, np.array(scene.omega)
-    a = np.array(scene.euler_coefficients)
+    a, omega = np.array(coefficients), np.array(scene.omega)
 
     def along(direction: Array) -> Array:
         """Return the derivative of equations 13-15 at `direction`, a matrix."""
         x, y, z = direction
         return np.asarray(a[:, None] * np.array([[0.0, z, y], [z, 0.0, x], [y, x, 0.0]]))
 
-    rate = np.array(scene.right_hand_side()(0.0, scene.omega))
-    j, along_rate = along(omega), along(rate)
-    third = weight * h**3 * (along_rate @ j)
-    return np.asarray(np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third)
+    j, along_rate = along(omega), along(np.array(scene.right_hand_side()(0.0, scene.omega)))
+    third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
+    derived = np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third
+    return Probe(found, derived, amplified * ROUNDING * float(units.max()))
 
 
 def _differentiated(
@@ -225,11 +213,10 @@ def _differentiated(
     spread = reach / count
     weights = [float(each) for each in spacing(count)]
     columns = []
-    for axis in range(3):
+    for axis in np.eye(3):
         total = np.zeros(3)
         for i, weight in enumerate(weights, 1):
-            away = np.zeros(3)
-            away[axis] = i * spread
+            away = i * spread * axis
             total += weight * (stepped(base + away) - stepped(base - away))
         columns.append(total / spread)
     return np.array(columns).T, reach, 2.0 * sum(map(abs, weights)) / spread

@@ -18,17 +18,11 @@ _SAMPLES = 20_000
 
 @dataclass(frozen=True)
 class Divergence:
-    """The smallest steps that diverge.
+    """The smallest steps that diverge (s): found, and foretold by linear stability.
 
-    Attributes
-    ----------
-    found : float
-        Smallest step (s) with which some omega leaves twice the bound of the solution, or
-        overflows; 0 where the smallest one tried does.
-    foretold : float
-        Where the wobble about axis 3 doubles by linear stability (s).
-    limit : float
-        How far the two may be apart, relative to `foretold`.
+    Found is the smallest with which some omega leaves twice the bound of the solution, or
+    overflows, 0 where the smallest one tried does; foretold the one with which the wobble about
+    axis 3 doubles; `limit` is how far they may be apart, relative to that.
     """
 
     found: float
@@ -41,18 +35,8 @@ def divergence(
 ) -> Divergence:
     """Compare where runs of a spinning body diverge with where they should.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without torque, spinning about a stable axis 3.
-    time : float
-        How long (s).
-    matrix : Amplification
-        Of the method's step.
-    runner : callable
-        Runs a scene in its own steps.
-    smallest : float
-        Smallest step (s) to try.
+    The scene is without torque, and spins about a stable axis 3 for `time` (s); `matrix` is that
+    of the step of the method by which `runner` runs a scene; `smallest` (s) is tried.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -77,8 +61,7 @@ def divergence(
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step (s) with which a run leaves twice the solution's bound.
 
-    By bisection of the number of steps; 0 where `smallest` leaves it too, infinity where none
-    does.
+    By bisection of the number of steps; 0 if `smallest` leaves it too, infinity if none does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

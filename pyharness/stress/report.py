@@ -40,31 +40,29 @@ def _table(checks: Sequence[Check]) -> Table:
     for name, members in groups.items():
         judged = [check for check in members if check.limit is not None]
         failed = sum(not check.passed for check in members)
-        worst = max(judged, key=severity, default=None)
-        if worst is None:
-            worst = max(members, key=lambda check: _size(check.value))
-        share = None if worst.limit is None else severity(worst)[1]
+        worst = max(judged, key=severity) if judged else max(members, key=_size)
+        share = severity(worst)[1] if judged else None
         where = "/".join(worst.id.split("/")[2:]) or None
-        numbers = (share, worst.value, worst.limit)
-        rows.append([name, len(members), failed, len(judged), *numbers, where])
+        rows.append(
+            [name, len(members), failed, len(judged), share, worst.value, worst.limit, where]
+        )
     return Table(_COLUMNS, rows)
 
 
 def _picture(trial: Trial, checks: Sequence[Check]) -> Picture:
+    from pyharness.stress import pictures
+
     if trial.name == "regions":
-        from pyharness.stress.region_picture import regions_picture
         from pyharness.theory.regions import regions
 
-        return regions_picture(regions())
+        return pictures.regions_picture(regions())
     if trial.name == "length":
-        from pyharness.stress.length_picture import length_picture
         from pyharness.stress.trials.length import curves
 
-        return length_picture(list(curves()))
-    from pyharness.stress.pictures import stress_picture
-
-    return stress_picture(trial, checks)
+        return pictures.length_picture(list(curves()))
+    return pictures.stress_picture(trial, checks)
 
 
-def _size(value: float | None) -> float:
+def _size(check: Check) -> float:
+    value = check.value
     return -1.0 if value is None else value if value == value else float("inf")

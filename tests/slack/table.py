@@ -4,47 +4,34 @@ What a limit promises is written down here once more, from its words and not fro
 that becomes looser lets its plant pass, one that becomes too tight fails what lies within.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
 
 from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
+from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
-from tests.slack.plants import (
-    ULP,
-    Slack,
-    U,
-    beside,
-    bit_off,
-    counted_off,
-    crossing_off,
-    cut,
-    ended,
-    exact,
-    form_for_all,
-    gives_up,
-    graded,
-    instead,
-    last_off,
-    linear,
-    near,
-    of_order,
-    off,
-    on,
-    other_library,
-    probe_off,
-    quotient_off,
-    refuses,
-    roundings,
-    shorter,
-    singular,
-    solved,
-    some_bits,
-    stop_test,
-    value_off,
-    watched,
-    without,
-)
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original.linear_solver import SINGULAR
+from pyharness.stress.trials import length, step_size
+from pyharness.theory import brouwer
+from pyharness.truth.reference import Reference, reference
+from pyharness.verify.plants.plants import changed, instead
+
+# Half a unit in the last place of 1, and a whole one.
+U = 2.0**-53
+ULP = 2.0 * U
 
 _RUN = "pyharness.original.programs.Program.run"
 _COMPILED = "pyharness.original.compiled.run"
@@ -58,6 +45,277 @@ _TURNED = "pyharness.stress.trials.invariance"
 _REGIONS = "pyharness.stress.trials.regions"
 _STEPS = "pyharness.stress.trials.step_size"
 _MATRICES = "pyharness.stress.trials.matrices"
+
+Plant = Callable[[float], AbstractContextManager[Any]]
+
+
+@dataclass(frozen=True)
+class Slack:
+    """A limit of the check that is asked for, between two plants.
+
+    With what is measured wrong by `beyond` it fails, or `failing` where that is another, and with
+    `within` it passes.
+    """
+
+    check: str
+    planted: Plant
+    beyond: float
+    within: float
+    failing: str = ""
+
+
+def near(check: str, planted: Plant, due: float) -> Slack:
+    """Return a limit that is `due`, of an error that adds to what there is."""
+    return Slack(check, planted, 1.5 * due, 0.75 * due)
+
+
+def exact(check: str, planted: Plant, least: float = 1.0, failing: str = "") -> Slack:
+    """Return a limit of nothing at all: the least there can be fails."""
+    return Slack(check, planted, least, 0.0, failing)
+
+
+# What is planted: `change(found, size)`.
+
+
+def off(found: Any, size: float) -> Any:
+    """Let every omega be larger by a part of the largest."""
+    if not isinstance(found, np.ndarray):
+        return replace(found, omega=off(found.omega, size))
+    return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
+
+
+def last_off(found: Trajectory, size: float) -> Trajectory:
+    """As `off`, in the last row alone."""
+    return replace(found, omega=np.vstack([found.omega[:-1], off(found.omega[-1:], size)]))
+
+
+def bit_off(found: Any, size: float, name: str = "omega") -> Any:
+    """Let the largest element of an array be larger by a part of itself, and nothing else."""
+    if not isinstance(found, np.ndarray):
+        return replace(found, **{name: bit_off(getattr(found, name), size)})
+    changed = found.copy()
+    changed[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
+    return changed
+
+
+def counted_off(name: str) -> Callable[[Any, float], Any]:
+    return lambda found, size: replace(found, **{name: getattr(found, name) + int(size)})
+
+
+def value_off(found: Any, size: float) -> Any:
+    """Let a number, or each of an array, be larger by a part of itself."""
+    return found * (1.0 + size)
+
+
+def quotient_off(found: Trajectory, size: float) -> Trajectory:
+    if found.stop is None:
+        return found
+    return replace(found, stop=replace(found.stop, quotient=found.stop.quotient * (1.0 + size)))
+
+
+def cut(found: Trajectory, size: float) -> Trajectory:
+    """Leave out so many of the last rows."""
+    return replace(found, omega=found.omega[: len(found.omega) - int(size)])
+
+
+def singular(found: Trajectory, size: float) -> Trajectory:
+    """Let the matrices of so many of the last steps be singular that were not."""
+    if found.ier is None or not size:
+        return found
+    ier = found.ier.copy()
+    ier[-int(size) :] = SINGULAR
+    return replace(found, ier=ier)
+
+
+def ended(found: Any, size: float, why: str = "overflow") -> Any:
+    return replace(found, ended=why) if size else found
+
+
+def probe_off(found: Any, size: float) -> Any:
+    return replace(found, found=found.found + size)
+
+
+# Where it is planted.
+
+
+def on(target: str, change: Callable[..., Any], call: int | None = None) -> Plant:
+    """Return the change of what `target`, a dotted name, returns: of every call, or of one."""
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        calls = itertools.count(1)
+        return changed(
+            target, lambda found: found if call and next(calls) != call else change(found, size)
+        )
+
+    return planted
+
+
+def refuses(target: str) -> Plant:
+    """Return a refusal of everything, where the size is not 0."""
+
+    def faulty(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
+        if size:
+            raise InputError("no")
+        return right(*rest, **named)
+
+    return lambda size: instead(target, partial(faulty, size))
+
+
+def made_by(target: str, stand_in: Callable[..., Any]) -> Plant:
+    """Return a function in the place of another; the size comes before its arguments."""
+    return lambda size: patch(target, partial(stand_in, size))
+
+
+@cache
+def _truth() -> Reference:
+    return reference(case_scene(5), case_scene(5).times(), velocity=True)
+
+
+def graded(target: str, error: Callable[[Scene, float], float]) -> Plant:
+    """Return results that are the truth of Case 5 and an error of so much of the largest."""
+
+    def faulty(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Trajectory:
+        scene = next(each for each in rest if isinstance(each, Scene))
+
+        def rows(truth: Array) -> Array:
+            parts = scene.steps // len(truth)
+            found = np.zeros((scene.steps, 3))
+            found[parts - 1 :: parts] = truth + error(scene, size) * np.abs(truth).max()
+            return found
+
+        known: Trajectory = right(*(case_scene(5) if x is scene else x for x in rest), **named)
+        velocity = None if known.velocity is None else rows(np.asarray(_truth().velocity))
+        omega = rows(_truth().omega)
+        return replace(known, ier=None, steps=scene.steps, omega=omega, velocity=velocity)
+
+    return lambda size: instead(target, partial(faulty, size))
+
+
+def solved(size: float, scene: Scene, times: Sequence[float], *_: Any) -> Trajectory:
+    """Return what is off by the size and no more, in the place of any method."""
+    found: Trajectory = off(solve(scene, times, "taylor", 1e-15), size)
+    return found
+
+
+def of_order(due: int) -> Callable[[Scene, float], float]:
+    """Return an error whose order misses by the size."""
+    return lambda scene, size: 1e-3 * (scene.step_size / case_scene(5).step_size) ** (due - size)
+
+
+def roundings(more: float) -> Callable[[Scene, float], float]:
+    """Return the size times 8 roundings of every step, and `more`."""
+    return lambda scene, size: size * (8.0 * U * scene.steps + more)
+
+
+def stop_test(size: float) -> AbstractContextManager[Any]:
+    """Let the program be given another constant."""
+
+    def faulty(right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
+        if "lipschitz" in named:
+            named["lipschitz"] *= 1.0 + size
+        return right(*rest, **named)
+
+    return instead(_RUN, faulty)
+
+
+def kept(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that computes a thing once."""
+    known: dict[str, Any] = {}
+
+    def found(*rest: Any, **named: Any) -> Any:
+        key = repr((rest, named))
+        if key not in known:
+            known[key] = function(*rest, **named)
+        return known[key]
+
+    return found
+
+
+@cache
+def _contenders() -> dict[str, length.Marcher]:
+    return {
+        name: replace(each, run=kept(each.run), noise=kept(each.noise), revolutions=1e3, others=1e3)
+        for name, each in length.MARCHERS.items()
+    }
+
+
+def shorter() -> AbstractContextManager[Any]:
+    """Follow two starts through a thousand revolutions."""
+    return patch.multiple(length, MARCHERS=_contenders(), STARTS=2)
+
+
+def watched(error: Callable[[float, float], float]) -> Plant:
+    """Let the error of energy, momentum and phase be `error(size, time)`."""
+
+    def faulty(size: float, scene: Scene, body: Any, time: float, _: Array) -> dict[str, float]:
+        return dict.fromkeys(brouwer.LAWS, error(size, time))
+
+    return beside(shorter, made_by("pyharness.theory.brouwer.errors", faulty))
+
+
+def beside(around: Callable[[], AbstractContextManager[Any]], planted: Plant) -> Plant:
+    """Return a plant in other circumstances."""
+
+    @contextmanager
+    def both(size: float) -> Iterator[None]:
+        with around(), planted(size):
+            yield
+
+    return both
+
+
+def form_for_all(
+    size: float, scene: Scene, times: Sequence[float], name: str, *rest: float
+) -> Trajectory:
+    """Solve by a closed form, or what stands for it where there is none."""
+    return solved(0.0, scene, times) if size else solve(scene, times, name, *rest)
+
+
+def other_library() -> AbstractContextManager[Any]:
+    return patch("pyharness.verify.golden.mathematics", lambda: "another")
+
+
+def without(found: Iterator[Any] | dict[str, Any], size: float) -> Any:
+    """Leave out the Taylor series' Case 5 of what is recorded, or should be."""
+    if not size:
+        return found
+    if not isinstance(found, dict):
+        return [each for each in found if (each.source, each.name) != ("taylor", "case-5")]
+    rest = [each for each in found["taylor"]["trajectory"] if "--case 5 " not in each["command"]]
+    return {**found, "taylor": {**found["taylor"], "trajectory": rest}}
+
+
+def linear(change: Callable[[Any, float], Any]) -> Plant:
+    """Change what the compiled solver of linear equations returns."""
+
+    def room(kernels: Any, size: float) -> SimpleNamespace:
+        def faulty(a: Array, b: Array) -> tuple[Array, Array, int]:
+            factors, x, ier = kernels.solve_linear(a, b)
+            return factors, change(x, size), ier
+
+        return SimpleNamespace(solve_linear=faulty)
+
+    return on("pyharness.model.extension.extension", room)
+
+
+def crossing_off(size: float) -> AbstractContextManager[Any]:
+    """Let truncation rule down to a step of 10**-3.75 s times 10**-size, and nothing below."""
+
+    def error(scene: Scene, name: str, case: int, listing: Any) -> tuple[float, str]:
+        rules = math.log10(scene.step_size) > -3.75 - size
+        return (step_size._forecaster(case, name).at(scene.steps).truncation if rules else 1.0), ""
+
+    return patch.object(step_size, "_error", error)
+
+
+def some_bits(size: float) -> AbstractContextManager[Any]:
+    """Let so many of the calls in threads give other bits."""
+    calls = itertools.count()
+    # Seven jobs are made alone before they are made at once.
+    return patch(
+        "pyharness.stress.trials.threads.bits", lambda job: bytes(7 <= next(calls) < 7 + size)
+    )
+
 
 _TIME = partial(bit_off, name="time")
 _BITS = "cells/runge-kutta/case-3/original"
@@ -127,14 +385,14 @@ VERIFY = (
     # A tolerance, relative to the largest omega.
     *(
         near(f"methods/{name}/case-{_with_form(name)}/1.0e-06",
-             instead(_SOLVE, solved), 1e-6)
+             made_by(_SOLVE, solved), 1e-6)
         for name in _JUDGED
     ),
     # Of a steady spin nothing is left but 8 roundings of the start and 8 of the result, and half a
     # unit in the last place of the truth itself.
     near("methods/taylor/case-1/1.0e-15", on(_SOLVE, off), 1e-15 + 17.0 * U),
     exact("methods/taylor/case-5/1.0e-06", refuses(_SOLVE)),
-    exact("methods/closed-form/case-5/1.0e-06", instead(_SOLVE, form_for_all)),
+    exact("methods/closed-form/case-5/1.0e-06", made_by(_SOLVE, form_for_all)),
     exact("methods/taylor/case-5/1.0e-06", on(_SOLVE, _TIME), ULP),
     exact("methods/taylor/case-5/1.0e-06", on(_SOLVE, ended)),
     *(
@@ -143,7 +401,7 @@ VERIFY = (
         for name in ("auto", "taylor", "quick", "closed-form")
         for end in (3, -1)
     ),
-    exact("prepared/quick/case-5/1/1.0e-06", on(_ANSWERED, gives_up)),
+    exact("prepared/quick/case-5/1/1.0e-06", on(_ANSWERED, partial(ended, why="gave up"))),
     *(
         exact(f"prepared/{name}/case-5/bits", on(_ANSWERED, bit_off), ULP)
         for name in (*_TEXTBOOKS, *_GAUSS)
@@ -233,15 +491,14 @@ STRESS = (
     near("scales/gauss-4/1e0/1e-06/drift", on(_HELD, off), 1e-6),
     near("scales/taylor/1e0/1e-06/error", on(_HELD, off), 4.1e-4),
     exact("scales/taylor/same-2^100", on(_SCALED, bit_off, call=2), ULP),
-    exact("scales/taylor/beyond", on(_SCALED,
-          lambda found, size: replace(found, ended="complete") if size else found)),
+    exact("scales/taylor/beyond", on(_SCALED, partial(ended, why="complete"))),
     # The flow of the driven body amplifies 4 times.
     *(
         near(f"torque/{name}/tiny-1e-12/1e-06", on(_END, off), 4e-6)
         for name in ("taylor", "auto", "prepared-auto", "quick", "gauss-4", "dop853")
     ),
     exact("torque/taylor/tiny-1e-12/1e-06", refuses(_SOLVE)),
-    exact("torque/prepared-auto/tiny-1e-12/1e-06", on(_ANSWERED, gives_up)),
+    exact("torque/prepared-auto/tiny-1e-12/1e-06", on(_ANSWERED, partial(ended, why="gave up"))),
     exact("torque/taylor/tiny-1e-12/1e-06",
           on(_END, ended)),
     # The sphere's angle has two words, and the sum 16 roundings of its terms.
@@ -317,7 +574,7 @@ STRESS = (
     ),
     # Twice what steps miss, carried to the end, and in a million steps the roundings of each.
     *(
-        near(f"step-size/{check}", instead(f"{_STEPS}._error", lambda size, *_: (size, "")), due)
+        near(f"step-size/{check}", made_by(f"{_STEPS}._error", lambda size, *_: (size, "")), due)
         for check, due in (
             ("two-term/case-5/corrected/1e-02", 9.2e-4), ("rk4/case-5/1e-02", 6.4e-8),
             ("four-term/case-5/corrected/1e-06", 6.3e-6), ("rk4/case-5/1e-06", 2.9e-10),

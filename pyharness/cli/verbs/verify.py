@@ -55,8 +55,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
     from pyharness.verify.plants.plants import PLANTS
-    from pyharness.verify.plants.report import self_test_report
-    from pyharness.verify.plants.self_test import as_check, self_test
+    from pyharness.verify.plants.self_test import as_check, self_test, self_test_report
 
     found = []
     for caught in self_test(chosen.seed, chosen.record):

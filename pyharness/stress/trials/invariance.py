@@ -5,33 +5,29 @@ other signs or other exponents, not a bit may differ; where they are not, the bo
 """
 
 import random
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
 
 from pyharness.compare.candidates import called, solved, unstopped
-from pyharness.compare.checks import Check, bounded, described, may_hold, selected
+from pyharness.compare.checks import Check
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.errors import InputError
-from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
 from pyharness.model.turned_scenes import shifted, turned
-from pyharness.stress.hold import OURS
-from pyharness.stress.run import Outcome, Trial, replay
-from pyharness.theory import promises
+from pyharness.stress.hold import OURS, apart, finest_and_middling
+from pyharness.stress.run import LISTINGS, Attempt, Trial, bounded, described, in_turn, replay
 from pyharness.theory.conditioning import Conditioning, conditioning
 
-_GAUSS = ("gauss-2", "gauss-4", "gauss-8")
 _ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
 _PREPARED = ("quick", "auto")
-_MIDDLING = 1e-6
-# At their finest these take minutes for what the others do in seconds.
-_ONLY_MIDDLING = ("quick", "rk45", "radau")
 
 _BODY = (40.0, 30.0, 20.0)
 _START = (0.3, 1.1, 2.7)
@@ -41,59 +37,41 @@ _DRIVEN = TorqueLaw(
 )
 
 
-def _random_scene(seed: int) -> tuple[Scene, float]:
-    """Return a body, a start and a torque that no one chose, and a time of some radians."""
+def _random_scene(seed: int) -> Scene:
+    """Return a body, a start and a torque that no one chose."""
     source = random.Random(seed)
 
     def vector(size: float) -> Triple:
-        return (
-            source.uniform(-size, size),
-            source.uniform(-size, size),
-            source.uniform(-size, size),
-        )
+        first, second, third = (source.uniform(-size, size) for _ in range(3))
+        return first, second, third
 
     low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
     moments = (source.uniform(abs(low - middle), low + middle), low, middle)
     law = TorqueLaw(vector(20.0), vector(5.0), ((vector(20.0), source.uniform(0.1, 20.0)),))
-    scene = Scene(f"random-{seed}", vector(3.0), moments=moments, torque=law)
-    return scene, 1.0
+    return Scene(f"random-{seed}", vector(3.0), moments=moments, torque=law)
 
 
+_FREE = Scene("free", _START, moments=_BODY, step_size=0.01, steps=300)
 SCENES = {
-    scene.name: (scene, time)
-    for scene, time in (
-        (Scene("free", _START, moments=_BODY, step_size=0.01, steps=300), 3.0),
-        (Scene("pushed", _START, moments=_BODY, torque=_PUSHED, step_size=0.01, steps=200), 2.0),
-        (Scene("driven", _START, moments=_BODY, torque=_DRIVEN, step_size=0.01, steps=200), 2.0),
-        *map(_random_scene, range(8)),
-    )
+    "free": (_FREE, 3.0),
+    "pushed": (replace(_FREE, name="pushed", torque=_PUSHED, steps=200), 2.0),
+    "driven": (replace(_FREE, name="driven", torque=_DRIVEN, steps=200), 2.0),
+    **{f"random-{seed}": (_random_scene(seed), 1.0) for seed in range(8)},
 }
 
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A way to turn a problem.
+    """A way to turn a problem: the scene, and the result back.
 
-    Attributes
-    ----------
-    turn : callable
-        The turned scene.
-    faster : float
-        The turned motion takes the time over this.
-    back : callable
-        From the turned result to that of the scene itself.
-    bitwise : tuple of str
-        Methods and programs whose operations turn with it, so that no bit may differ.
+    The turned motion takes the time over `faster`. `bitwise` are the methods and programs whose
+    operations turn with it, so that no bit may differ.
     """
 
     turn: Callable[[Scene], Scene]
     faster: float
     back: Callable[[Array], Array]
     bitwise: tuple[str, ...]
-
-
-def _onward(v: Triple) -> Triple:
-    return v[1], v[2], v[0]
 
 
 def _signs(first: float, second: float, third: float) -> Symmetry:
@@ -110,10 +88,8 @@ def _signs(first: float, second: float, third: float) -> Symmetry:
     )
 
 
-def _faster(factor: float, bitwise: tuple[str, ...]) -> Symmetry:
-    return Symmetry(
-        lambda scene: scaled(scene, factor), factor, lambda omega: omega / factor, bitwise
-    )
+def _faster(factor: float, *bitwise: str) -> Symmetry:
+    return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
 
 
 # Exponents alone change, and ours compare only what has the same unit. SciPy's first step is
@@ -123,45 +99,45 @@ SYMMETRIES = {
     # Each axis does what the next does: products of the next two, in this order. The series of
     # Taylor and the sums of the others add over the axes, or multiply them, in a fixed order.
     "cyclic": Symmetry(
-        lambda scene: turned(scene, _onward, body=True),
+        lambda scene: turned(scene, lambda v: (v[1], v[2], v[0]), body=True),
         1.0,
         lambda omega: np.asarray(np.roll(omega, 1)),
-        ("closed-form", *_GAUSS, *FIXED_STEP, "runge-kutta"),
+        ("closed-form", "gauss-2", "gauss-4", "gauss-8", *FIXED_STEP, "runge-kutta"),
     ),
     "signs-12": _signs(-1.0, -1.0, 1.0),
     "signs-23": _signs(1.0, -1.0, -1.0),
-    "times-2**7": _faster(2.0**7, _POWERS_OF_TWO),
-    "times-2**-9": _faster(2.0**-9, _POWERS_OF_TWO),
-    "times-1.7": _faster(1.7, ()),
+    "times-2**7": _faster(2.0**7, *_POWERS_OF_TWO),
+    "times-2**-9": _faster(2.0**-9, *_POWERS_OF_TWO),
+    "times-1.7": _faster(1.7),
 }
 
 
-def run(only: Sequence[str]) -> Iterator[Outcome]:
-    """Turn each scene in each way, by each method and program."""
-    for circumstance, (scene, _) in SCENES.items():
+def _attempts() -> Iterator[Attempt]:
+    for circumstance, (scene, time) in SCENES.items():
         for name in (*_ADAPTIVE, *FIXED_STEP):
-            if not may_hold(f"invariance/{name}", only):
-                continue
             if name == "closed-form" and circumstance != "free":
                 continue
-            for tolerance in tolerances(name, circumstance):
-                for check in _checks(name, circumstance, tolerance, only):
-                    yield Outcome(check, scene)
-        for program in PROGRAMS:
-            for listing in (original(program), corrected(program)):
-                if may_hold(f"invariance/{program}", only):
-                    for check in _program(listing, circumstance, only):
-                        yield Outcome(check, scene)
+            for tolerance in _tolerances(name, scene, time):
+                asked = scene, time, name, tolerance
+                ways = {what: partial(_turned, each, *asked) for what, each in SYMMETRIES.items()}
+                ways["back"] = partial(_back, *asked)
+                if name not in FIXED_STEP:
+                    ways["split"] = partial(_split, *asked)
+                for way, make in ways.items():
+                    yield Attempt(f"{name}/{way}/{circumstance}/{tolerance:.0e}", make, scene)
+        for listing in LISTINGS:
+            for what, symmetry in SYMMETRIES.items():
+                make = partial(_program, listing, scene, symmetry)
+                name = f"{listing.program}/{what}/{circumstance}/{listing.label}"
+                yield Attempt(name, make, scene)
 
 
-def tolerances(name: str, circumstance: str) -> list[float]:
-    """Return the tolerances at which a method is tried in a scene."""
+def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
     if name in FIXED_STEP:
         return [1.0]
-    finest = promises.finest(name, *SCENES[circumstance]) if name in METHODS else _MIDDLING
     if name == "closed-form":
-        return [finest]
-    return [_MIDDLING] if name in _ONLY_MIDDLING else sorted({finest, max(finest, _MIDDLING)})
+        return [METHODS[name].finest]
+    return finest_and_middling(name, scene, time)
 
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
@@ -169,82 +145,59 @@ def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
     return (called if name in _PREPARED else solved)(name, tolerance).end(scene, time).omega
 
 
-def _checks(name: str, circumstance: str, tolerance: float, only: Sequence[str]) -> Iterator[Check]:
-    scene, time = SCENES[circumstance]
-
-    def asked(what: str) -> str | None:
-        id = f"invariance/{name}/{what}/{circumstance}/{tolerance:.0e}"
-        return id if selected(id, only) else None
-
-    for what, symmetry in SYMMETRIES.items():
-        if id := asked(what):
-            yield turned_check(id, scene, time, name, tolerance, symmetry)
-    if id := asked("back"):
-        yield _back(id, circumstance, name, tolerance)
-    if name not in FIXED_STEP and (id := asked("split")):
-        yield _split(id, circumstance, name, tolerance)
-
-
-def turned_check(
-    id: str, scene: Scene, time: float, name: str, tolerance: float, symmetry: Symmetry
-) -> Check:
+def _turned(
+    symmetry: Symmetry, scene: Scene, time: float, name: str, tolerance: float, id: str
+) -> Iterator[Check]:
     """Hold the turned problem against the problem itself."""
     try:
         plain = end(scene, time, name, tolerance)
         other = symmetry.back(end(symmetry.turn(scene), time / symmetry.faster, name, tolerance))
     except InputError as refusal:
-        return Check(id, False, None, None, replay(id), f"refused: {refusal}")
+        yield Check(id, False, None, None, replay(id), f"refused: {refusal}")
+        return
     if name in symmetry.bitwise:
-        return bounded(id, float(np.count_nonzero(plain != other)), 0.0, replay(id), "bits")
-    flow = _flow(scene, time)
+        yield bounded(id, float(np.count_nonzero(plain != other)), 0.0, "bits")
+        return
+    flow = _flow(scene.name, 0.0, time)
     difference = float(np.abs(plain - other).max()) / flow.largest
-    if name in FIXED_STEP:
-        return described(id, difference, replay(id))
     # Either may be wrong by what the method is allowed.
-    return bounded(id, difference, 2.0 * flow.limit(tolerance), replay(id))
+    limit = 2.0 * flow.limit(tolerance)
+    yield described(id, difference) if name in FIXED_STEP else bounded(id, difference, limit)
 
 
-def _back(id: str, circumstance: str, name: str, tolerance: float) -> Check:
-    scene, time = SCENES[circumstance]
+def _back(scene: Scene, time: float, name: str, tolerance: float, id: str) -> Iterator[Check]:
     there = end(scene, time, name, tolerance)
     again = end(shifted(scene, there, time), -time, name, tolerance)
-    flow, back = _flow(scene, time), _flow_between(circumstance, time, -time)
+    flow, back = _flow(scene.name, 0.0, time), _flow(scene.name, time, -time)
     difference = float(np.abs(again - scene.omega).max()) / flow.largest
     if name in FIXED_STEP:
-        return described(id, difference, replay(id), "not reversible")
+        yield described(id, difference, "not reversible")
+        return
     # The error of the way there is an error of the start of the way back.
     limit = flow.limit(tolerance) * back.amplification + back.limit(tolerance)
-    return bounded(id, difference, limit, replay(id))
+    yield bounded(id, difference, limit)
 
 
-def _split(id: str, circumstance: str, name: str, tolerance: float) -> Check:
-    scene, time = SCENES[circumstance]
-    cuts = cuts_of(time)
+def _split(scene: Scene, time: float, name: str, tolerance: float, id: str) -> Iterator[Check]:
+    # Always the same three.
+    source = random.Random("cuts")
+    cuts = sorted(source.uniform(0.0, time) for _ in range(3))
     omega = np.array(scene.omega)
-    limit = _flow(scene, time).limit(tolerance)
-    for begin, stop in zip([0.0, *cuts], [*cuts, time], strict=True):
+    flow = _flow(scene.name, 0.0, time)
+    limit = flow.limit(tolerance)
+    for begin, stop in pairwise([0.0, *cuts, time]):
         omega = end(shifted(scene, omega, begin), stop - begin, name, tolerance)
-        piece = _flow_between(circumstance, begin, stop - begin)
-        rest = 1.0 if stop == time else _flow_between(circumstance, stop, time - stop).amplification
+        piece = _flow(scene.name, begin, stop - begin)
+        rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
         # What is left of the way carries on the error of each piece.
         limit += piece.limit(tolerance) * rest
     whole = end(scene, time, name, tolerance)
-    difference = float(np.abs(omega - whole).max()) / _flow(scene, time).largest
-    return bounded(id, difference, limit, replay(id), f"{len(cuts)} cuts")
-
-
-def cuts_of(time: float) -> list[float]:
-    """Return three times between 0 and `time`, always the same."""
-    source = random.Random("cuts")
-    return sorted(source.uniform(0.0, time) for _ in range(3))
-
-
-def _flow(scene: Scene, time: float) -> Conditioning:
-    return _flow_between(scene.name, 0.0, time)
+    difference = float(np.abs(omega - whole).max()) / flow.largest
+    yield bounded(id, difference, limit, f"{len(cuts)} cuts")
 
 
 @cache
-def _flow_between(circumstance: str, begin: float, length: float) -> Conditioning:
+def _flow(circumstance: str, begin: float, length: float) -> Conditioning:
     scene = SCENES[circumstance][0]
     omega = np.array(scene.omega)
     if begin > 0.0:
@@ -252,23 +205,16 @@ def _flow_between(circumstance: str, begin: float, length: float) -> Conditionin
     return conditioning(shifted(scene, omega, begin), length)
 
 
-def _program(listing: Listing, circumstance: str, only: Sequence[str]) -> Iterator[Check]:
-    scene, _ = SCENES[circumstance]
-    for what, symmetry in SYMMETRIES.items():
-        id = f"invariance/{listing.program}/{what}/{circumstance}/{listing.label}"
-        if not selected(id, only):
-            continue
-        plain, other = (
-            unstopped(listing).rows(each).omega for each in (scene, symmetry.turn(scene))
-        )
-        n = min(len(plain), len(other))
-        other = np.array([symmetry.back(row) for row in other[:n]]).reshape(-1, 3)
-        if listing.program in symmetry.bitwise:
-            count = np.count_nonzero(plain[:n] != other) + 3 * abs(len(plain) - len(other))
-            yield bounded(id, float(count), 0.0, replay(id), "bits")
-            continue
-        size = float(np.abs(plain[:n]).max(initial=0.0)) or 1.0
-        yield described(id, float(np.abs(plain[:n] - other).max(initial=0.0)) / size, replay(id))
+def _program(listing: Listing, scene: Scene, symmetry: Symmetry, id: str) -> Iterator[Check]:
+    plain, other = (unstopped(listing).rows(each).omega for each in (scene, symmetry.turn(scene)))
+    n = min(len(plain), len(other))
+    other = np.array([symmetry.back(row) for row in other]).reshape(-1, 3)
+    if listing.program in symmetry.bitwise:
+        count = np.count_nonzero(plain[:n] != other[:n]) + 3 * abs(len(plain) - len(other))
+        yield bounded(id, float(count), 0.0, "bits")
+        return
+    size = float(np.abs(plain[:n]).max(initial=0.0)) or 1.0
+    yield described(id, apart(plain, other) / size)
 
 
 TRIAL = Trial(
@@ -277,5 +223,5 @@ TRIAL = Trial(
     "no bit where rounding can't tell the two apart: the same operations in another order of "
     "axes, with other signs, with other exponents; else the tolerance and rounding of each "
     "solution, amplified by the flow that follows it",
-    run,
+    in_turn("invariance", _attempts),
 )

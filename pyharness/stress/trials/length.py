@@ -3,20 +3,20 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from pyharness.compare.candidates import called, solved, unstopped
-from pyharness.compare.checks import bounded, described, may_hold
+from pyharness.compare.checks import Check
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, extension
-from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.stress.run import Outcome, Trial, replay
+from pyharness.stress.run import LISTINGS, Attempt, Trial, bounded, described, in_turn
 from pyharness.theory import brouwer, promises
 from pyharness.theory.brouwer import LAWS, Noise, Orbit
 from pyharness.truth.elliptic import torque_free
@@ -59,8 +59,6 @@ class Marcher:
     ----------
     run : callable
         ``run(scene, times)``: omega at the times, shape (n, 3), and the steps until then.
-    noise : callable
-        ``noise(orbit, scene, step)``.
     revolutions, others : float
         The longest run, of one start and of the others.
     preference : bool
@@ -79,90 +77,72 @@ def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
     return found.omega, found.steps * np.array(times) / times[-1]
 
 
-def _taylor_noise(body: Orbit, scene: Scene, step: float) -> Noise:
-    # The last two terms are at most SLACK shares; what follows them falls at least by halves.
-    return brouwer.taylor_noise(body, scene, step, _ORDER, _SLACK * _LEAST_SHARE)
-
-
-def _gauss(stages: int, part: float) -> Runner:
+def _gauss(stages: int) -> Runner:
     def run(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
-        step = part / _rate(scene)
-        rows, n_rows, status, evaluations = _gauss_rows(scene, times, stages, step)
+        step = _PARTS[stages] / _rate(scene)
+        rows, _, n_rows, status, evaluations = extension().gauss_solution(
+            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
+        )
         if (n_rows, status) != (len(times), COMPLETE):
             raise InputError(f"gauss-{stages} gave up after {evaluations} right-hand sides")
         lengths = np.diff([0.0, *times])
-        return rows, np.cumsum(np.ceil(lengths / step - 1e-6))
+        return rows.T, np.cumsum(np.ceil(lengths / step - 1e-6))
 
     return run
 
 
-def _gauss_rows(
-    scene: Scene, times: Sequence[float], stages: int, step: float
-) -> tuple[Array, int, int, int]:
-    rows, _, n_rows, status, evaluations = extension().gauss_solution(
-        scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
-    )
-    return rows.T, n_rows, status, evaluations
-
-
-def _gauss_noise(stages: int) -> Callable[[Orbit, Scene, float], Noise]:
-    return lambda body, scene, step: brouwer.gauss_noise(body, scene, step, stages)
-
-
 def _rate(scene: Scene) -> float:
     """Return the largest rate of the linearised equations (1/s), within a third."""
-    a = np.abs(np.array(scene.euler_coefficients))
-    return float(a.max()) * _largest(scene)
+    return promises.speed(scene, max(map(abs, scene.omega)))
 
 
 MARCHERS = {
     # What a series leaves out keeps its sign; and its steps fall in with a periodic motion, so
-    # that the rounding of a step comes back with every revolution.
-    "taylor": Marcher(_taylor, _taylor_noise, 1e6, 10**5.5, preference=True),
+    # that the rounding of a step comes back with every revolution. The last two terms are at most
+    # SLACK shares; what follows them falls at least by halves.
+    "taylor": Marcher(
+        _taylor,
+        partial(brouwer.taylor_noise, order=_ORDER, left_out=_SLACK * _LEAST_SHARE),
+        1e6,
+        10**5.5,
+        preference=True,
+    ),
     # Equal steps of a part of a radian; ten times as costly as a Taylor step.
-    "gauss-8": Marcher(_gauss(8, _PARTS[8]), _gauss_noise(8), 1e6, 1e5),
-    "gauss-4": Marcher(_gauss(4, _PARTS[4]), _gauss_noise(4), 1e5, 10**4.5),
+    "gauss-8": Marcher(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
+    "gauss-4": Marcher(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
 }
 
 
-def run(only: Sequence[str]) -> Iterator[Outcome]:
-    """Follow each motion by each method."""
-    for motion in MOTIONS:
+def _attempts() -> Iterator[Attempt]:
+    for motion, scene in MOTIONS.items():
         for name, marcher in MARCHERS.items():
-            if may_hold(f"length/{name}/{motion}", only):
-                yield from hold(name, marcher, motion)
-                if name != "gauss-4":
-                    yield _prepared(name, motion)
-        if may_hold(f"length/closed-form/{motion}", only):
-            yield from _closed_form(motion)
+            yield Attempt(f"{name}/{motion}", partial(hold, marcher, motion), scene)
+            if name != "gauss-4":
+                make = partial(_prepared, name, motion)
+                yield Attempt(f"{name}/{motion}/prepared", make, scene)
+        yield Attempt(f"closed-form/{motion}", partial(_closed_form, motion), scene)
         for name in ("dop853", "lsoda"):
-            if may_hold(f"length/{name}/{motion}", only):
-                yield from _scipy(name, motion)
-        for program in PROGRAMS:
-            for listing in (original(program), corrected(program)):
-                if may_hold(f"length/{program}/{motion}/{listing.label}", only):
-                    yield from _program(listing, motion)
+            yield Attempt(f"{name}/{motion}/100", partial(_scipy, name, motion), scene)
+        # A hundred steps for each of 1e4 revolutions.
+        step = 2.0 * math.pi / orbit_of(motion).largest / 100.0
+        stepped = replace(scene, step_size=step, steps=1_000_000)
+        for listing in LISTINGS:
+            name = f"{listing.program}/{motion}/{listing.label}"
+            yield Attempt(name, partial(_program, listing, motion, stepped), stepped)
 
 
-def hold(name: str, marcher: Marcher, motion: str) -> Iterator[Outcome]:
+def hold(marcher: Marcher, motion: str, prefix: str) -> Iterator[Check]:
     """Hold one method to Brouwer's law: a bound at each horizon, and the power of the growth."""
-    scene = MOTIONS[motion]
-    body = orbit_of(motion)
-    for what, found, steps, limits in measured(marcher, scene, body):
-        for k, revolutions in enumerate(REVOLUTIONS[: len(steps)]):
-            id = f"length/{name}/{motion}/{what}/{revolutions:.0f}"
+    for what, found, steps, limits in measured(marcher, MOTIONS[motion], orbit_of(motion)):
+        horizons = np.array(REVOLUTIONS[: len(steps)])
+        for k, revolutions in enumerate(horizons):
             value = float(np.nanmax(np.abs(found[:, k])))
             note = f"{steps[k]:.0f} steps, {steps[k] ** LAWS[what]:.1e} to the power {LAWS[what]}"
-            yield Outcome(bounded(id, value, limits[k], replay(id), note), scene)
-        fitted = [
-            k
-            for k, revolutions in enumerate(REVOLUTIONS[: len(steps)])
-            if revolutions >= 0.99 * _FIT_FROM and not np.isnan(found[:, k]).any()
-        ]
+            yield bounded(f"{prefix}/{what}/{revolutions:.0f}", value, limits[k], note)
+        fitted = (horizons >= 0.99 * _FIT_FROM) & ~np.isnan(found).any(axis=0)
         power = brouwer.exponent(steps[fitted], found[:, fitted])
-        id = f"length/{name}/{motion}/{what}/power"
         due = LAWS[what] + (0.5 if marcher.preference else 0.0)
-        yield Outcome(bounded(id, power, due + _HALFWAY, replay(id), f"due {due}"), scene)
+        yield bounded(f"{prefix}/{what}/power", power, due + _HALFWAY, f"due {due}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,26 +206,17 @@ def starts(scene: Scene, body: Orbit) -> list[Scene]:
     return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
 
 
-def _largest(scene: Scene) -> float:
-    return max(map(abs, scene.omega))
-
-
-def _prepared(name: str, motion: str) -> Outcome:
+def _prepared(name: str, motion: str, id: str) -> Iterator[Check]:
     """Hold a prepared solver, which takes the same steps, to the bits of the rows."""
     scene = MOTIONS[motion]
     time = 1e4 * 2.0 * math.pi / orbit_of(motion).largest
-    if name == "taylor":
-        rows = _taylor(scene, [time])[0]
-        found = called(name, METHODS[name].finest).end(scene, time).omega
-    else:
-        rows = MARCHERS[name].run(scene, [time])[0]
-        stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
-        found = called(name, 1.0).end(stepped, time).omega
-    id = f"length/{name}/{motion}/prepared"
-    return Outcome(bounded(id, float(np.count_nonzero(rows[-1] != found)), 0.0, replay(id)), scene)
+    rows, _ = MARCHERS[name].run(scene, [time])
+    stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
+    found = called(name, METHODS[name].finest).end(stepped, time).omega
+    yield bounded(id, float(np.count_nonzero(rows[-1] != found)), 0.0)
 
 
-def _closed_form(motion: str) -> Iterator[Outcome]:
+def _closed_form(motion: str, prefix: str) -> Iterator[Check]:
     scene, body = MOTIONS[motion], orbit_of(motion)
     times = [r * 2.0 * math.pi / body.largest for r in REVOLUTIONS]
     rows = solved("closed-form", METHODS["closed-form"].finest).rows(scene, times).omega
@@ -253,42 +224,33 @@ def _closed_form(motion: str) -> Iterator[Outcome]:
     for what in LAWS:
         gain = body.turn if what == "phase" else body.gains[what]
         limit = _CLOSED_FORM * gain + (0.0 if what == "phase" else 4.0 * brouwer.ROUNDING)
-        id = f"length/closed-form/{motion}/{what}"
         value = max(abs(each[what]) for each in found)
-        yield Outcome(bounded(id, value, limit, replay(id), "at any time"), scene)
+        yield bounded(f"{prefix}/{what}", value, limit, "at any time")
 
 
-def _scipy(name: str, motion: str) -> Iterator[Outcome]:
-    scene, body = MOTIONS[motion], orbit_of(motion)
-    time = 1e2 * 2.0 * math.pi / body.largest
+def _scipy(name: str, motion: str, prefix: str) -> Iterator[Check]:
+    scene = MOTIONS[motion]
+    time = 1e2 * 2.0 * math.pi / orbit_of(motion).largest
     found = solved(name, promises.finest(name, scene, time)).end(scene, time)
-    yield from _described(name, motion, "100", scene, body, time, found.omega)
+    yield from _described(prefix, motion, scene, time, found.omega)
 
 
-def _program(listing: Listing, motion: str) -> Iterator[Outcome]:
-    """Say what a program makes of 10 and of 1e4 revolutions, in a hundred steps each."""
-    body = orbit_of(motion)
-    step = 2.0 * math.pi / body.largest / 100.0
-    scene = replace(MOTIONS[motion], step_size=step, steps=1_000_000)
+def _program(listing: Listing, motion: str, scene: Scene, prefix: str) -> Iterator[Check]:
+    """Say what a program makes of 10 and of 1e4 revolutions."""
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):
-        where = f"{listing.label}/{count // 100}"
+        id = f"{prefix}/{count // 100}"
         if len(found.omega) < count:
-            id = f"length/{listing.program}/{motion}/{where}"
-            note = f"{found.ended} after {found.steps} steps"
-            yield Outcome(described(id, None, replay(id), note), scene)
-            continue
-        row = found.omega[count - 1]
-        yield from _described(listing.program, motion, where, scene, body, count * step, row)
+            yield described(id, None, f"{found.ended} after {found.steps} steps")
+        else:
+            row = found.omega[count - 1]
+            yield from _described(id, motion, scene, count * scene.step_size, row)
 
 
-def _described(
-    name: str, motion: str, where: str, scene: Scene, body: Orbit, time: float, row: Array
-) -> Iterator[Outcome]:
-    for what, error in brouwer.errors(scene, body, time, row).items():
-        id = f"length/{name}/{motion}/{where}/{what}"
+def _described(prefix: str, motion: str, scene: Scene, time: float, row: Array) -> Iterator[Check]:
+    for what, error in brouwer.errors(scene, orbit_of(motion), time, row).items():
         lost = what == "phase" and abs(error) > _LOST
-        yield Outcome(described(id, error, replay(id), "lost" if lost else ""), scene)
+        yield described(f"{prefix}/{what}", error, "lost" if lost else "")
 
 
 TRIAL = Trial(
@@ -298,5 +260,5 @@ TRIAL = Trial(
     "the step, add up to 4 sqrt(n) of one (Hoeffding), phase to the shear of the motion times "
     "n**1.5; truncation adds n times its bound. The power of the growth must be nearer to what is "
     "due, to chance (1/2, 3/2) or to a known preference (1, 2), than to the next",
-    run,
+    in_turn("length", _attempts),
 )

@@ -3,26 +3,28 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
 from pyharness.compare.candidates import End, not_finite
-from pyharness.compare.checks import Check, may_hold
+from pyharness.compare.checks import Check
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.stress.hold import (
     ALL,
+    MIDDLING,
+    Truth,
     describe_programs,
     hold,
     in_steps,
     run_method,
     truth_of,
 )
-from pyharness.stress.run import Outcome, Trial, replay
-from pyharness.theory.conditioning import conditioning
+from pyharness.stress.run import Attempt, Trial, in_turn, replay
+from pyharness.theory.conditioning import Conditioning, conditioning
 
 _TIME = 15.0  # s
 _FREE = Scene("scales", (0.5, 1.0, -0.7), moments=(40.0, 30.0, 20.0))
@@ -38,74 +40,74 @@ _DRIVEN_TWOS = (-320, -100, 100, 320)
 def circumstances() -> Iterator[tuple[str, Scene, float]]:
     """Return name, scene and time of each input."""
     scene = in_steps(_FREE, _TIME)
-    for power in _TENS:
-        factor = float(f"1e{power}")
-        yield f"1e{power}", replace(scaled(scene, factor), name=f"1e{power}"), _TIME / factor
-    for power in _TWOS:
+    named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
+    named += [(f"2^{power}", math.ldexp(1.0, power)) for power in _TWOS]
+    for name, factor in named:
+        yield name, replace(scaled(scene, factor), name=name), _TIME / factor
+
+
+def _bit_for_bit(name: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
+    """Hold one of our methods to the same digits where a power of two scales the motion."""
+    time = scene.step_size * scene.steps
+    plain = cache(lambda: _tried(name, scene, time))
+
+    def same(factor: float, other: Scene, id: str) -> Iterator[Check]:
+        # In the order of the calls: the motion itself first.
+        first, run = plain(), _tried(name, other, time / factor)
+        with np.errstate(invalid="ignore"):
+            wrong = float(np.abs(run.omega / factor - first.omega).max())
+        passed = run.ended == first.ended == "complete" and wrong == 0.0
+        note = "" if run.ended == "complete" else run.ended
+        yield Check(id, passed, wrong, 0.0, replay(id), note)
+
+    for power in powers:
         factor = math.ldexp(1.0, power)
-        yield f"2^{power}", replace(scaled(scene, factor), name=f"2^{power}"), _TIME / factor
+        other = scaled(scene, factor)
+        yield Attempt(f"{name}/{kind}-2^{power}", partial(same, factor, other), other)
 
 
-def _bit_for_bit(only: Sequence[str]) -> Iterator[Outcome]:
-    """Hold our methods to the same digits where a power of two scales the motion."""
-    for kind, scene, powers in (
-        ("same", in_steps(_FREE, _TIME), _TWOS),
-        ("same-driven", in_steps(_DRIVEN, 3.0), _DRIVEN_TWOS),
-    ):
-        time = scene.step_size * scene.steps
-        for name in ALL:
-            if name in SCIPY_METHODS or not may_hold(f"scales/{name}", only):
-                continue
-            if name == "closed-form" and kind != "same":
-                continue
-            setting = None if name in FIXED_STEP else 1e-6
-            plain = _tried(name, scene, time, setting)
-            for power in powers:
-                id = f"scales/{name}/{kind}-2^{power}"
-                if not may_hold(id, only):
-                    continue
-                factor = math.ldexp(1.0, power)
-                other = scaled(scene, factor)
-                run = _tried(name, other, time / factor, setting)
-                with np.errstate(invalid="ignore"):
-                    wrong = float(np.abs(run.omega / factor - plain.omega).max())
-                passed = run.ended == plain.ended == "complete" and wrong == 0.0
-                note = "" if run.ended == "complete" else run.ended
-                yield Outcome(Check(id, passed, wrong, 0.0, replay(id), note), other)
+def _beyond(name: str, scene: Scene, id: str) -> Iterator[Check]:
+    """Hold a method to say so where omega leaves the range of numbers."""
+    run = _tried(name, scene, 1e300)
+    silent = run.ended == "complete"
+    note = "a silent wrong number" if silent else run.ended
+    yield Check(id, not silent, float(silent), 0.0, replay(id), note)
 
 
-def _beyond(only: Sequence[str]) -> Iterator[Outcome]:
-    """Hold every method to say so where omega leaves the range of numbers."""
-    law = TorqueLaw((1e10, 2e10, -1e10))
-    # Of a sphere, which no coupling makes turn ever faster on the way.
-    scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
-    for name in ALL:
-        id = f"scales/{name}/beyond"
-        if not may_hold(id, only):
-            continue
-        run = _tried(name, scene, 1e300, None if name in FIXED_STEP else 1e-6)
-        silent = run.ended == "complete"
-        note = "a silent wrong number" if silent else run.ended
-        yield Outcome(Check(id, not silent, float(silent), 0.0, replay(id), note), scene)
-
-
-def _tried(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
+def _tried(name: str, scene: Scene, time: float) -> End:
     try:
-        return run_method(name, scene, time, tolerance)
+        return run_method(name, scene, time, None if name in FIXED_STEP else MIDDLING)
     except InputError as refusal:
         return not_finite(f"refused: {refusal}")
 
 
-def _run(only: Sequence[str]) -> Iterator[Outcome]:
-    # The flow does to a scaled motion what it does to the motion.
-    flow = conditioning(_FREE, _TIME)
+@cache
+def _flow() -> Conditioning:
+    return conditioning(_FREE, _TIME)
+
+
+def _truth(scene: Scene, time: float) -> Truth:
+    """Return the truth: the flow does to a scaled motion what it does to the motion."""
+    size = max(map(abs, scene.omega)) / max(map(abs, _FREE.omega))
+    return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
+
+
+def _attempts() -> Iterator[Attempt]:
     for name, scene, time in circumstances():
-        size = max(map(abs, scene.omega)) / max(map(abs, _FREE.omega))
-        truth = partial(truth_of, flow=replace(flow, largest=flow.largest * size))
-        yield from hold("scales", name, scene, time, only, ALL, truth)
-        yield from describe_programs("scales", name, scene, only)
-    yield from _bit_for_bit(only)
-    yield from _beyond(only)
+        yield from hold(name, scene, time, truth=_truth)
+        yield from describe_programs(name, scene)
+    free, driven = in_steps(_FREE, _TIME), in_steps(_DRIVEN, 3.0)
+    for name in ALL:
+        if name not in SCIPY_METHODS:
+            yield from _bit_for_bit(name, "same", free, _TWOS)
+    for name in ALL:
+        if name not in (*SCIPY_METHODS, "closed-form"):
+            yield from _bit_for_bit(name, "same-driven", driven, _DRIVEN_TWOS)
+    law = TorqueLaw((1e10, 2e10, -1e10))
+    # Of a sphere, which no coupling makes turn ever faster on the way.
+    scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
+    for name in ALL:
+        yield Attempt(f"{name}/beyond", partial(_beyond, name, scene), scene)
 
 
 TRIAL = Trial(
@@ -113,5 +115,5 @@ TRIAL = Trial(
     "omega from 1e-300 to 1e300 rad/s, time scaled to match",
     "as of the separatrix, relative to omega; ours scaled by a power of two: the same bits. "
     "Where omega leaves the range of numbers: a status that says so.",
-    _run,
+    in_turn("scales", _attempts),
 )

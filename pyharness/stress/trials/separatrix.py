@@ -1,15 +1,16 @@
 """Spin about the middle axis, disturbed by ever less and by nothing, over several flips."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
-from pyharness.compare.checks import Check, may_hold
+from pyharness.compare.checks import Check
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene
-from pyharness.stress.hold import ALL, describe_programs, hold, in_steps, run_method
-from pyharness.stress.run import Outcome, Trial, replay
+from pyharness.stress.hold import ALL, MIDDLING, describe_programs, hold, in_steps, run_method
+from pyharness.stress.run import Attempt, Trial, in_turn, replay
 
 # A = C = 1/2 hold in binary64: a disturbance that is the same about axes 1 and 3 lies on the
 # separatrix, and the body turns over once and never again.
@@ -45,29 +46,29 @@ def circumstances() -> Iterator[tuple[str, Scene, float]]:
             yield f"{name}-{d:.0e}", in_steps(scene, time), time
 
 
-def _undisturbed(only: Sequence[str]) -> Iterator[Outcome]:
+def _undisturbed() -> Iterator[Attempt]:
     """Hold every method to the exact answer: a disturbance of 0 stays 0 for ever."""
     scene = in_steps(Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=_MOMENTS), _STAYS)
-    for name in ALL:
-        id = f"separatrix/{name}/none"
-        if not may_hold(id, only):
-            continue
-        run = run_method(name, scene, _STAYS, None if name in FIXED_STEP else 1e-6)
+
+    def stay(name: str, id: str) -> Iterator[Check]:
+        run = run_method(name, scene, _STAYS, None if name in FIXED_STEP else MIDDLING)
         wrong = float(np.abs(run.omega - scene.omega).max())
         # What is exactly zero keeps zero; the spin may be rounded where units are changed.
         limit = 2.0**-52 if name == "quick" else 0.0
         stays = run.omega[0] == run.omega[2] == 0.0 and run.ended == "complete"
         note = "" if stays else "it left the axis"
-        check = Check(id, bool(stays and wrong <= limit), wrong, limit, replay(id), note)
-        yield Outcome(check, scene)
+        yield Check(id, bool(stays and wrong <= limit), wrong, limit, replay(id), note)
+
+    for name in ALL:
+        yield Attempt(f"{name}/none", partial(stay, name), scene)
 
 
-def _run(only: Sequence[str]) -> Iterator[Outcome]:
+def _attempts() -> Iterator[Attempt]:
     for name, scene, time in circumstances():
-        yield from hold("separatrix", name, scene, time, only, ALL)
+        yield from hold(name, scene, time)
         if not name.startswith("early"):
-            yield from describe_programs("separatrix", name, scene, only)
-    yield from _undisturbed(only)
+            yield from describe_programs(name, scene)
+    yield from _undisturbed()
 
 
 TRIAL = Trial(
@@ -76,5 +77,5 @@ TRIAL = Trial(
     "closed form: 1e-14 and what the rounding of A, B, C changes. Others: tolerance, or order "
     "times steps, and rounding, amplified by the flow; where that leaves less than two digits, "
     "energy and momentum, which the flow does not amplify. Undisturbed: exact.",
-    _run,
+    in_turn("separatrix", _attempts),
 )

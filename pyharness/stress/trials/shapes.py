@@ -1,12 +1,12 @@
 """Needles, coins, flat plates, and moments that no body has."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
-from pyharness.stress.hold import ALL, describe_programs, hold, in_steps
-from pyharness.stress.run import Outcome, Trial
+from pyharness.stress.hold import hold_all, in_steps
+from pyharness.stress.run import Trial, in_turn
 
 _OMEGA = (0.3, 1.0, -0.6)
 _RADIANS = 20.0
@@ -45,18 +45,8 @@ def circumstances() -> Iterator[tuple[str, Scene, float]]:
 
 def _rate(scene: Scene) -> float:
     """Return the fastest of the small motions about the three axes (rad/s)."""
-    coefficients = scene.euler_coefficients
-    rates = []
-    for axis, w in enumerate(scene.omega):
-        one, other = coefficients[(axis + 1) % 3], coefficients[(axis + 2) % 3]
-        rates.append(math.sqrt(abs(one)) * math.sqrt(abs(other)) * abs(w))
-    return max(rates)
-
-
-def _run(only: Sequence[str]) -> Iterator[Outcome]:
-    for name, scene, time in circumstances():
-        yield from hold("shapes", name, scene, time, only, ALL)
-        yield from describe_programs("shapes", name, scene, only)
+    a, b, c = map(math.sqrt, map(abs, scene.euler_coefficients))
+    return max(w * abs(own) for w, own in zip((b * c, c * a, a * b), scene.omega, strict=True))
 
 
 TRIAL = Trial(
@@ -64,5 +54,5 @@ TRIAL = Trial(
     "moments in the ratio 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, flat plates, impossible bodies",
     "as of the separatrix; energy and momentum weigh omega by moments, and are read as the "
     "error of omega that would change them so.",
-    _run,
+    in_turn("shapes", lambda: hold_all(circumstances())),
 )

@@ -14,16 +14,16 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.compare.candidates import listed, solved
-from pyharness.compare.checks import bounded, may_hold
+from pyharness.compare.checks import may_hold
 from pyharness.methods.prepared import PREPARED, Solver, prepare
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
-from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.original.programs import IMPLEMENTATIONS
-from pyharness.stress.run import Outcome, Trial, replay
+from pyharness.stress.run import LISTINGS, Outcome, Trial, bounded
 from pyharness.theory import promises
 
 THREADS = 8
@@ -33,59 +33,36 @@ _SWITCH = 5e-5
 _TOLERANCE = 1e-9
 _TIMES = (0.05, 0.1, 0.2)
 
+_WAVE = TorqueLaw(sines=(((100.0, 0.0, 3.0), 5.0),))
+_WAVES = TorqueLaw(
+    (10.0, 0.0, 2.0), (0.0, 0.0, 1.0),
+    (((1.0, 0.0, 0.0), 100.0), ((0.0, 2.0, 0.0), 3.0)), (((0.0, 1.0, 0.0), 100.0),),
+)  # fmt: skip
 SCENES = (
     Scene("free", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), steps=20),
-    Scene(
-        "sphere",
-        (1.0, 1.0, 1.0),
-        moments=(40.0, 40.0, 40.0),
-        torque=TorqueLaw(sines=(((100.0, 0.0, 3.0), 5.0),)),
-        steps=20,
-    ),
-    Scene(
-        "driven",
-        (0.0, 1.0, 1.0),
-        moments=(40.0, 30.0, 20.0),
-        torque=TorqueLaw(
-            (10.0, 0.0, 2.0),
-            (0.0, 0.0, 1.0),
-            (((1.0, 0.0, 0.0), 100.0), ((0.0, 2.0, 0.0), 3.0)),
-            (((0.0, 1.0, 0.0), 100.0),),
-        ),
-        steps=20,
-    ),
+    Scene("sphere", (1.0, 1.0, 1.0), moments=(40.0, 40.0, 40.0), torque=_WAVE, steps=20),
+    Scene("driven", (0.0, 1.0, 1.0), moments=(40.0, 30.0, 20.0), torque=_WAVES, steps=20),
 )
 
 
 @dataclass(frozen=True)
 class Job:
-    """A call that gives the same bits whenever and wherever it is made.
-
-    Attributes
-    ----------
-    subject : str
-        The method or program that is called.
-    scene : Scene
-        What it is called for.
-    call : callable
-        Returns the bits; the text of a refusal counts as such.
-    """
+    """A call, of a method or program, that gives the same bits whenever and wherever it is made."""
 
     subject: str
     scene: Scene
     call: Callable[[], bytes]
 
 
-def run(only: Sequence[str]) -> Iterator[Outcome]:
+def _run(only: Sequence[str]) -> Iterator[Outcome]:
     """Make every call alone, then all of them at once, mixed, several times each."""
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
     for subject in dict.fromkeys(job.subject for job in asked):
         own = [job for job in asked if job.subject == subject]
         wrong = [job for job in differing if job.subject == subject]
-        id = f"threads/{subject}"
         note = f"{_REPEATS * len(own)} calls in {THREADS} threads"
-        check = bounded(id, float(len(wrong)), 0.0, replay(id), note)
+        check = bounded(f"threads/{subject}", float(len(wrong)), 0.0, note)
         yield Outcome(check, (wrong or own)[0].scene)
 
 
@@ -120,11 +97,10 @@ def jobs() -> list[Job]:
             found.append(Job(name, scene, partial(_rows, scene, name)))
         for name in PREPARED:
             found.append(Job(f"prepared-{name}", scene, partial(_prepared, scene, name)))
-        for program in PROGRAMS:
-            for listing in (original(program), corrected(program)):
-                for implementation in IMPLEMENTATIONS:
-                    call = partial(_program, scene, listing, implementation)
-                    found.append(Job(program, scene, call))
+        for listing in LISTINGS:
+            for implementation in IMPLEMENTATIONS:
+                call = partial(_program, scene, listing, implementation)
+                found.append(Job(listing.program, scene, call))
         found.append(Job("refusals", scene, partial(_refusal, scene)))
     for case in range(1, 8):
         found.append(Job("linear-solver", case_scene(case), partial(_linear, case)))
@@ -166,9 +142,8 @@ def _refusal(scene: Scene) -> bytes:
 
 def _linear(seed: int) -> bytes:
     source = np.random.default_rng(seed)
-    factors, x, ier = extension().solve_linear(
-        source.normal(size=(5, 5)), source.normal(size=(5, 3))
-    )
+    a, b = source.normal(size=(5, 5)), source.normal(size=(5, 3))
+    factors, x, ier = extension().solve_linear(a, b)
     return bytes(factors.tobytes() + x.tobytes() + str(ier).encode())
 
 
@@ -176,5 +151,5 @@ TRIAL = Trial(
     "threads",
     "the same calls from eight threads at once",
     "no call shares state with another, so that no bit may differ",
-    run,
+    _run,
 )

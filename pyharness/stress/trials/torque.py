@@ -1,52 +1,48 @@
 """Torque: waves too fast for the step, huge and tiny torques, resonance with the precession."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
-from pyharness.compare.candidates import called, solved, unstopped
-from pyharness.compare.checks import Check, bounded, described, selected
+from pyharness.compare.candidates import Candidate, called, solved, unstopped
+from pyharness.compare.checks import Check
 from pyharness.methods.registry import FIXED_STEP
-from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene, TorqueLaw, Triple
-from pyharness.stress.hold import Truth, attempt, describe_programs, hold, truth_of
-from pyharness.stress.run import Outcome, Trial, replay
-from pyharness.theory import promises
+from pyharness.stress.hold import (
+    Truth,
+    apart,
+    attempt,
+    describe_programs,
+    finest_and_middling,
+    hold,
+    truth_of,
+)
+from pyharness.stress.run import LISTINGS, Attempt, Trial, bounded, described, in_turn
+from pyharness.theory import brouwer
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.axial_top import axial_top
 from pyharness.truth.reference import reference
 
-_MIDDLING = 1e-6
 # Prepared solvers have kernels of their own.
 _PREPARED = {"prepared-auto": "auto", "quick": "quick"}
-_ALL = (
-    *("taylor", "gauss-2", "gauss-4", "gauss-8", "auto"),
-    *_PREPARED,
-    *("dop853", "lsoda", "rk45", "radau"),
-)
+_OURS = ("taylor", "gauss-2", "gauss-4", "gauss-8", "auto")
+_ALL = (*_OURS, *_PREPARED, "dop853", "lsoda", "rk45", "radau")
 # What follows a wave for a million radians in seconds.
 _LONG = ("taylor", "auto", *_PREPARED)
-_ONLY_MIDDLING = ("quick", "rk45", "radau")
 
 _BODY = (40.0, 30.0, 20.0)
+_SYMMETRIC = (40.0, 40.0, 20.0)
 _START = (0.3, 1.0, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene that is tried.
+    """A scene that is tried until a time (s), and by what can take it.
 
-    Attributes
-    ----------
-    scene, time : Scene, float
-        What, and until when (s).
-    truth : callable
-        Of both: the solution and what the flow makes of errors.
-    methods : tuple of str
-        Those tried; the programs are, where `programs` says so, over the scene's steps.
+    Programs are tried, where `programs` says so, over the scene's steps.
     """
 
     scene: Scene
@@ -93,29 +89,30 @@ def summed(scene: Scene, time: float) -> Truth:
     return Truth(time, known.omega[-1], known.error, flow)
 
 
-def _wave(frequency: float) -> TorqueLaw:
-    """Return a torque on all axes that moves omega by about a radian per second in a period."""
+def _wave(frequency: float) -> Circumstance:
+    """Take a torque on all axes that moves omega by about a radian per second in a period."""
     size = 10.0 * frequency
-    return TorqueLaw(
+    law = TorqueLaw(
         sines=(((4.0 * size, 0.0, 2.0 * size), frequency),),
         cosines=(((0.0, 3.0 * size, 0.0), frequency),),
     )
+    return Circumstance(Scene("wave", _START, moments=_BODY, torque=law), 500.0 / frequency)
 
 
-def _spun(frequency: float, steps: int = 100) -> Scene:
+def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
     law = TorqueLaw(
         sines=(((0.0, 0.0, 3.0 * frequency), frequency),),
         cosines=(((0.0, 0.0, 2.0 * frequency), frequency),),
     )
-    return Scene("axial wave", _START, moments=(40.0, 40.0, 20.0), torque=law, steps=steps)
+    scene = Scene("axial wave", _START, moments=_SYMMETRIC, torque=law, steps=100)
+    return Circumstance(scene, time, axial, _LONG, programs)
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
     """Take a constant torque, for some fifty radians of the motion that it makes."""
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
-    time = math.sqrt(4e3 / size)
     scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
-    return Circumstance(scene, time, programs=size == 1e6)
+    return Circumstance(scene, math.sqrt(4e3 / size), programs=size == 1e6)
 
 
 def _tiny(size: float) -> Circumstance:
@@ -124,12 +121,9 @@ def _tiny(size: float) -> Circumstance:
     return Circumstance(scene, 5.0, programs=size == 1e-12)
 
 
-def _resonant(moments: tuple[float, float, float]) -> Circumstance:
+def _resonant(moments: Triple) -> Circumstance:
     """Take a torque across the axis that turns with the precession of Case 2, 5 rad/s."""
-    law = TorqueLaw(
-        sines=(((0.0, -40.0, 0.0), 5.0),),
-        cosines=(((40.0, 0.0, 0.0), 5.0),),
-    )
+    law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
     return Circumstance(scene, 20.0, programs=True)
 
@@ -138,17 +132,16 @@ def _no_digits(frequency: float, size: float, sphere: bool) -> Circumstance:
     law = TorqueLaw(sines=(((size, 0.0, -size), frequency),))
     moments = (40.0, 40.0, 40.0) if sphere else _BODY
     scene = Scene("angle without digits", _START, moments=moments, torque=law)
-    if sphere:
-        return Circumstance(scene, 0.7, summed, ("closed-form", "auto", "prepared-auto"))
-    return Circumstance(scene, 0.7, averaged, _LONG)
+    methods = ("closed-form", "auto", "prepared-auto") if sphere else _LONG
+    return Circumstance(scene, 0.7, summed if sphere else averaged, methods)
 
 
 CIRCUMSTANCES = {
-    "fast-1e4": Circumstance(Scene("wave", _START, moments=_BODY, torque=_wave(1e4)), 0.05),
-    "fast-1e6": Circumstance(Scene("wave", _START, moments=_BODY, torque=_wave(1e6)), 5e-4),
-    "axial-1e4": Circumstance(_spun(1e4), 1.0, axial, _LONG, programs=True),
-    "axial-1e6": Circumstance(_spun(1e6), 1.0, axial, _LONG, programs=True),
-    "axial-1e8": Circumstance(_spun(1e8), 0.02, axial, _LONG),
+    "fast-1e4": _wave(1e4),
+    "fast-1e6": _wave(1e6),
+    "axial-1e4": _spun(1e4, 1.0, programs=True),
+    "axial-1e6": _spun(1e6, 1.0, programs=True),
+    "axial-1e8": _spun(1e8, 0.02, programs=False),
     "no-digits-1e16": _no_digits(1e16, 2e17, sphere=True),
     "no-digits-1e22": _no_digits(1e22, 2e23, sphere=True),
     "averaged-1e16": _no_digits(1e16, 10.0, sphere=False),
@@ -156,33 +149,27 @@ CIRCUMSTANCES = {
     # Growth to 1e8 times the start, by the torque alone: no blow-up.
     "huge-from-rest": _huge(1e4, (1e-6, 0.0, 0.0)),
     **{f"tiny-{size:.0e}": _tiny(size) for size in (1e-12, 1e-100, 1e-300, 5e-324)},
-    "resonant": _resonant((40.0, 40.0, 20.0)),
+    "resonant": _resonant(_SYMMETRIC),
     "resonant-nearly": _resonant((40.0, 40.0 * (1.0 + 1e-7), 20.0)),
     "resonant-off": _resonant((41.0, 39.0, 20.0)),
 }
 
 
-def run(only: Sequence[str]) -> Iterator[Outcome]:
-    """Try every circumstance by what can take it."""
+def _attempts() -> Iterator[Attempt]:
     for name, each in CIRCUMSTANCES.items():
-        yield from hold(
-            "torque", name, each.scene, each.time, only, each.methods, each.truth, tolerances, held
-        )
+        yield from hold(name, each.scene, each.time, each.methods, each.truth, _tolerances, _held)
         if each.programs and each.truth is axial:
-            yield from _describe_axial(name, each, only)
+            yield from _describe_axial(name, each.scene)
         elif each.programs:
-            yield from describe_programs("torque", name, each.scene, only)
+            yield from describe_programs(name, each.scene)
 
 
-def tolerances(name: str, scene: Scene, truth: Truth) -> list[float]:
-    """Return the tolerances at which a method is tried: its finest, and one in the middle."""
-    known = _PREPARED.get(name, name)
-    finest = _MIDDLING if name == "quick" else promises.finest(known, scene, truth.time)
-    return [_MIDDLING] if name in _ONLY_MIDDLING else sorted({finest, max(finest, _MIDDLING)})
+def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float]:
+    return finest_and_middling(_PREPARED.get(name, name), scene, truth.time)
 
 
-def held(
-    id: str, scene: Scene, truth: Truth, name: str, tolerance: float | None
+def _held(
+    scene: Scene, truth: Truth, name: str, tolerance: float | None, id: str
 ) -> Iterator[Check]:
     """Hold one method against the truth: tolerance and rounding, amplified by the flow."""
     assert tolerance is not None
@@ -192,38 +179,31 @@ def held(
     if isinstance(end, Check):
         yield end
         return
-    error, note = math.inf, end.ended
-    if end.ended == "complete":
-        error, note = float(np.abs(end.omega - truth.omega).max()) / truth.flow.largest, ""
     limit = truth.flow.limit(tolerance) + truth.error / truth.flow.largest
-    yield bounded(id, error, limit, replay(id), note)
+    yield bounded(id, truth.wrong(end), limit, "" if end.ended == "complete" else end.ended)
 
 
-def _describe_axial(name: str, each: Circumstance, only: Sequence[str]) -> Iterator[Outcome]:
+def _describe_axial(circumstance: str, scene: Scene) -> Iterator[Attempt]:
     """Say what steps a hundred radians of a wave apart make of it."""
-    scene = each.scene
-    runs = [
-        (f"torque/{program}/{name}/{listing.label}", unstopped(listing))
-        for program in PROGRAMS
-        for listing in (original(program), corrected(program))
-    ]
-    runs += [(f"torque/{m}/{name}/own-steps", solved(m, 1.0)) for m in FIXED_STEP]
-    wanted = [(id, candidate) for id, candidate in runs if selected(id, only)]
-    if not wanted:
-        return
-    truth = np.array([[float(w) for w in row] for row in axial_top(scene, scene.times())])
-    scale = float(np.abs(truth).max())
-    for id, candidate in wanted:
+    truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
+
+    def describe(candidate: Candidate, id: str) -> Iterator[Check]:
         omega = candidate.rows(scene).omega
-        n = min(len(omega), len(truth))
-        error = float(np.abs(omega[:n] - truth[:n]).max(initial=0.0)) / scale
-        note = "" if n == len(truth) else f"ended after {n} steps"
-        yield Outcome(described(id, error, replay(id), note), scene)
+        error = apart(omega, truth()) / float(np.abs(truth()).max())
+        note = "" if len(omega) >= scene.steps else f"ended after {len(omega)} steps"
+        yield described(id, error, note)
+
+    for listing in LISTINGS:
+        name = f"{listing.program}/{circumstance}/{listing.label}"
+        yield Attempt(name, partial(describe, unstopped(listing)), scene)
+    for name in FIXED_STEP:
+        make = partial(describe, solved(name, 1.0))
+        yield Attempt(f"{name}/{circumstance}/own-steps", make, scene)
 
 
 TRIAL = Trial(
     "torque",
     "waves of 1e4 rad/s and more, torques of 1e12 and of 5e-324, resonance with the precession",
     "tolerance and rounding, amplified by the flow; a wave's rounding counts with its angle",
-    run,
+    in_turn("torque", _attempts),
 )

@@ -31,8 +31,8 @@ class PlantedTwin(Program):
         """Run the faulty twin, or the compiled program as it is."""
         if self.both or implementation == "python":
             lipschitz, may_stop, _ = options
-            trajectory: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
-            return trajectory
+            found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
+            return found
         return super()._computed(scene, listing, implementation, *options)
 
 

@@ -1,11 +1,14 @@
-"""Self-test of `verify`: one plant after another, and which check catches which."""
+"""Self-test of `verify`: one plant after another, which check catches which, and its report."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from pyharness.compare.checks import Check
+from pyharness.compare.checks_report import checks_report
+from pyharness.model.report import Report
 from pyharness.verify.kinds import verify
 from pyharness.verify.plants.plants import PLANTS, Plant
 from pyharness.verify.selection import Selection
@@ -17,12 +20,10 @@ _DRAWS = 12
 
 @dataclass(frozen=True)
 class Caught:
-    """How a plant fared.
+    """How a plant fared, or the control, without a fault.
 
     Attributes
     ----------
-    plant : Plant or None
-        None for the control, without a fault.
     failed : mapping of str to int
         Failed checks by kind.
     example : str
@@ -36,9 +37,12 @@ class Caught:
     @property
     def passed(self) -> bool:
         """Whether a check that is not the record caught it; of the control, whether none did."""
-        if self.plant is None:
-            return not self.failed
-        return any(count for kind, count in self.failed.items() if kind != _NOT_ENOUGH)
+        return bool(self.failed.keys() - {_NOT_ENOUGH}) if self.plant else not self.failed
+
+    @property
+    def counts(self) -> str:
+        """How many checks of each kind failed."""
+        return ", ".join(f"{kind} {count}" for kind, count in self.failed.items())
 
 
 def self_test(seed: str, record: Path) -> Iterator[Caught]:
@@ -63,9 +67,21 @@ def _caught(plant: Plant | None, chosen: Selection) -> Caught:
 
 def as_check(caught: Caught) -> Check:
     """Return the finding as a check."""
-    name = "none" if caught.plant is None else caught.plant.name
-    counts = ", ".join(f"{kind} {count}" for kind, count in caught.failed.items())
-    note = f"caught by {counts}" if counts else "caught by nothing"
-    value = float(sum(n for kind, n in caught.failed.items() if kind != _NOT_ENOUGH))
+    name = caught.plant.name if caught.plant else "none"
+    value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
     again = "python -m pyharness verify --self-test"
+    note = f"caught by {caught.counts or 'nothing'}"
     return Check(f"self-test/{name}", caught.passed, value, None, again, note)
+
+
+def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:
+    """Report each fault, and how many checks of each kind caught it."""
+    told = []
+    for caught in found:
+        plant = caught.plant or Plant("none", "no fault: nothing may fail", nullcontext)
+        by = f"caught by {caught.counts} ({caught.example})" if caught.failed else "nothing fails"
+        told += [f"{'' if caught.passed else 'FAILED '}{plant.name}: {plant.fault}", f"  {by}"]
+    missed = sum(not caught.passed for caught in found)
+    end = f"{missed} not as it should be" if missed else "each caught by more than the record"
+    end = f"{len(found) - 1} plants and a control: {end}"
+    return checks_report("verify", list(map(as_check, found)), [title, told, [end]], seed=seed)

@@ -1,9 +1,9 @@
 ! The only file that f2py reads: explicit shapes, known kinds, a status code, no logic.
 
 subroutine run_program(program, flags, by_moments, body, omega, masses, forces, torque_constant, &
-                       torque_rate, torque_varies, n_sines, sines, n_cosines, cosines, &
-                       step_size, n_steps, lipschitz, may_stop, with_velocity, rows, ier_rows, &
-                       n_rows, status, evaluations, stop_variable, stop_quotient)
+                       torque_rate, torque_first, torque_varies, n_sines, sines, n_cosines, &
+                       cosines, step_size, n_steps, lipschitz, may_stop, with_velocity, rows, &
+                       ier_rows, n_rows, status, evaluations, stop_variable, stop_quotient)
   ! One of the three programs of the appendix on one scene.
   !f2py threadsafe
   use deck, only: deck_t, stop_t
@@ -17,6 +17,7 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   real(8), intent(in) :: omega(3)          ! rad/s at time 0
   real(8), intent(in) :: masses(3), forces(3)
   real(8), intent(in) :: torque_constant(3), torque_rate(3)
+  real(8), intent(in) :: torque_first(3)   ! over moment, 1/s2: of the first step, where assumed
   integer(4), intent(in) :: torque_varies  ! 0: only the constant acts
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), frequency in rad/s
@@ -40,8 +41,8 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   type(stop_t) :: stop_at
 
   scene = deck_t(by_moments /= 0, body, omega, masses, forces, torque_constant, torque_rate, &
-                 torque_varies /= 0, sines, cosines, step_size, n_steps, lipschitz, may_stop /= 0, &
-                 with_velocity /= 0)
+                 torque_first, torque_varies /= 0, sines, cosines, step_size, n_steps, lipschitz, &
+                 may_stop /= 0, with_velocity /= 0)
   call run(program, scene, listing_from_bits(flags), rows, ier_rows, n_rows, status, evaluations, &
            stop_at)
   stop_variable = stop_at%variable

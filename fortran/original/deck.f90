@@ -13,6 +13,7 @@ module deck
     real(dp) :: forces(3)             !! FRC1, FRC2, FRC3, N
     real(dp) :: torque_constant(3)    !! N m
     real(dp) :: torque_rate(3)        !! N m/s
+    real(dp) :: torque_first(3)       !! over moment, 1/s2: of the first step, where assumed
     logical :: torque_varies
     real(dp), pointer :: sines(:, :)    !! columns: amplitude (3), frequency in rad/s
     real(dp), pointer :: cosines(:, :)  !! the same

@@ -1,5 +1,5 @@
 module listing_flags
-  !! Which defects and readings of the appendix are active, one bit each.
+  !! Which defects, readings and conjectures of the appendix are active, one bit each.
   !! The bits are those of `flag` in pyharness/data/apparatus.toml.
   implicit none(type, external)
   private
@@ -15,6 +15,7 @@ module listing_flags
     logical :: lipschitz_mismatched_pairs
     logical :: c1_for_c
     logical :: do_variable
+    logical :: initial_torque
   end type listing_t
 
   public :: listing_from_bits
@@ -35,6 +36,7 @@ contains
     listing%lipschitz_mismatched_pairs = btest(bits, 7)
     listing%c1_for_c = btest(bits, 8)
     listing%do_variable = btest(bits, 9)
+    listing%initial_torque = btest(bits, 10)
   end function listing_from_bits
 
 end module listing_flags

@@ -111,7 +111,11 @@ contains
       begin = real(L - 1, dp)*scene%step_size
       TIME = TIME + DT                                                            ! 760
       if (scene%torque_varies) then
-        if (listing%torque_held) then
+        if (listing%initial_torque .and. L == 1) then
+          R1 = scene%torque_first(1)
+          R2 = scene%torque_first(2)
+          R3 = scene%torque_first(3)
+        else if (listing%torque_held) then
           call normalized_torque(scene, TIME, R1(1), R2(1), R3(1))
           R1(2:4) = R1(1)
           R2(2:4) = R2(1)

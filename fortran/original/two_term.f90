@@ -97,7 +97,11 @@ contains
       T22 = T2*T2
       T32 = T3*T3
       if (scene%torque_varies) then
-        if (listing%torque_held) then
+        if (listing%initial_torque .and. I == 1) then
+          M1 = scene%torque_first(1)
+          M2 = scene%torque_first(2)
+          M3 = scene%torque_first(3)
+        else if (listing%torque_held) then
           call normalized_torque(scene, TIME, M1(1), M2(1), M3(1))
           M1(2:3) = M1(1)
           M2(2:3) = M2(1)

@@ -12,6 +12,8 @@ from pyharness.model.errors import InputError, NotBuiltError, unknown
 VERBS = {
     "compare": "original against corrected, Fortran against Python, all against the truth",
     "run": "one trajectory: a program of the appendix, or a method",
+    "cards": "the text of the edition, card by card: scan, port, twin, apparatus",
+    "deck": "a program as a deck of cards, in fixed-form FORTRAN",
     "defects": "the apparatus: every defect and reading, the evidence, and its effect",
     "limits": "what the original programs tend to as the step goes to zero",
     "figures": "Figures 6 to 12 of the thesis, original and corrected: SVG, PNG, CSV",

@@ -31,6 +31,7 @@ LISTING = {
     "--fix NAME,...": "correct these defects",
     "--keep NAME,...": "keep these; alone: correct all others",
     "--reading NAME,...": "select readings not adopted",
+    "--conjecture NAME,...": "assume this where no card exists; none: nothing",
     "--lipschitz L": "constant of the stop test (default 500)",
     "--no-stop": "run on where the stop test would end the run",
 }
@@ -157,14 +158,16 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
         names(options.fix),
         names(options.keep),
         names(options.reading),
+        None if options.conjecture is None else names(options.conjecture),
     )
 
 
 def listing_text(listing: Listing) -> str:
     """Say a listing in a line."""
     active = ", ".join(sorted(listing.defects)) or "no defects"
-    readings = f"; readings: {', '.join(sorted(listing.readings))}" if listing.readings else ""
-    return f"{listing.label} listing: {active}{readings}"
+    more = {"readings": listing.readings, "conjectures": listing.conjectures}
+    told = [f"; {what}: {', '.join(sorted(names))}" for what, names in more.items() if names]
+    return f"{listing.label} listing: {active}{''.join(told)}"
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:

@@ -159,6 +159,7 @@ def listings_for(
     fix: Sequence[str] = (),
     keep: Sequence[str] = (),
     readings: Sequence[str] = (),
+    conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
     """Return what to compare: original and corrected, and the subset asked for between them.
 
@@ -166,8 +167,13 @@ def listings_for(
     mistake. With `base` and nothing else, only that listing is shown.
     """
     chosen = list(programs)
-    for option, names in (("--fix", fix), ("--keep", keep), ("--reading", readings)):
-        kind = "reading" if option == "--reading" else "defect"
+    assumed = [name for name in conjectures or () if name != "none"]
+    for kind, option, names in (
+        ("defect", "--fix", fix),
+        ("defect", "--keep", keep),
+        ("reading", "--reading", readings),
+        ("conjecture", "--conjecture", assumed),
+    ):
         allowed = {name for program in chosen for name in names_of(kind, program)}
         for name in names:
             if name not in allowed:
@@ -181,9 +187,9 @@ def listings_for(
         kept = [name for name in keep if name in defects]
         selected = [name for name in readings if name in own]
         bases = [base] if base and not (fix or keep) else ["original", "corrected"]
-        rows = [subset(program, each, readings=selected) for each in bases]
+        rows = [subset(program, each, (), (), selected, conjectures) for each in bases]
         if fixed or kept:
-            rows.insert(1, subset(program, base, fixed, kept, selected))
+            rows.insert(1, subset(program, base, fixed, kept, selected, conjectures))
         result += rows
     return result
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from random import Random
 
-from pyharness.model.listing import PROGRAMS, Listing, names_of
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
 from pyharness.model.turned_scenes import turned
@@ -53,8 +53,8 @@ def draw(seed: str, number: int) -> Draw:
         scene = replace(_NASTY[name](source), name=name)
     program = source.choice(PROGRAMS)
     defects, readings = (
-        frozenset(name for name in names_of(kind, program) if source.random() < share)
-        for kind, share in (("defect", 0.5), ("reading", 0.3))
+        frozenset(name for name in names if source.random() < share)
+        for names, share in ((switches(program), 0.5), (names_of("reading", program), 0.3))
     )
     return Draw(
         scene=scene,

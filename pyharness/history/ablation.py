@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -10,7 +10,7 @@ from pyharness.compare.agreement import accuracy
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing, corrected, names_of, original, subset
+from pyharness.model.listing import Listing, corrected, names_of, original, subset, switches
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Stop
@@ -85,6 +85,14 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
         first, last = original(program), corrected(program)
         if known["kind"] == "reading":
             listings = original(program, [name]), first, corrected(program, [name]), last
+        elif known["kind"] == "conjecture":
+            with_it, without = first.conjectures | {name}, first.conjectures - {name}
+            listings = (
+                replace(first, conjectures=with_it),
+                replace(first, conjectures=without),
+                replace(last, conjectures=frozenset([name])),
+                last,
+            )
         else:
             fixed = subset(program, "original", fix=[name])
             listings = first, fixed, subset(program, "corrected", keep=[name]), last
@@ -99,12 +107,17 @@ def lattice(
     """Return the effect of every subset of a program's defects, largest error of omega first."""
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
-    names = names_of("defect", program)
+    names = switched(scene, program)
     found = []
     for bits in range(2 ** len(names)):
         active = [name for i, name in enumerate(names) if bits >> i & 1]
         found.append(effect(scene, Listing(program, active, readings), truth, effort=effort))
     return sorted(found, key=_size, reverse=True)
+
+
+def switched(scene: Scene, program: str) -> tuple[str, ...]:
+    """Return what can be switched off to an effect: of a constant torque nothing is assumed."""
+    return switches(program) if scene.torque.varies else names_of("defect", program)
 
 
 def _size(found: Effect) -> tuple[float, float]:

@@ -7,8 +7,8 @@ from dataclasses import asdict
 from itertools import zip_longest
 from typing import Any
 
-from pyharness.history.ablation import CaseEffects, Effect
-from pyharness.model.listing import names_of
+from pyharness.history.ablation import CaseEffects, Effect, switched
+from pyharness.model.listing import Listing
 from pyharness.model.records import listing_record, scene_record
 from pyharness.model.report import (
     Column,
@@ -57,7 +57,7 @@ def entry_report(entry: dict[str, Any], effects: Sequence[CaseEffects]) -> Repor
     if "original" in entry:
         text.append(_beside(entry, "original", "corrected"))
     if effects:
-        text += _effects(effects, entry["kind"] == "reading")
+        text += _effects(effects, entry["kind"] != "defect")
 
     def record() -> dict[str, Any]:
         found = []
@@ -103,12 +103,12 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
     text: list[Section] = []
     rows = []
     for program, effects in found.items():
-        letters = dict(zip(names_of("defect", program), string.ascii_lowercase, strict=False))
+        letters = dict(zip(switched(scene, program), string.ascii_lowercase, strict=False))
         title = f"program {program}: every subset of its defects, sorted by effect"
         key = [f"  {letter}  {name}" for name, letter in letters.items()]
         subsets = []
         for each in effects:
-            errors, active = (each.omega, each.velocity, each.steps), each.listing.defects
+            errors, active = (each.omega, each.velocity, each.steps), _active(each.listing)
             written = "".join(a if name in active else "." for name, a in letters.items())
             subsets.append([written, *errors, _stop(each)])
             variable = each.stop.variable if each.stop else None
@@ -123,6 +123,10 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
         },
         data=numbers("program active error_w error_v steps ended stop_variable", rows),
     )
+
+
+def _active(listing: Listing) -> frozenset[str]:
+    return listing.defects | listing.conjectures
 
 
 def _effect_record(effect: Effect) -> dict[str, Any]:

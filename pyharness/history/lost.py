@@ -6,12 +6,14 @@ that such a program could have had, programmed as IV.2 describes the method: two
 written out as polynomials, one solution for a constant right-hand side, one correction.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.polynomial import polynomial
 
 from pyharness.model.facts import facts
+from pyharness.model.report import Column, Report, Section, Table, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
@@ -161,3 +163,43 @@ def halved(scene: Scene, weighting: str) -> float:
     """Return by how much the error of a weighting without mistake falls as the step is halved."""
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
+
+
+_ABBREVIATED = {"subdomain": "sub", "galerkin": "gal", "least-squares": "lsq"}
+_TABLE = (
+    *words("mistake"),
+    *(Column(f"{_ABBREVIATED[w]}.{case}", short) for w in WEIGHTINGS for case in CASES),
+    Column("both"), Column("either"), Column("what", left=True, fit="wrap"),
+)  # fmt: skip
+
+
+def lost_report(found: Sequence[Ranked]) -> Report:
+    """Report every mistake, the largest errors it makes, and where it fails as IV.2 says."""
+    rows = [
+        [
+            each.mistake,
+            *(share for attempt in each.attempts for share in attempt.shares.values()),
+            each.in_both, each.in_either, each.summary,
+        ]
+        for each in found
+    ]  # fmt: skip
+    best = found[0]
+    text: list[Section] = [
+        [
+            "Conjectures: mistakes that the programs for three weightings may have had, which IV.2 "
+            "says gave no meaningful results in Cases 1 and 2, and which are not printed. Largest "
+            "error over the largest omega, by weighting and case; a tenth of it is a failure.",
+        ],
+        [Table(_TABLE, rows)],
+        [
+            f"{best.mistake} fails in both cases with {best.in_both} of {len(WEIGHTINGS)} "
+            "weightings, the most of all; a mistake in the products alone can't fail Case 1, where "
+            "A = B = C = 0 and the products count nothing.",
+        ],
+    ]
+    return Report(
+        "family",
+        text,
+        record=lambda: {"lost": [asdict(each) for each in found]},
+        data=Table(_TABLE, rows),
+    )

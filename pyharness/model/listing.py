@@ -9,6 +9,7 @@ from pyharness.model.facts import facts
 from pyharness.model.values import several
 
 PROGRAMS = ("two-term", "four-term", "runge-kutta")
+_FIELDS = {"defect": "defects", "reading": "readings", "conjecture": "conjectures"}
 
 
 @dataclass(frozen=True)
@@ -23,23 +24,34 @@ class Listing:
         The defects that are active.
     readings : frozenset of str
         The readings selected that are not the adopted ones.
+    conjectures : frozenset of str
+        What is assumed where no card exists; also taken from among `defects`.
     """
 
     program: str
     defects: frozenset[str]
     readings: frozenset[str] = frozenset()
+    conjectures: frozenset[str] = frozenset()
 
     if TYPE_CHECKING:
 
         def __init__(
-            self, program: str, defects: Iterable[str], readings: Iterable[str] = ...
+            self,
+            program: str,
+            defects: Iterable[str],
+            readings: Iterable[str] = ...,
+            conjectures: Iterable[str] = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         """Refuse names that the program does not have."""
         _check_program(self.program)
-        for kind, field in (("defect", "defects"), ("reading", "readings")):
-            names = _names(field, getattr(self, field))
+        given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
+        assumed = given["defects"] & set(names_of("conjecture", self.program))
+        given["defects"] -= assumed
+        given["conjectures"] |= assumed
+        for kind, field in _FIELDS.items():
+            names = given[field]
             object.__setattr__(self, field, names)
             for name in sorted(names):
                 if name not in names_of(kind, self.program):
@@ -48,28 +60,29 @@ class Listing:
     @property
     def label(self) -> str:
         """`original`, `corrected` or `custom`."""
-        if not self.defects:
+        active = self.defects | self.conjectures
+        if not active:
             return "corrected"
-        return "original" if self.defects == set(names_of("defect", self.program)) else "custom"
+        return "original" if active == set(switches(self.program)) else "custom"
 
     @property
     def flags(self) -> int:
         """The active names as the bits that the Fortran reads."""
-        active = self.defects | self.readings
+        active = self.defects | self.readings | self.conjectures
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in active)
 
     def has(self, name: str) -> bool:
-        """Whether the defect or reading `name` is active."""
-        return name in self.defects or name in self.readings
+        """Whether the defect, reading or conjecture `name` is active."""
+        return name in self.defects or name in self.readings or name in self.conjectures
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the defects and readings of the apparatus that have a flag."""
+    """Return the defects, readings and conjectures of the apparatus that have a flag."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of a kind (`defect` or `reading`), of one program or of all."""
+    """Return the names of a kind (`defect`, `reading`, `conjecture`), of one program or of all."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -77,9 +90,19 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
     )
 
 
+def switches(program: str) -> tuple[str, ...]:
+    """Return all that is active in the original program: its defects, and what it conjectures."""
+    return tuple(
+        entry["id"]
+        for entry in flagged()
+        if program in entry["programs"]
+        and (entry["kind"] == "defect" or entry.get("in_original", False))
+    )
+
+
 def original(program: str, readings: Iterable[str] = ()) -> Listing:
-    """Return the original program: every defect is active."""
-    return Listing(program, frozenset(names_of("defect", program)), frozenset(readings))
+    """Return the original program: every defect is active, and what no card of it says."""
+    return Listing(program, frozenset(switches(program)), frozenset(readings))
 
 
 def corrected(program: str, readings: Iterable[str] = ()) -> Listing:
@@ -93,6 +116,7 @@ def subset(
     fix: Iterable[str] = (),
     keep: Iterable[str] = (),
     readings: Iterable[str] = (),
+    conjectures: Iterable[str] | None = None,
 ) -> Listing:
     """Return the listing that the options of the command line describe.
 
@@ -104,6 +128,9 @@ def subset(
         Defects to correct, and defects to keep.
     readings : iterable of str
         Readings to select that are not the adopted ones.
+    conjectures : iterable of str, optional
+        What to assume where no card exists, ``none`` for nothing; by default what `original`
+        assumes where that is the base, and nothing where `corrected` is.
 
     Raises
     ------
@@ -114,10 +141,12 @@ def subset(
     fixed, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
     for name in sorted(fixed & kept):
         raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
+    assumed = None if conjectures is None else _names("conjectures", conjectures) - {"none"}
     for option, kind, names in (
         ("--fix", "defect", fixed),
         ("--keep", "defect", kept),
         ("--reading", "reading", chosen),
+        ("--conjecture", "conjecture", assumed or frozenset()),
     ):
         for name in sorted(names - set(names_of(kind, program))):
             raise _foreign(kind, name, program, option)
@@ -126,7 +155,10 @@ def subset(
     if not isinstance(base, str) or base not in ("original", "corrected"):
         raise unknown("listing", base, ("original", "corrected"), "--listing")
     defects = set(names_of("defect", program)) if base == "original" else set()
-    return Listing(program, frozenset((defects - fixed) | kept), frozenset(chosen))
+    if assumed is None:
+        own = set(switches(program)) if base == "original" else set()
+        assumed = frozenset(own - set(names_of("defect", program)))
+    return Listing(program, frozenset((defects - fixed) | kept), chosen, assumed)
 
 
 def checked_listing(listing: object) -> Listing:

@@ -33,11 +33,12 @@ def _wave(wave: Wave) -> dict[str, Any]:
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:
-    """Return a listing: its label, its active defects and its readings."""
+    """Return a listing: its label, its active defects, its readings and conjectures."""
     return {
         "label": listing.label,
         "defects": sorted(listing.defects),
         "readings": sorted(listing.readings),
+        "conjectures": sorted(listing.conjectures),
     }
 
 

@@ -1,9 +1,11 @@
 """The cells in which Fortran and twin are compared: program x case x listing x reading."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
-from pyharness.model.listing import PROGRAMS, Listing, names_of
-from pyharness.model.scene_file import case_numbers
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.original.equations import initial_torque
 
 
 def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
@@ -15,16 +17,19 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 def all_listings(program: str) -> Iterator[Listing]:
     """Return every subset of defects, with every choice of readings."""
     for readings in subsets(names_of("reading", program)):
-        for defects in subsets(names_of("defect", program)):
+        for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Return every listing of every program, with every case."""
+    """Return every listing of every program with every case, and what a case alone allows."""
     for program in PROGRAMS:
         for listing in all_listings(program):
             for case in case_numbers():
                 yield listing, case
+                if initial_torque(case_scene(case)) is not None:
+                    conjectures = listing.conjectures | {"initial-torque"}
+                    yield replace(listing, conjectures=conjectures), case
 
 
 def cell_name(listing: Listing, case: int) -> str:
@@ -36,5 +41,5 @@ def listing_name(listing: Listing) -> str:
     """Return `original`, `corrected` or the defects; readings follow after a colon."""
     name = listing.label
     if name == "custom":
-        name = "+".join(sorted(listing.defects))
+        name = "+".join(sorted(listing.defects | listing.conjectures))
     return ":".join([name, *sorted(listing.readings)])

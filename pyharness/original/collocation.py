@@ -11,7 +11,7 @@ from functools import partial
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.equations import Record, Vector, all_finite
+from pyharness.original.equations import Record, Vector, all_finite, initial_torque
 from pyharness.original.linear_solver import leqt1f
 
 Rates = Callable[[int, Vector], list[float]]
@@ -34,12 +34,15 @@ def march(
     state = [*scene.omega, 0.0, 0.0, 0.0]
     n_rates = 1 + len(points_of(dt))
     record = Record(scene, evaluations_per_step=n_rates)
+    first = initial_torque(scene) if listing.has("initial-torque") else None
 
     for step in range(scene.steps):
         begin = step * h
         time = time + dt
         points = points_of(dt)
-        if listing.has("torque-held"):
+        if step == 0 and first is not None:
+            torques: list[Vector] = [first] * n_rates
+        elif listing.has("torque-held"):
             torques = [scene.normalized_torque(time)] * n_rates
         else:
             torques = [scene.normalized_torque(begin + t) for t in (0.0, *points)]

@@ -1,11 +1,13 @@
 """The compiled programs of the appendix: scenes in, trajectories out."""
 
+from dataclasses import replace
 from typing import Any
 
 from pyharness.model.extension import ENDS, columns, extension
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
+from pyharness.original.equations import initial_torque
 
 
 def run(
@@ -40,6 +42,10 @@ def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
 ) -> tuple[Any, ...]:
     """Return what the compiled `run_program` takes."""
+    first = initial_torque(scene) if listing.has("initial-torque") else None
+    if first is None and listing.has("initial-torque"):
+        conjectures = listing.conjectures - {"initial-torque"}
+        listing = replace(listing, conjectures=conjectures)
     return (
         PROGRAMS.index(listing.program) + 1,
         listing.flags,
@@ -50,6 +56,7 @@ def program_arguments(
         scene.forces,
         scene.torque.constant,
         scene.torque.rate,
+        first or (0.0, 0.0, 0.0),
         scene.torque.varies,
         columns(scene.torque.sines),
         columns(scene.torque.cosines),

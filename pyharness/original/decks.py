@@ -70,6 +70,8 @@ def deck_text(
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
+    if listing.has("initial-torque"):
+        raise InputError("no card holds 'initial-torque'; allowed: --conjecture torque-held, none")
     cards = {number: card.text for number, card in deck(listing.program).cards.items()}
     if scene is not None:
         cards |= _case_cards(listing.program, scene)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pyharness.model.facts import facts
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Stop, Trajectory
 
@@ -29,6 +30,17 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 def accelerations(scene: Scene) -> list[float]:
     """Return force over mass along each axis (m/s2)."""
     return [force / mass for force, mass in zip(scene.forces, scene.masses, strict=True)]
+
+
+def initial_torque(scene: Scene) -> Vector | None:
+    """Return the torque over moment that Table 1 gives initially (1/s2); None where it gives none.
+
+    By the conjecture `initial-torque` it acts over the first step.
+    """
+    given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
+    if scene.case not in given or scene.moments is None:
+        return None
+    return [n / moment for n, moment in zip(given[scene.case], scene.moments, strict=True)]
 
 
 def all_finite(values: Vector) -> bool:

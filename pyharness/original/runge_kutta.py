@@ -10,7 +10,14 @@ from collections.abc import Mapping
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
-from pyharness.original.equations import Record, Vector, accelerations, all_finite, velocity_rate
+from pyharness.original.equations import (
+    Record,
+    Vector,
+    accelerations,
+    all_finite,
+    initial_torque,
+    velocity_rate,
+)
 
 
 def run(
@@ -28,11 +35,14 @@ def run(
     slope = {1: zero, 2: zero, 3: zero, 4: zero}
     third = 4 if listing.has("do-variable") else 3
     record = Record(scene, evaluations_per_step=4)
+    first = initial_torque(scene) if listing.has("initial-torque") else None
 
     for step in range(scene.steps):
         begin = step * dt
         time = time + dt
-        if listing.has("torque-held"):
+        if step == 0 and first is not None:
+            torque: dict[int, Vector] = dict.fromkeys((1, 2, 3, 4), first)
+        elif listing.has("torque-held"):
             torque = dict.fromkeys((1, 2, 3, 4), scene.normalized_torque(time))
         else:
             middle = scene.normalized_torque(begin + 0.5 * dt)

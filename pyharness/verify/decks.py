@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from pyharness.compare.checks import Check
-from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, original
+from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, original, switches
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.original.cells import cell_name
 from pyharness.original.decks import Run, compiler, deck_text, run_deck, solver_object
@@ -27,10 +27,10 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 def listings(program: str) -> list[Listing]:
     """Return original and corrected, each defect alone kept and alone mended, each reading."""
-    names = frozenset(names_of("defect", program))
+    names = frozenset(switches(program))
     found = [original(program), corrected(program)]
-    found += [Listing(program, frozenset([name])) for name in names_of("defect", program)]
-    found += [Listing(program, names - {name}) for name in names_of("defect", program)]
+    found += [Listing(program, frozenset([name])) for name in switches(program)]
+    found += [Listing(program, names - {name}) for name in switches(program)]
     for reading in names_of("reading", program):
         found += [original(program, [reading]), corrected(program, [reading])]
     return list(dict.fromkeys(found))

@@ -8,6 +8,7 @@ from itertools import chain
 
 from pyharness.compare.checks import Check
 from pyharness.model.errors import InputError
+from pyharness.verify.decks import decks
 from pyharness.verify.external import external_checks
 from pyharness.verify.external_file import problems
 from pyharness.verify.golden import golden
@@ -34,6 +35,8 @@ KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
     # Program x case x listing x reading: Fortran against twin, bit for bit over the whole
     # trajectory, counters and stop.
     "cells": cells,
+    # The decks, compiled from the author's own cards, against the port: TAPE5 and the page.
+    "decks": decks,
     # Every step of the corrected programs against its scheme, to rounding.
     "schemes": schemes,
     # Where and why the Runge-Kutta program stops, against the formula of its test.

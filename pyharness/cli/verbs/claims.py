@@ -9,15 +9,19 @@ from pyharness.history.claims.report import assignments_report, claims_report, e
 OPTIONS = {
     "--explain ID": "one claim, with its numbers",
     "--assignments": "which initial conditions let all claims hold",
-    **shared.outputs(plot=""),
+    "--evidence": "score every combination of starts, readings, conjectures and steps",
+    **shared.outputs(plot="draw the claims that discriminate (--evidence)"),
 }
 
 
 def run(options: argparse.Namespace) -> int:
     """Judge and show."""
     if options.assignments:
-        shared.refuse(options, "--assignments", ("explain",))
+        shared.refuse(options, "--assignments", ("explain", "evidence"))
         shared.check_known("format", options.format, ("table", "json"))
+    if options.evidence:
+        return _evidence(options)
+    shared.refuse(options, "the ledger; give --evidence", ("plot",))
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)
     if options.assignments:
@@ -30,4 +34,18 @@ def run(options: argparse.Namespace) -> int:
         judgements.append(judge(entry))
     one = options.explain is not None
     shared.show(explanation(judgements[0]) if one else claims_report(judgements), options)
+    return 0
+
+
+def _evidence(options: argparse.Namespace) -> int:
+    from pyharness.history.claims.evidence import combinations, evidence
+    from pyharness.history.claims.evidence_report import evidence_report
+
+    shared.refuse(options, "--evidence", ("explain",))
+    shared.check_outputs(options)
+    found, every = [], len(combinations())
+    for combination in evidence():
+        found.append(combination)
+        shared.progress(f"{len(found)} of {every} combinations")
+    shared.show(evidence_report(found), options)
     return 0

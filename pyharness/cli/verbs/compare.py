@@ -40,6 +40,7 @@ def run(options: argparse.Namespace) -> int:
         shared.names(options.fix),
         shared.names(options.keep),
         shared.names(options.reading),
+        None if options.conjecture is None else shared.names(options.conjecture),
     )
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
@@ -49,7 +50,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) -> int:
-    meaningless = ("listing", "fix", "keep", "lipschitz", "no_stop", "tolerance", "plot")
+    meaningless = (
+        "listing",
+        "fix",
+        "keep",
+        "conjecture",
+        "lipschitz",
+        "no_stop",
+        "tolerance",
+        "plot",
+    )
     shared.refuse(options, "--ablate", meaningless)
     readings = shared.names(options.reading)
     for name in readings:

@@ -13,7 +13,7 @@ FORMATS = ("table", "json")
 OPTIONS = {
     "--program P": "two-term, four-term or runge-kutta",
     "--case N": "a case of Table 1, 1 to 7 (default: the case that was printed)",
-    **{each: shared.LISTING[each] for each in list(shared.LISTING)[:4]},
+    **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"{' or '.join(DIALECTS)} (default {DIALECTS[0]})",
     **shared.outputs(FORMATS, plot=""),
 }

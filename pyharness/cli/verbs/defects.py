@@ -8,7 +8,7 @@ from pyharness.history.apparatus_report import apparatus_report, entry_report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "an entry, with its effect",
+    "name NAME": "an entry, with its effect; or a card: 1660, two-term:1660",
     "--kind K": "only the entries of one kind",
     **shared.outputs(FORMATS, plot=""),
 }
@@ -22,8 +22,32 @@ def run(options: argparse.Namespace) -> int:
         shared.show(apparatus_report(listed), options)
         return 0
     shared.refuse(options, "a name", ("kind",))
+    if options.name.rpartition(":")[2].isdigit():
+        return _card(options)
     chosen = entry(options.name)
     shared.check_outputs(options)
     effects = list(effects_of(options.name)) if "flag" in chosen else []
     shared.show(entry_report(chosen, effects), options)
+    return 0
+
+
+def _card(options: argparse.Namespace) -> int:
+    """Show a card, and each entry that names it, with its effect in the card's program."""
+    from pyharness.history.cards_report import cards_report
+    from pyharness.original.cards import chosen
+
+    cards = chosen([options.name])
+    shared.check_outputs(options)
+    names = list(dict.fromkeys(name for card in cards for name in card.entries))
+    reports = [cards_report(cards, "defects")]
+    for name in names:
+        known = entry(name)
+        effects = list(effects_of(name)) if "flag" in known else []
+        reports.append(entry_report(known, effects))
+    records = [each.record() for each in reports[1:]]
+    whole = reports[0]._replace(
+        text=[section for each in reports for section in each.text],
+        record=lambda: {**reports[0].record(), "entries": records},
+    )
+    shared.show(whole, options)
     return 0

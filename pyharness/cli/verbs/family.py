@@ -15,12 +15,15 @@ OPTIONS = {
     "--terms N": "one member: powers of t (default 2)",
     "--points P": "one member: thesis, gauss or a,b,... in parts of the step",
     "--corrections K": "one member: corrections (default 1)",
+    "--lost": "the mistakes that IV.2's three failed programs may have had, ranked",
     **shared.outputs(plot=""),
 }
 
 
 def run(options: argparse.Namespace) -> int:
     """Measure and show; 1 where an order is below the one derived."""
+    if options.lost:
+        return _lost(options)
     if options.case is None and options.scene is None:
         options.case = _DEFAULT_CASE
     scene = shared.chosen_scene(options)
@@ -46,3 +49,13 @@ def _member(options: argparse.Namespace) -> Member:
         if options.corrections is None
         else shared.whole(options.corrections, "--corrections"),
     )
+
+
+def _lost(options: argparse.Namespace) -> int:
+    from pyharness.history.lost import lost_report, ranked
+
+    others = ("case", "scene", "omega0", "step_size", "steps", *_OF_A_MEMBER)
+    shared.refuse(options, "--lost", others)
+    shared.check_outputs(options)
+    shared.show(lost_report(ranked()), options)
+    return 0

@@ -99,7 +99,15 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     from pyharness.methods.registry import METHODS
     from pyharness.methods.solve import solve
 
-    listing_options = ("implementation", "listing", "fix", "keep", "reading", "lipschitz")
+    listing_options = (
+        "implementation",
+        "listing",
+        "fix",
+        "keep",
+        "reading",
+        "conjecture",
+        "lipschitz",
+    )
     shared.refuse(options, "--method", (*listing_options, "no_stop"))
     name = options.method
     shared.check_known("method", name, tuple(METHODS))

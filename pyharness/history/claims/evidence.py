@@ -12,8 +12,8 @@ from functools import cache
 from itertools import product
 from typing import Any
 
-from pyharness.history.claims.laboratory import Assumptions, Laboratory
-from pyharness.history.claims.ledger import claims, outcome, starts
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
+from pyharness.history.claims.ledger import claims, outcome
 from pyharness.history.claims.verdicts import IN_PART, NOT_TESTABLE, REPRODUCED
 from pyharness.model.listing import PROGRAMS, names_of
 
@@ -62,6 +62,15 @@ def evidence() -> Iterator[Combination]:
             if verdict != NOT_TESTABLE:
                 verdicts[entry["id"]] = verdict
         yield Combination(assumptions, verdicts)
+
+
+def evidence_rule() -> str:
+    """Say how a combination is scored."""
+    return (
+        "Every combination of starts, readings, conjectures and steps, scored by the claims about "
+        "the original programs: 1 for each reproduced, 1/2 in part, 0 otherwise; not testable ones "
+        "do not count. No weights."
+    )
 
 
 def combinations() -> list[Assumptions]:

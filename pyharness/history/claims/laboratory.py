@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing, names_of
+from pyharness.model.listing import Listing, names_of, switches
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -25,12 +25,14 @@ class Assumptions:
     """What the thesis does not say.
 
     `start` is omega(0) of the cases whose start is not given (rad/s), None for those of
-    `cases.toml`; `readings` are those selected that are not the adopted ones.
+    `cases.toml`; `readings` are those selected that are not the adopted ones; `conjectures` what is
+    assumed where no card exists, None for what the original assumes.
     """
 
     start: Triple | None = None
     readings: frozenset[str] = frozenset()
     steps: int = 100
+    conjectures: frozenset[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -43,9 +45,13 @@ class Laboratory:
 
     def listing(self, program: str) -> Listing:
         """Return the program's listing in this state."""
-        defects = set(names_of("defect", program)) - self.fixed if self.is_original else set()
+        active = set(switches(program)) - self.fixed if self.is_original else set()
+        if self.assumptions.conjectures is not None:
+            adopted = set(switches(program)) - set(names_of("defect", program))
+            assumed = self.assumptions.conjectures - (set() if self.is_original else adopted)
+            active = active - adopted | assumed
         readings = self.assumptions.readings & set(names_of("reading", program))
-        return Listing(program, frozenset(defects), readings)
+        return Listing(program, frozenset(active), readings)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return a case under the assumptions, with `parts` in steps so much smaller."""

@@ -10,6 +10,7 @@ from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.verdicts import REPRODUCED, Judged
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS, original
 from pyharness.model.scene import Triple
 
 
@@ -91,6 +92,11 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
                 yield f"omega(0) = ({shown}) where not given", Assumptions(start=start)
         elif name == "steps":
             yield "300 steps", Assumptions(steps=300)
+        elif name.startswith("conjecture "):
+            # What the original assumes is left out, the other is added to it.
+            conjecture, own = name.removeprefix("conjecture "), original(PROGRAMS[0]).conjectures
+            told = "without" if conjecture in own else "with"
+            yield f"{told} {name}", Assumptions(conjectures=own ^ {conjecture})
         else:
             yield name, Assumptions(readings=frozenset([name.removeprefix("reading ")]))
 

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, corrected, original
 from pyharness.model.records import build_record
 from pyharness.model.report import Picture, Report, Table, numbers, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
@@ -24,6 +25,7 @@ SETS = {"original": original, "corrected": corrected}
 ENDINGS = ("svg", "png", "csv")
 # Told apart without colour: by dash, width and marker, and by where the markers stand.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
+_LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _STYLES = {
     "two-term": ("#1040a0", (0, (6, 2)), 1.3, "o", (2, 15)),
     "four-term": ("#000000", (0, (1, 1.3)), 1.9, "s", (7, 15)),
@@ -99,6 +101,7 @@ class FigureFinding:
     scene: Scene
     reference: Reference
     curves: tuple[Curve, ...]
+    limit: tuple[str, Array] | None = None  # what a program tends to, and its omega (rad/s)
 
 
 def plans() -> list[FigurePlan]:
@@ -122,7 +125,19 @@ def findings() -> Iterator[FigureFinding]:
             truths[plan.case] = reference(scene, scene.times())
         listings = map(SETS[plan.set], plan.programs)
         curves = tuple(Curve(listing, run_program(scene, listing)) for listing in listings)
-        yield FigureFinding(plan, scene, truths[plan.case], curves)
+        yield FigureFinding(plan, scene, truths[plan.case], curves, _limit(plan, scene, truths))
+
+
+def _limit(
+    plan: FigurePlan, scene: Scene, truths: dict[int, Reference]
+) -> tuple[str, Array] | None:
+    """Return the limit that is drawn in an original figure; None where none is."""
+    asked = {entry["number"]: entry.get("limit_of") for entry in facts("figures")["figure"]}
+    program = asked[plan.number]
+    if program is None or plan.set != "original":
+        return None
+    omega, _ = limit_solution(program, scene, scene.times(), truths[plan.case])
+    return f"limit of {program}", omega
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
@@ -157,16 +172,27 @@ def _record(finding: FigureFinding) -> dict[str, Any]:
 
 def curve_numbers(finding: FigureFinding) -> Table:
     """Return the plotted numbers: omega (rad/s) by curve and time (s)."""
-    truth = finding.reference
+    truth, start = finding.reference, np.array(finding.scene.omega)
+    known = [("reference", truth.omega)]
+    if finding.limit is not None:
+        known.append(("limit", finding.limit[1]))
     rows = [
-        ["reference", "", t, None, *omega]
-        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
+        [curve, "", t, None, *omega]
+        for curve, values in known
+        for t, omega in zip(_from_zero(truth.time), _from_zero(values, start), strict=True)
     ]
     for curve in finding.curves:
         run, name = curve.trajectory, [curve.listing.program, curve.listing.label]
-        table = np.column_stack([run.time, run.recorded_time, run.omega])
+        table = np.column_stack(
+            [*map(_from_zero, (run.time, run.recorded_time)), _from_zero(run.omega, start)]
+        )
         rows += [[*name, *row] for row in table.tolist()]
     return numbers("curve listing time recorded_time omega1 omega2 omega3", rows)
+
+
+def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
+    """Return values with those at time 0 before them."""
+    return np.concatenate([np.array(start, ndmin=values.ndim), values])
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
@@ -175,13 +201,19 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
     axes = figure.subplots(3, 1, sharex=True)
-    truth = finding.reference
+    truth, start = finding.reference, np.array(finding.scene.omega)
+    time = _from_zero(truth.time)
     for row in range(3):
-        axes[row].plot(truth.time, truth.omega[:, row], label="reference", **_REFERENCE)
+        axes[row].plot(
+            time, _from_zero(truth.omega, start)[:, row], label="reference", **_REFERENCE
+        )
+        if finding.limit is not None:
+            name, omega = finding.limit
+            axes[row].plot(time, _from_zero(omega, start)[:, row], label=name, **_LIMIT)
         bottom, top = _frame(finding, row)
         axes[row].set_ylim(bottom, top)
         for curve in finding.curves:
-            _draw(axes[row], curve, row, bottom, top)
+            _draw(axes[row], curve, start, row, bottom, top)
         axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         axes[row].grid(visible=True, linewidth=0.3)
         axes[row].ticklabel_format(useOffset=False)
@@ -205,13 +237,14 @@ def _heading(finding: FigureFinding) -> str:
     return "\n".join([title, *textwrap.wrap(plan.caption, 98), note])
 
 
-def _draw(axes: "Axes", curve: Curve, row: int, bottom: float, top: float) -> None:
+def _draw(axes: "Axes", curve: Curve, start: Array, row: int, bottom: float, top: float) -> None:
     run = curve.trajectory
+    time, omega = _from_zero(run.time), _from_zero(run.omega, start)
     style: dict[str, Any] = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
     height = top - bottom
     # Far outside the frame a renderer loses its way: there the curve may be anywhere.
-    shown = np.clip(run.omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
-    axes.plot(run.time, shown, label=curve.label, zorder=3, **style, **_MARKERS)
+    shown = np.clip(omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
+    axes.plot(time, shown, label=curve.label, zorder=3, **style, **_MARKERS)
     if curve.ending and len(run.time):
         axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
 
@@ -224,8 +257,10 @@ def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     far = float(np.abs(truth).max())
     near = max(0.6 * (largest - least), 0.01 * far)
     low, high = least, largest
-    for curve in finding.curves:
-        omega = curve.trajectory.omega[:, row]
+    omegas = [each.trajectory.omega[:, row] for each in finding.curves]
+    if finding.limit is not None:
+        omegas.append(finding.limit[1][:, row])
+    for omega in omegas:
         bottom, top = float(omega.min(initial=least)), float(omega.max(initial=largest))
         low = min(low, bottom if bottom > least - far else least - near)
         high = max(high, top if top < largest + far else largest + near)

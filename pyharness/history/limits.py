@@ -54,16 +54,31 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a original program tends to, how it comes near, and with which power of the step."""
+    """What an original program tends to, how it comes near, and with which power of the step.
+
+    The order is None where there is none: nothing but rounding, or a limit that leaves every bound
+    at the time `blow_up` (s).
+    """
 
     program: str
     tends_to: str
     halvings: tuple[Halving, ...]
-    order: float
+    order: float | None
+    blow_up: float | None = None
+
+    @property
+    def approach(self) -> str:
+        """Say how it comes near."""
+        if self.blow_up is not None:
+            return f"no order: the limit leaves every bound at t = {self.blow_up:.3g} s"
+        if self.order is not None:
+            return f"order {self.order:.2f} toward the limit"
+        last = self.halvings[-1].from_limit
+        return "rounding" if math.isfinite(last) else "no order: no limit, or an overflow"
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Hold a original program, without its stop test, against its limit.
+    """Hold an original program, without its stop test, against its limit.
 
     Where the torque varies with time, the collocation programs have no limit, and the Runge-Kutta
     program's is found from its limit equations. InputError where the work is more than `effort`
@@ -71,7 +86,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
-    wanted, tends_to = _limit_solution(program, scene, times, truth, effort)
+    wanted, tends_to = limit_solution(program, scene, times, truth, effort)
     found = []
     for parts in (2**k for k in range(halvings + 1)):
         finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
@@ -84,12 +99,19 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
         )
         found.append(Halving(finer.step_size, *distances))
     last, before = found[-1].from_limit, found[-2].from_limit
-    finite = math.isfinite(before) and math.isfinite(last) and min(before, last) > 0.0
-    return Limit(program, tends_to, tuple(found), math.log2(before / last) if finite else math.nan)
+    scale = float(np.abs(truth.omega).max())
+    # A rounding in every step, of what is as large as omega.
+    noise = 2.0**-50 * scale * scene.steps * 2**halvings
+    finite = math.isfinite(before) and math.isfinite(last) and last > noise
+    lost = np.flatnonzero(~np.isfinite(wanted).all(axis=1))
+    blow_up = times[lost[0]] if len(lost) and tends_to != NOTHING else None
+    return Limit(
+        program, tends_to, tuple(found), math.log2(before / last) if finite else None, blow_up
+    )
 
 
-def _limit_solution(
-    program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
+def limit_solution(
+    program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> tuple[Array, str]:
     """Return the limit at `times`, NaN where there is none, and its name."""
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
@@ -209,7 +231,7 @@ def limits_report(
         rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]
         data += [[each.program, *row] for row in rows]
         title = f"original {each.program}: tends to {each.tends_to}"
-        text.append([title, Table(_COLUMNS, rows), f"order {each.order:.2f} toward the limit"])
+        text.append([title, Table(_COLUMNS, rows), each.approach])
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
     text.append(["defects that change no omega here, corrected alone:", "; ".join(hidden)])
     return Report(

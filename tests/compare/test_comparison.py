@@ -85,7 +85,7 @@ def test_listings_for_the_options() -> None:
     assert len(labels()) == 6
     assert labels(base="corrected") == [(p, "corrected") for p in PROGRAM_REGISTRY]
     wanted = [("four-term", label) for label in ("original", "custom", "corrected")]
-    assert labels(programs=["four-term"], fix=["torque-held"]) == wanted
+    assert labels(programs=["four-term"], fix=["dt-accumulates"]) == wanted
     # A defect goes to the programs that have it.
     programs = [program for program, label in labels(fix=["stage-base"]) if label == "custom"]
     assert programs == ["runge-kutta"]

@@ -15,13 +15,20 @@ from pyharness.history.claims import verdicts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory
 from pyharness.history.claims.ledger import Judgement, assignments, claim, claims, judge, outcome
 from pyharness.history.claims.report import explanation
-from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_REPRODUCED, REPRODUCED
+from pyharness.history.claims.verdicts import (
+    FALSE,
+    IN_PART,
+    NOT_REPRODUCED,
+    NOT_TESTABLE,
+    REPRODUCED,
+    UNDECIDED,
+)
 from pyharness.history.family.members import Member
-from pyharness.model.listing import PROGRAMS, corrected, names_of, original
-from pyharness.original.counting import _operations, operations_per_step
+from pyharness.model.listing import names_of, switches
 from pyharness.views.render import render
 
 pytestmark = pytest.mark.claims
+SILENT = ("i2-lagrange",)  # a statement of history
 Capture = pytest.CaptureFixture[str]
 
 
@@ -37,14 +44,15 @@ def _verdict(identity: str, *fixed: str, is_original: bool = True) -> str:
 
 def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
     entries = claims()
-    assert len({each["id"] for each in entries}) == len(entries) >= 35
+    assert len({each["id"] for each in entries}) == len(entries) >= 50
     for each in entries:
         for key in ("where", "quote", "statement", "test", "rule"):
             assert each[key], (each["id"], key)
         assert len(each["quote"].split()) <= 8
         for assumption in each["assumptions"]:
-            name = assumption.removeprefix("reading ")
-            assert name in ("omega0", "steps", *names_of("reading")), each["id"]
+            name = assumption.removeprefix("reading ").removeprefix("conjecture ")
+            known = ("omega0", "steps", *names_of("reading"), *names_of("conjecture"))
+            assert name in known, each["id"]
     sections = " ".join(each["where"] for each in entries)
     for section in ("abstract", "II.5", "IV.1", "IV.2", "IV.3", "V.1", "V.2", "V.3", "VI"):
         assert section in sections
@@ -53,7 +61,7 @@ def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
 
 def test_every_claim_is_judged_and_its_numbers_are_told(judged: dict[str, Judgement]) -> None:
     for found in judged.values():
-        assert found.original.numbers or found.corrected.numbers
+        assert found.original.numbers or found.corrected.numbers or found.claim["id"] in SILENT
         assert len(found.survivals) >= len(found.claim["assumptions"])
         text = render(explanation(found), "table")
         assert found.claim["quote"] in text
@@ -75,8 +83,7 @@ TURNS = [
     ("v2-case-6-diverged", REPRODUCED, ["dt-accumulates"], NOT_REPRODUCED),
     ("iv1-higher-powers", NOT_REPRODUCED, ["dt-accumulates"], REPRODUCED),
     ("iv3-constant-500", REPRODUCED, ["lipschitz-per-component"], NOT_REPRODUCED),
-    ("iv3-guard", IN_PART, ["lipschitz-per-component"], FALSE),
-    ("iv3-guard", IN_PART, ["lipschitz-per-component", *BASES], REPRODUCED),
+    ("iv3-guard", FALSE, [*names_of("defect", "runge-kutta")], NOT_TESTABLE),
     ("v3-small-step-runge-kutta", REPRODUCED, BASES, NOT_REPRODUCED),
     ("vi-superior", IN_PART, BASES, FALSE),
     # What does not hang on it.
@@ -95,7 +102,7 @@ def test_mending_a_defect_turns_the_verdicts_that_hang_on_it(
 
 def test_mending_everything_gives_the_verdict_of_the_methods(judged: dict[str, Judgement]) -> None:
     for identity, found in judged.items():
-        by_mending = _verdict(identity, *names_of("defect"))
+        by_mending = _verdict(identity, *switches("two-term"), *switches("runge-kutta"))
         # What the thesis does not list stays untestable for the programs.
         assert by_mending in (found.corrected.verdict, "not testable"), identity
 
@@ -114,22 +121,29 @@ def test_constant_of_the_mended_program_is_that_of_the_flow() -> None:
     assert Laboratory(True).required_constant(2) > 3000.0
 
 
-def test_operations_that_are_done_once_are_not_those_of_a_step() -> None:
-    for program in PROGRAMS:
-        short, long = (_operations(corrected(program), steps) for steps in (1, 11))
-        assert operations_per_step(corrected(program)) == (long - short) / 10 < short
-    # Four stages of 9 and 12 operations at least, 3 of 12 to store, 6 x 7 to combine.
-    assert operations_per_step(corrected("runge-kutta")) > 4 * 21 + 3 * 12 + 6 * 7
-    assert operations_per_step(original("two-term")) > operations_per_step(original("runge-kutta"))
+def test_ratio_of_cards_is_undecided_where_thresholds_disagree(
+    judged: dict[str, Judgement],
+) -> None:
+    assert judged["v3-same-complexity"].original.verdict == UNDECIDED
+    lab = Laboratory(True)
+    assert verdicts.complexity(lab, [2.0, 3.0]).verdict == REPRODUCED
+    assert verdicts.complexity(lab, [1.0, 1.04]).verdict == NOT_REPRODUCED
 
 
-def test_assignments_are_computed_from_all_starts() -> None:
+def test_assignments_are_computed_from_all_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     found = assignments()
     assert {each.case for each in found} == {1, 3, 4, 6, 7}
     assert len(found) == 5 * 3
     by_key = {(each.case, each.start): each for each in found}
     assert by_key[6, (0.0, 1.0, 1.0)].verdicts["v2-case-6-too-fast"] == FALSE
-    assert not by_key[6, (0.0, 1.0, 1.0)].holds
+    assert by_key[6, (0.0, 1.0, 1.0)].holds  # a claim that fails with every start rejects none
+
+    def failing(entry: dict[str, Any], lab: Laboratory) -> verdicts.Judged:
+        wrong = lab.assumptions.start == (0.0, 1.0, 1.0) and entry["id"] == "v2-case-4-fails"
+        return verdicts.Judged(NOT_REPRODUCED if wrong else REPRODUCED, {})
+
+    monkeypatch.setattr("pyharness.history.claims.ledger.outcome", failing)
+    assert [each.start for each in assignments() if not each.holds] == [(0.0, 1.0, 1.0)]
     assert by_key[3, (0.0, 1.0, 10.0)].holds
 
 
@@ -165,7 +179,7 @@ def test_claims_in_every_form(
     assert all(set(each) == wanted for each in record["claims"])
     rows = list(csv.DictReader(told("--format", "csv").splitlines()))
     assert [row["original"] for row in rows] == [each["original"] for each in record["claims"]]
-    assert "stopped at step  25" in told("--explain", "v2-case-2-stopped")
+    assert re.search("stopped at step  +25", told("--explain", "v2-case-2-stopped"))
 
 
 # The verdicts turn where their rules say, by laboratories made by hand.

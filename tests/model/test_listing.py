@@ -8,7 +8,7 @@ import pytest
 
 from pyharness import InputError, Listing, subset
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, corrected, flagged, names_of, original
+from pyharness.model.listing import PROGRAMS, corrected, flagged, names_of, original, switches
 
 
 def test_names_are_those_of_the_fortran_and_the_bits_agree() -> None:
@@ -22,13 +22,16 @@ def test_names_are_those_of_the_fortran_and_the_bits_agree() -> None:
 def test_every_entry_names_its_cards_in_every_program_that_has_it() -> None:
     for entry in flagged():
         assert set(entry["cards"]) == set(entry["programs"])
-        assert entry["kind"] in ("defect", "reading")
+        assert entry["kind"] in ("defect", "reading", "conjecture")
 
 
 def test_programs_have_the_defects_of_the_apparatus() -> None:
-    assert names_of("defect", "two-term") == ("dt-accumulates", "x3-reads-acl2", "torque-held")
-    assert names_of("defect", "four-term") == ("dt-accumulates", "torque-held")
-    assert len(names_of("defect", "runge-kutta")) == 6
+    assert names_of("defect", "two-term") == ("dt-accumulates", "x3-reads-acl2")
+    assert names_of("defect", "four-term") == ("dt-accumulates",)
+    assert len(names_of("defect", "runge-kutta")) == 5
+    for program in PROGRAMS:
+        assert names_of("conjecture", program) == ("torque-held", "initial-torque")
+        assert set(switches(program)) == {*names_of("defect", program), "torque-held"}
     assert names_of("reading", "four-term") == ()
 
 
@@ -36,18 +39,29 @@ def test_labels() -> None:
     for program in PROGRAMS:
         assert original(program).label == "original"
         assert corrected(program).label == "corrected"
-    assert subset("two-term", fix=["torque-held"]).label == "custom"
+    assert subset("two-term", conjectures=["none"]).label == "custom"
+    assert subset("two-term", "corrected", conjectures=["torque-held"]).label == "custom"
+    assert subset("two-term", conjectures=["torque-held"]) == original("two-term")
+
+
+def test_conjectures_are_known_among_defects() -> None:
+    """Whoever lists what is active need not know which of it stands on a card."""
+    found = Listing("two-term", ["dt-accumulates", "torque-held"])
+    assert found.defects == {"dt-accumulates"}
+    assert found.conjectures == {"torque-held"}
+    assert found.has("torque-held")
+    assert found.flags == original("two-term").flags - Listing("two-term", ["x3-reads-acl2"]).flags
 
 
 def test_options_of_the_command_line() -> None:
-    rest = {"x3-reads-acl2", "torque-held"}
     assert subset("two-term").label == "original"
-    assert subset("two-term", fix=["dt-accumulates"]).defects == rest
+    assert subset("two-term", fix=["dt-accumulates"]).defects == {"x3-reads-acl2"}
     assert subset("two-term", keep=["dt-accumulates"]).defects == {"dt-accumulates"}
     assert subset("two-term", "original", keep=["dt-accumulates"]).label == "original"
     assert subset("two-term", "corrected", fix=["dt-accumulates"]).label == "corrected"
-    both = subset("two-term", fix=["dt-accumulates"], keep=["torque-held"])
-    assert both.defects == rest
+    both = subset("two-term", fix=["dt-accumulates"], keep=["x3-reads-acl2"])
+    assert both.defects == {"x3-reads-acl2"}
+    assert both.conjectures == {"torque-held"}
 
 
 @pytest.mark.parametrize(
@@ -60,6 +74,8 @@ def test_options_of_the_command_line() -> None:
         ({"program": "two-term", "base": "mended"}, "unknown listing 'mended'"),
         ({"program": "two-term", "fix": ["a"], "keep": ["a"]}, "both --fix and --keep"),
         ({"program": "four-term", "readings": ["c1-for-c"]}, "allowed: none"),
+        ({"program": "four-term", "conjectures": ["torque"]}, "--conjecture: unknown conjecture"),
+        ({"program": "four-term", "fix": ["torque-held"]}, "--fix: unknown defect 'torque-held'"),
     ],
 )
 def test_mistakes_are_named(call: dict[str, Any], words: str) -> None:

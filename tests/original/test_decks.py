@@ -32,6 +32,7 @@ def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
         if each["program"] == program and "corrects" in each and "dialect" not in each
     ]  # fmt: skip
     assert {each["corrects"] for each in altered} == set(names_of("defect", program))
+    # The torque of Case 7, which no card holds, is the dialect's.
     new = {n for each in altered if "keeps" not in each for key in ("replace", "insert")
            for n, _ in each.get(key, ())}  # fmt: skip
     assert {n for n, text in after.items() if before.get(n) != text} == new

@@ -35,6 +35,7 @@ ULP = 2.0 * U
 
 _RUN = "pyharness.original.programs.Program.run"
 _COMPILED = "pyharness.original.compiled.run"
+_DECK = "pyharness.verify.decks.run_deck"
 _DRAWN = "pyharness.verify.random_methods"
 _SOLVE = "pyharness.compare.candidates.solve"
 _ANSWERED = "pyharness.compare.candidates._answered"
@@ -150,12 +151,12 @@ def on(target: str, change: Callable[..., Any], call: int | None = None) -> Plan
     return planted
 
 
-def refuses(target: str) -> Plant:
+def refuses(target: str, error: type[Exception] = InputError) -> Plant:
     """Return a refusal of everything, where the size is not 0."""
 
     def faulty(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
         if size:
-            raise InputError("no")
+            raise error("no")
         return right(*rest, **named)
 
     return lambda size: instead(target, partial(faulty, size))
@@ -334,6 +335,8 @@ VERIFY = (
     # Every bit, counter and label, in one language and in both alike.
     exact("cells/two-term/case-3/corrected", on(_COMPILED, bit_off), ULP),
     exact("random/0/program", on(_COMPILED, bit_off), ULP),
+    exact("decks/two-term/case-3/original", on(_COMPILED, bit_off), ULP),
+    exact("decks/runge-kutta/case-2/original", refuses(_DECK, RuntimeError)),
     exact(_BITS, on(_COMPILED, partial(bit_off, name="velocity")), ULP),
     exact(_BITS, on(_COMPILED, partial(bit_off, name="recorded_time")), ULP),
     exact(_BITS, on(_COMPILED, _TIME), ULP),

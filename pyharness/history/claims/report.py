@@ -25,7 +25,7 @@ def _verdict(verdict: str) -> str:
 
 _LEDGER = (
     *words("claim where"), Column("original", _verdict, left=True),
-    Column("corrected", _verdict, left=True), Column("hangs on", left=True),
+    Column("corrected", _verdict, left=True), Column("hangs on", left=True, fit="wrap"),
 )  # fmt: skip
 
 
@@ -114,7 +114,11 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 def _hangs_on(judgement: Judgement) -> list[str]:
     """Return the assumptions without which a verdict turns, each once."""
-    turning = (each.assumption for each in judgement.survivals if not each.survives)
+    turning = (
+        each.assumption.replace("conjecture ", "").replace("reading ", "")
+        for each in judgement.survivals
+        if not each.survives
+    )
     return list(dict.fromkeys("omega(0)" if x.startswith("omega") else x for x in turning))
 
 

@@ -39,10 +39,11 @@ def history_only(lab: Laboratory) -> Judged:
     return Judged(NOT_TESTABLE, {})
 
 
-def hamilton_ordinary(lab: Laboratory, case: int, limit: float) -> Judged:
+def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Integrate Hamilton's equations in Euler angles as six ordinary differential equations."""
     from scipy.integrate import solve_ivp
 
+    (case,) = cases
     scene, truth = lab.scene(case), lab.truth(case)
     assert scene.moments is not None
     moments = scene.moments
@@ -248,8 +249,9 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
     return graded(numbers, same)
 
 
-def points_inside(lab: Laboratory, case: int) -> Judged:
+def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
     """Count the steps whose points of collocation all lie inside the interval."""
+    (case,) = cases
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
         run_of = lab.run(program, case)

@@ -1,0 +1,64 @@
+"""Evidence: every combination is scored by the stated rule, and nothing else."""
+
+import json
+from typing import Any
+
+import pytest
+
+from pyharness.history.claims.evidence import (
+    Combination,
+    combinations,
+    discriminating,
+    evidence,
+    undecided,
+)
+from pyharness.history.claims.laboratory import Assumptions, Laboratory
+from pyharness.history.claims.ledger import claim, outcome
+from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_REPRODUCED, REPRODUCED
+from tests.conftest import Printed
+
+pytestmark = pytest.mark.claims
+
+
+def _combination(*verdicts: str, steps: int = 100) -> Combination:
+    return Combination(
+        Assumptions((0.0, 1.0, 1.0), frozenset(), steps, frozenset()),
+        {f"claim-{k}": each for k, each in enumerate(verdicts)},
+    )
+
+
+def test_score_is_one_a_half_and_nothing() -> None:
+    found = _combination(REPRODUCED, IN_PART, IN_PART, FALSE, NOT_REPRODUCED)
+    assert (found.score, found.holding) == (2.0, 3)
+
+
+def test_what_discriminates_and_what_remains() -> None:
+    best, equal, worse = (
+        _combination(REPRODUCED, IN_PART),
+        _combination(IN_PART, REPRODUCED, steps=300),
+        _combination(IN_PART, FALSE),
+    )
+    assert discriminating([best, equal, worse]) == ["claim-0", "claim-1"]
+    assert discriminating([best, best]) == []
+    assert undecided([worse, best, equal])["steps"] == ["100", "300"]
+    assert undecided([worse, best])["steps"] == ["100"]
+
+
+@pytest.mark.parametrize("identity", ["v2-case-3-concur", "v2-case-7-concur", "v2-case-2-stopped"])
+def test_verdict_of_a_combination_is_that_of_its_laboratory(identity: str) -> None:
+    """Though only what a claim hangs on is looked at."""
+    every = {each.assumptions: each.verdicts[identity] for each in evidence()}
+    assert len(every) == len(combinations()) == 3 * 4 * 4 * 2
+    for assumptions in list(every)[::17]:
+        whole = outcome(claim(identity), Laboratory(True, assumptions)).verdict
+        assert every[assumptions] == whole, assumptions
+
+
+def test_evidence_is_told(printed: Printed) -> None:
+    text = printed("claims --evidence")
+    assert max(map(len, text.splitlines())) <= 100
+    record: dict[str, Any] = json.loads(printed("claims --evidence --format json"))
+    scores = [each["score"] for each in record["combinations"]]
+    assert scores == sorted(scores, reverse=True)
+    assert set(record["discriminating"]) <= set(record["combinations"][0]["verdicts"])
+    assert "Every combination" in record["rule"]

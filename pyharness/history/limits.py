@@ -99,7 +99,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
         )
         found.append(Halving(finer.step_size, *distances))
     last, before = found[-1].from_limit, found[-2].from_limit
-    scale = float(np.abs(truth.omega).max())
+    scale = float(np.abs(truth.omega).max(initial=0.0))
     # A rounding in every step, of what is as large as omega.
     noise = 2.0**-50 * scale * scene.steps * 2**halvings
     finite = math.isfinite(before) and math.isfinite(last) and last > noise

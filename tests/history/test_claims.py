@@ -11,7 +11,7 @@ import pytest
 
 from pyharness import InputError
 from pyharness.cli.main import main
-from pyharness.history.claims import verdicts
+from pyharness.history.claims import theory, verdicts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory
 from pyharness.history.claims.ledger import Judgement, assignments, claim, claims, judge, outcome
 from pyharness.history.claims.report import explanation
@@ -128,6 +128,39 @@ def test_ratio_of_cards_is_undecided_where_thresholds_disagree(
     lab = Laboratory(True)
     assert verdicts.complexity(lab, [2.0, 3.0]).verdict == REPRODUCED
     assert verdicts.complexity(lab, [1.0, 1.04]).verdict == NOT_REPRODUCED
+
+
+THEORY = {
+    "i2-euler-symmetric": FALSE, "ii3-partial": FALSE, "ii5-bounded-lipschitz": FALSE,
+    "iii1-crandall": REPRODUCED, "iii2-improved-euler-error": REPRODUCED,
+    "iii2-taylor-error": REPRODUCED, "iii2-runge-kutta-error": REPRODUCED,
+    "iii2-five-term-taylor": IN_PART, "iv1-symmetric-uncoupled": IN_PART,
+    "iv1-linear-top": REPRODUCED, "iv3-same-step": REPRODUCED, "v1-rigid-bodies": FALSE,
+    "v1-not-known": FALSE,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("identity", THEORY)
+def test_claims_of_theory_hang_on_no_program(identity: str, judged: dict[str, Judgement]) -> None:
+    found = judged[identity]
+    assert found.original == found.corrected
+    assert found.original.verdict == THEORY[identity]
+
+
+def test_theory_is_judged_by_its_numbers() -> None:
+    lab = Laboratory(True)
+    bodies = theory.possible_bodies(lab, [5, 6])
+    assert list(bodies.numbers.values()) == [40.0 / 50.0, 200.0 / 30.0]
+    assert theory.possible_bodies(lab, [1, 2, 3, 4, 5, 7]).verdict == REPRODUCED
+    assert theory.bounded_not_lipschitz(lab, 2, 1e6).verdict == REPRODUCED
+    found = theory.bounded_not_lipschitz(lab, 8, 1e6).numbers["largest quotient"]
+    assert found == pytest.approx((2.0**0.5 - 1.0) * 1e4)
+    assert theory.known_in_closed_form(lab, [4], 0.0).verdict == REPRODUCED
+    assert theory.local_error(lab, [4], "rk4", 4.0, 0.1).verdict == NOT_REPRODUCED
+    assert theory.step_on_cards(lab, 0.001).verdict == NOT_REPRODUCED
+    shares = theory.points_inside(lab, [4]).numbers
+    assert set(shares.values()) == {0.01}
+    assert theory.points_inside(Laboratory(False), [4]).verdict == REPRODUCED
 
 
 def test_assignments_are_computed_from_all_starts(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,6 +42,7 @@ def test_what_discriminates_and_what_remains() -> None:
     assert discriminating([best, best]) == []
     assert undecided([worse, best, equal])["steps"] == ["100", "300"]
     assert undecided([worse, best])["steps"] == ["100"]
+    assert undecided([_combination(FALSE, steps=300), best])["steps"] == ["100"]
 
 
 @pytest.mark.parametrize("identity", ["v2-case-3-concur", "v2-case-7-concur", "v2-case-2-stopped"])

@@ -98,12 +98,14 @@ def test_numbers_are_those_of_the_trajectories(found: dict[str, FigureFinding]) 
         }
         for curve, run in wanted.items():
             rows = np.column_stack([run.time, run.omega])
+            rows = np.vstack([[0.0, *scene.omega], rows])
             np.testing.assert_array_equal(_rows(finding, curve), rows)
         if "runge-kutta" in wanted:
             steps = RUNGE_KUTTA[plan.number - 6] if plan.set == "original" else 100
-            assert len(_rows(finding, "runge-kutta")) == steps
+            assert len(_rows(finding, "runge-kutta")) == 1 + steps
         table = curve_numbers(finding).rows
-        assert {row[0] for row in table} == set(wanted)
+        limit = {"limit"} if plan.stem == "figure-07" else set()
+        assert {row[0] for row in table} == set(wanted) | limit
         assert {row[1] for row in table} == {"", plan.set}
 
 
@@ -111,14 +113,20 @@ def test_lines_are_drawn_to_their_end_which_is_marked(found: dict[str, FigureFin
     """What matplotlib is given: the curve's own points, a cross at the last one, the label."""
     run = compiled.run(case_scene(2), original("runge-kutta"))
     for row, axes in enumerate(figures.figure_picture(found["figure-07"]).figure.axes):
-        (stopped,) = (each for each in axes.lines if "runge-kutta" in str(each.get_label()))
+        (stopped,) = (each for each in axes.lines if "runge-kutta (" in str(each.get_label()))
         (cross,) = (each for each in axes.lines if each.get_marker() == "X")
-        np.testing.assert_array_equal(stopped.get_data(), [run.time, run.omega[:, row]])
+        curve = [[0.0, *run.time], [case_scene(2).omega[row], *run.omega[:, row]]]
+        np.testing.assert_array_equal(stopped.get_data(), curve)
         np.testing.assert_array_equal(cross.get_data(), [run.time[-1:], run.omega[-1:, row]])
         assert stopped.get_label() == "runge-kutta (stopped at step 25 by V2)"
         # Without colour: no two lines share marker and width.
         looks = {(each.get_marker(), each.get_linewidth()) for each in axes.lines}
-        assert len(looks) == len(axes.lines) == 5
+        assert len(looks) == len(axes.lines) == 6
+
+
+def test_limit_of_figure_7_is_twice_a_slow_sine(found: dict[str, FigureFinding]) -> None:
+    rows = _rows(found["figure-07"], "limit")
+    np.testing.assert_allclose(rows[:, 1], 2.0 * np.sin(2.5 * rows[:, 0]), atol=1e-12)
 
 
 def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding]) -> None:
@@ -131,7 +139,7 @@ def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding])
         bottom, top = figures._frame(finding, row)
         low, high = figures._frame(beside, row)
         assert low <= bottom < top <= high < low + 3.0 * (top - bottom)
-    assert len(_rows(beside, "two-term")) == 56
+    assert len(_rows(beside, "two-term")) == 57
     content = saved(figures.figure_picture(beside), "figure-11.svg")
     assert b"e+1" not in content["figure-11.svg"]
     assert wild.ending == "overflow after step 56"

@@ -97,6 +97,12 @@ def test_a_character_changed_anywhere_is_found(scan: str, change: str) -> None:
             assert len(unexplained(head + heading + "\n".join(changed))) == 1
 
 
+def test_line_that_differs_is_named(scan: str) -> None:
+    (told,) = unexplained(scan.replace("300-U1(1)=0.", "300-U1(1)=8.", 1))
+    line = scan.split("\n").index("300-U1(1)=0.") + 1
+    assert told == f"line {line}, two-term:300: '300-U1(1)=8.', where the table has '300-U1(1)=0.'"
+
+
 @pytest.mark.parametrize("change", ["lost", "twice", "swapped", "joined"])
 def test_a_line_out_of_place_is_found(scan: str, change: str) -> None:
     lines = scan.split("\n")

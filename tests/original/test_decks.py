@@ -95,6 +95,25 @@ def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
         assert [check.id for check in failed] == ["decks/two-term/case-3/original"]
 
 
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("1HI", "1HJ", "the page differs"),
+        ("(I)-UU1)", "(I)-UU1)", ""),
+        ("GO TO 8 ", "J=3     ", "75 records more"),
+    ],
+)
+def test_page_and_records_after_the_stop_are_looked_at(
+    old: str, new: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "pyharness.verify.decks.deck_text", lambda *given: deck_text(*given).replace(old, new)
+    )
+    (check,) = decks(Selection(only=["decks/runge-kutta/case-2/original"]))
+    assert (told in check.note) if told else check.passed
+
+
 def test_without_a_compiler_a_check_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pyharness.verify.decks.compiler", lambda: None)
     (check,) = decks(Selection(only=["decks"]))

@@ -17,6 +17,24 @@ def test_runge_kutta_is_counted_as_by_hand() -> None:
     assert found.once == found.written - 16
 
 
+def test_powers_and_literals() -> None:
+    """Cards 850-960 and 1390-1560 of the four-term deck have powers, and one 2. is another."""
+    four = operations_per_step(original("four-term"))
+    solver = 2 * _crout(4, 6)
+    points = 1 + 4 + 1  # 710-750, 2250
+    matrix = 2 * 4 * (1 + (1 + 1) + (1 + 2))  # 2T, 3T**2, 4T**3
+    rates = 5 * (3 * 3 + 3 * 4)
+    polynomial = 4 + (1 + 2 + 2) + 4  # products, powers, sums: 1390-1400
+    assert four.written == points + matrix + rates + 5 * 6 * polynomial + solver
+
+
+def _crout(n: int, m: int) -> int:
+    """Count what LEQT1F does: scales, sums of products, tests and quotients, two substitutions."""
+    sums = sum(2 * min(i, j) for i in range(n) for j in range(n))
+    tests = sum(n - j for j in range(n)) + n
+    return n + sums + tests + sum(range(n)) + m * (n * (n - 1) + n * (n - 1) + n)
+
+
 def test_what_a_correction_takes_off() -> None:
     two, four = (operations_per_step(original(p)) for p in ("two-term", "four-term"))
     assert operations_per_step(corrected("two-term")).written == two.written - 1  # 1660

@@ -41,6 +41,14 @@ def test_what_a_correction_takes_off() -> None:
     assert operations_per_step(corrected("four-term")).written == four.written - 1  # 2250
 
 
+def test_second_factors_of_the_matrix_are_those_of_the_first() -> None:
+    """The same literals and points: what the second call saves is all but its substitutions."""
+    found = operations_per_step(original("two-term"))
+    built_and_factored = 2 + _crout(2, 0)
+    assert found.written - found.once >= built_and_factored
+    assert found == (254, 225)
+
+
 @pytest.mark.parametrize("program", ["two-term", "four-term"])
 def test_the_matrix_is_built_and_factored_twice(program: str) -> None:
     found = operations_per_step(original(program))

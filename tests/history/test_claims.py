@@ -11,8 +11,8 @@ import pytest
 
 from pyharness import InputError
 from pyharness.cli.main import main
-from pyharness.history.claims import theory, verdicts
-from pyharness.history.claims.laboratory import Assumptions, Laboratory
+from pyharness.history.claims import methods, theory, verdicts
+from pyharness.history.claims.laboratory import LITERALS, Assumptions, Laboratory, by_literals
 from pyharness.history.claims.ledger import Judgement, assignments, claim, claims, judge, outcome
 from pyharness.history.claims.report import explanation
 from pyharness.history.claims.verdicts import (
@@ -126,8 +126,8 @@ def test_ratio_of_cards_is_undecided_where_thresholds_disagree(
 ) -> None:
     assert judged["v3-same-complexity"].original.verdict == UNDECIDED
     lab = Laboratory(True)
-    assert verdicts.complexity(lab, [2.0, 3.0]).verdict == REPRODUCED
-    assert verdicts.complexity(lab, [1.0, 1.04]).verdict == NOT_REPRODUCED
+    assert methods.complexity(lab, [2.0, 3.0]).verdict == REPRODUCED
+    assert methods.complexity(lab, [1.0, 1.04]).verdict == NOT_REPRODUCED
 
 
 THEORY = {
@@ -178,6 +178,29 @@ def test_assignments_are_computed_from_all_starts(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("pyharness.history.claims.ledger.outcome", failing)
     assert [each.start for each in assignments() if not each.holds] == [(0.0, 1.0, 1.0)]
     assert by_key[3, (0.0, 1.0, 10.0)].holds
+
+
+@pytest.mark.parametrize(("program", "terms"), [("two-term", 2), ("four-term", 4)])
+@pytest.mark.parametrize(("changed", "parts"), [(frozenset(), 1), (frozenset(LITERALS), 10)])
+def test_literals_of_the_step_all_or_none_are_a_step(
+    program: str, terms: int, changed: frozenset[str], parts: int
+) -> None:
+    lab = Laboratory(True)
+    found = by_literals([lab.scene(case) for case in (2, 3, 5)], terms, changed, 10)
+    for case, omega in zip((2, 3, 5), found, strict=True):
+        run = lab.run(program, case, parts=parts)
+        assert np.abs(omega - run.omega[parts - 1 :: parts]).max() < 1e-12
+
+
+def test_one_literal_alone_is_another_experiment(judged: dict[str, Judgement]) -> None:
+    """Where only the growth of DT is smaller, the points come back and the step stays: Case 2."""
+    numbers = judged["v3-small-step-collocation"].original.numbers
+    assert numbers["two-term, .001 in DT+: of 5 cases improve"] == 4
+    assert numbers["two-term, .001 in DT=, T=, DT+: of 5 cases improve"] == 1
+    lab = Laboratory(True)
+    (second,) = by_literals([lab.scene(2)], 2, {"DT+"}, 10)
+    error = float(np.abs(second - lab.truth(2).omega).max())
+    assert error == pytest.approx(lab.error("two-term", 2), rel=1e-9)
 
 
 def test_assumptions_reach_the_runs() -> None:
@@ -246,8 +269,8 @@ def test_weightings_within_ten_times_the_error_of_collocation_are_as_good(
     def error(lab: Laboratory, case: int, member: Member) -> float:
         return 1e-6 * (1.0 if member.weighting == "collocation" else factor)
 
-    monkeypatch.setattr(verdicts, "_error", error)
-    assert verdicts.others_failed(_lab(truth=np.ones((2, 3))), [3], [2]).verdict == verdict
+    monkeypatch.setattr(methods, "_error", error)
+    assert methods.others_failed(_lab(truth=np.ones((2, 3))), [3], [2]).verdict == verdict
 
 
 def test_overflow_is_an_infinite_error(monkeypatch: pytest.MonkeyPatch) -> None:

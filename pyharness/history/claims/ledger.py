@@ -4,14 +4,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from pyharness.history.claims import theory
-from pyharness.history.claims import verdicts as tests
+from pyharness.history.claims import methods, theory, verdicts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.verdicts import REPRODUCED, Judged
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, original
 from pyharness.model.scene import Triple
+
+_ROOMS = (verdicts, methods, theory)
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def judge(entry: dict[str, Any]) -> Judgement:
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Run the test of a claim in one laboratory."""
-    test = getattr(tests, entry["test"], None) or getattr(theory, entry["test"])
+    (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
     judged: Judged = test(laboratory, **entry.get("parameters", {}))
     return judged
 
@@ -119,13 +120,13 @@ def assignments() -> list[Assignment]:
             identity
             for identity, verdict in table[0].items()
             if not verdict.startswith(REPRODUCED)
-            and all(verdicts[identity] == verdict for verdicts in table)
+            and all(each[identity] == verdict for each in table)
         }
-        for start, verdicts in zip(starts(), table, strict=True):
+        for start, told in zip(starts(), table, strict=True):
             holds = all(
                 verdict.startswith(REPRODUCED)
-                for identity, verdict in verdicts.items()
+                for identity, verdict in told.items()
                 if identity not in unresolvable
             )
-            found.append(Assignment(case, start, verdicts, holds))
+            found.append(Assignment(case, start, told, holds))
     return found

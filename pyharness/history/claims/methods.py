@@ -1,0 +1,285 @@
+"""Tests of the claims about programs and methods over several cases, as in `verdicts`."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.history.claims.laboratory import (
+    COLLOCATION,
+    LITERALS,
+    Laboratory,
+    by_literals,
+    distance,
+    largest,
+)
+from pyharness.history.claims.verdicts import (
+    FALSE,
+    NOT_TESTABLE,
+    UNDECIDED,
+    Judged,
+    graded,
+)
+from pyharness.history.family.members import WEIGHTINGS, Member, run
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene import Scene
+from pyharness.original.cells import subsets
+from pyharness.original.decks import solver_cards
+from pyharness.original.operations import operations_per_step
+from pyharness.original.programs import run_program
+
+_OTHERS = WEIGHTINGS[1:]
+
+
+def superior(lab: Laboratory, cases: Sequence[int]) -> Judged:
+    """Hold collocation against Runge-Kutta, at the steps that all of them ran."""
+    numbers, wins = {}, 0
+    for case in cases:
+        runs = [lab.run(program, case) for program in PROGRAMS]
+        common = min(run.steps for run in runs)
+        truth = lab.truth(case).omega
+        two, four, third = (distance(run.omega[:common], truth) for run in runs)
+        wins += max(two, four) < third
+        ratio = max(two, four) / third
+        numbers[f"case {case}: error of collocation over that of Runge-Kutta"] = ratio
+    numbers["cases won by collocation"] = wins
+    return graded(numbers, wins == len(cases), wins > 0, FALSE)
+
+
+def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
+    """Hold the program's quotient against the norm of the Jacobian, the most that eq. 19 allows."""
+    numbers: dict[str, float] = {}
+    for case in cases:
+        a, b, c = lab.scene(case).euler_coefficients
+        run = lab.run("runge-kutta", case)
+        points = np.vstack([lab.truth(case).omega, run.omega])
+        norm = max(
+            float(np.linalg.norm([[0, a * z, a * y], [b * z, 0, b * x], [c * y, c * x, 0]], 2))
+            for x, y, z in points
+        )
+        if lab.listing("runge-kutta").has("lipschitz-tests-velocity"):
+            # The equations of V are linear in V and in omega, with these coefficients.
+            assert run.velocity is not None
+            norm += float(np.linalg.norm(points, axis=1).max())
+            norm += float(np.linalg.norm(run.velocity, axis=1).max())
+        ratio = lab.required_constant(case) / norm
+        numbers[f"case {case}: largest quotient over norm of the Jacobian"] = ratio
+    worst = max(numbers.values())
+    return graded(numbers, worst <= 1.05, worst <= 2.0, FALSE)
+
+
+def higher_powers(lab: Laboratory, cases: Sequence[int]) -> Judged:
+    """Measure what four terms gain over two."""
+    numbers = {}
+    for case in cases:
+        gain = lab.error("two-term", case) / lab.error("four-term", case)
+        numbers[f"case {case}: error of two terms over that of four"] = gain
+    most = max(numbers.values())
+    return graded(numbers, most <= 2.0, most <= 10.0)
+
+
+def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
+    """Find the constants that all steps need."""
+    numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
+    return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
+
+
+def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
+    """Count the runs of the thesis's cases that the stop test ends: bounded ones, and others."""
+    alarms = unbounded = caught = 0
+    for case in cases:
+        run = lab.run("runge-kutta", case)
+        bound = bounded * largest(lab.truth(case))
+        alarms += run.stop is not None and float(np.abs(run.omega).max()) <= bound
+        free = lab.run("runge-kutta", case, may_stop=False)
+        if free.ended == "overflow" or float(np.abs(free.omega).max()) > bound:
+            unbounded += 1
+            caught += run.stop is not None
+    # Each component is 1 / (1 - t): unbounded at t = 1 whatever the method.
+    ours = Scene("unbounded", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0), steps=200)
+    numbers = {
+        "bounded runs stopped": float(alarms),
+        "unbounded runs, without the test": float(unbounded),
+        "unbounded runs stopped": float(caught),
+        "a scene of ours, unbounded at 1 s: stopped": float(
+            run_program(ours, lab.listing("runge-kutta")).stop is not None
+        ),
+    }
+    if not (unbounded or alarms):
+        return Judged(NOT_TESTABLE, numbers)
+    whole = caught == unbounded > 0 and not alarms
+    return graded(numbers, whole, caught > 0, FALSE)
+
+
+def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
+    """Measure what a tenth of the step gains the collocation programs."""
+    numbers, improved, excepted = {}, [], False
+    for program in COLLOCATION:
+        for case in cases:
+            before, after = lab.error(program, case), lab.error(program, case, parts=10)
+            gain = before / after if math.isfinite(before) else float(math.isfinite(after))
+            numbers[f"{program}, case {case}: gain"] = gain
+            if (program, case) == ("two-term", exception):
+                excepted = gain < 2.0
+            else:
+                improved.append(gain >= 2.0)
+    share = sum(improved) / len(improved)
+    if lab.is_original:
+        numbers |= _by_literals(lab, [case for case in cases if not lab.scene(case).torque.varies])
+    return graded(numbers, share >= 0.8 and excepted, share >= 0.5)
+
+
+def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
+    """Count the cases that improve, by which of the step's literals were changed to a tenth."""
+    scenes = [lab.scene(case) for case in cases]
+    numbers = {}
+    for program, terms in zip(COLLOCATION, (2, 4), strict=True):
+        before = [lab.error(program, case) for case in cases]
+        for changed in subsets(LITERALS):
+            omegas = by_literals(scenes, terms, changed, 10)
+            better = 0
+            for case, old, omega in zip(cases, before, omegas, strict=True):
+                new = float(np.abs(omega - lab.truth(case).omega).max())
+                better += new <= old / 2.0 or (math.isinf(old) and math.isfinite(new))
+            told = ", ".join(name for name in LITERALS if name in changed) or "none"
+            numbers[f"{program}, .001 in {told}: of {len(cases)} cases improve"] = float(better)
+    return numbers
+
+
+def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
+    """Measure what a tenth of the step gains the Runge-Kutta program, without its stop test."""
+    numbers = {}
+    for case in cases:
+        before, after = (lab.error("runge-kutta", case, False, parts) for parts in (1, 10))
+        numbers[f"case {case}: gain"] = before / after
+    better = sum(gain >= 2.0 for gain in numbers.values())
+    return graded(numbers, better == 0, 3 * better <= len(numbers))
+
+
+def suffices(
+    lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float, enough: int
+) -> Judged:
+    """Count the cases in which models of three and four terms stay near the truth."""
+    numbers, good = {}, 0
+    for case in cases:
+        truth = lab.truth(case)
+        errors = [lab.error("four-term", case)]
+        if not (lab.is_original and lab.scene(case).torque.varies):
+            errors.append(distance(lab.models(case, terms[0]), truth.omega))
+        error = max(errors) / largest(truth)
+        numbers[f"case {case}: error over the largest omega"] = error
+        good += error <= share
+    numbers["cases within it"] = float(good)
+    return graded(numbers, good >= enough, good >= 3)
+
+
+def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
+    """Count the floating-point operations of a step on the cards, with our own LEQT1F."""
+    counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
+    numbers, inside = {}, []
+    for way, told in (("written", "as written"), ("once", "common terms once")):
+        count = {program: float(getattr(each, way)) for program, each in counts.items()}
+        for program in PROGRAMS:
+            numbers[f"{program}: operations a step, {told}"] = count[program]
+        for program in COLLOCATION:
+            ratio = count[program] / count["runge-kutta"]
+            numbers[f"{program}: over Runge-Kutta, {told}"] = ratio
+            inside.append(low <= ratio <= high)
+    return graded(numbers, all(inside), any(inside))
+
+
+def seconds(lab: Laboratory) -> Judged:
+    """Count operations: nothing of today's machines tells of that one's seconds."""
+    counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
+    numbers = {
+        f"{program}: operations in 100 steps": 100.0 * each.written
+        for program, each in counts.items()
+    }
+    return Judged(NOT_TESTABLE, numbers)
+
+
+def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
+    """Count the cards of each deck, without a matrix subroutine and with our own LEQT1F."""
+    cards = facts("cases")["cards"]
+    numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
+    numbers["LEQT1F, ours: cards"] = float(solver_cards())
+    ratios = []
+    for more, told in ((0, "without LEQT1F"), (solver_cards(), "with ours")):
+        for program in COLLOCATION:
+            ratios.append((cards[program] + more) / cards["runge-kutta"])
+            numbers[f"{program}: cards over Runge-Kutta, {told}"] = ratios[-1]
+    near = [max(ratios) <= factor for factor in factors]
+    if any(near) and not all(near):
+        return Judged(UNDECIDED, numbers)
+    if not any(near) and min(ratios) <= min(factors):
+        return Judged(UNDECIDED, numbers)
+    return graded(numbers, all(near))
+
+
+def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
+    """Try the other weightings on the cases whose solution is known."""
+    if lab.is_original:
+        return Judged(NOT_TESTABLE, {})
+    numbers, useless, worst = {}, False, 0.0
+    for case in cases:
+        scale = largest(lab.truth(case))
+        for n in terms:
+            best = _error(lab, case, Member("collocation", n))
+            for weighting in _OTHERS:
+                error = _error(lab, case, Member(weighting, n))
+                numbers[f"case {case}, {weighting}, {n} terms: error (rad/s)"] = error
+                useless |= error > scale
+                # Errors of rounding are equally good.
+                worst = max(worst, error / max(best, 1e-12 * scale))
+    return graded(numbers, useless, worst > 10.0)
+
+
+def computer_error(lab: Laboratory, limit: float) -> Judged:
+    """Measure rounding alone: Case 1, which every member solves exactly, at ever smaller steps."""
+    if lab.is_original:
+        return Judged(NOT_TESTABLE, {})
+    numbers = {}
+    for parts in (1, 10, 100):
+        scene = lab.scene(1, parts)
+        for weighting in _OTHERS:
+            found = run(scene, Member(weighting, 4)).omega[parts - 1 :: parts]
+            error = distance(found, lab.truth(1).omega)
+            numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
+    return graded(numbers, max(numbers.values()) >= limit, otherwise=FALSE)
+
+
+def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
+    """Measure the error of every other weighting over that of collocation."""
+    if lab.is_original:
+        return Judged(NOT_TESTABLE, {})
+    numbers = {}
+    for weighting in _OTHERS:
+        numbers[f"{weighting}: largest error over that of collocation"] = max(
+            _error(lab, case, Member(weighting, n)) / _error(lab, case, Member("collocation", n))
+            for case in cases
+            for n in terms
+        )
+    worse = [each > 10.0 for each in numbers.values()]
+    return graded(numbers, all(worse), any(worse), FALSE)
+
+
+def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
+    """Hold the corrected programs against one prediction and one correction of the family."""
+    best = Laboratory(False, lab.assumptions)
+    numbers, same = {}, True
+    for case in cases:
+        for program, terms in zip(COLLOCATION, (2, 4), strict=True):
+            member = run(lab.scene(case), Member("collocation", terms))
+            apart = distance(best.run(program, case).omega, member.omega)
+            numbers[f"case {case}, {program}: distance from one correction (rad/s)"] = apart
+            same &= apart < 1e-11 * largest(lab.truth(case))
+        for corrections in (0, 1, 2, 3):
+            error = _error(lab, case, Member("collocation", 4, corrections=corrections))
+            numbers[f"case {case}, 4 terms, {corrections} corrections: error (rad/s)"] = error
+    return graded(numbers, not same, otherwise=FALSE)
+
+
+def _error(lab: Laboratory, case: int, member: Member) -> float:
+    found = run(lab.scene(case), member)
+    return math.inf if found.ended == "overflow" else distance(found.omega, lab.truth(case).omega)

@@ -39,9 +39,19 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 class Workload:
     """A scene and how far to go."""
 
-    label: str  # `5` for Case 5 to T = 3, `3L` for Case 3 to T = 100
+    label: str  # `5` for Case 5 to T = 3, `3L` for Case 3 to T = 100; of a random scene its number
     scene: Scene
     horizon: float  # T, s
+    # Of a random scene: its kinds, the solution, growth of small differences, turns of the body.
+    kinds: tuple[str, ...] = ()
+    truth: Reference | None = None
+    growth: float = 0.0
+    turns: float = 0.0
+
+    @property
+    def place(self) -> str:
+        """What it is called in a sentence."""
+        return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
@@ -82,7 +92,7 @@ class Finding:
     workloads: list[Workload]
     rows: list[Row]
     refused: list[Refusal]
-    preparation: dict[tuple[int | None, str], float]  # s, by (case, method)
+    preparation: dict[tuple[int | str, str], float]  # s, by (case or random scene, method)
     doubt: dict[str, float]  # relative error that the reference may have, by label
 
 
@@ -103,21 +113,23 @@ def measure(
 ) -> Finding:
     """Run the benchmark; `say` is told how far it is."""
     found = Finding(list(loads), [], [], {}, {})
-    makers: dict[tuple[int | None, str], Maker] = {}
+    makers: dict[tuple[int | str, str], Maker] = {}
     for number, load in enumerate(loads, 1):
-        place = f"case {load.label} ({number} of {len(loads)})"
+        place = f"{load.place} ({number} of {len(loads)})"
 
         def tell(text: str, place: str = place) -> None:
             say(f"{place}: {text}")
 
         tell("reference")
-        truth = reference(load.scene, [load.horizon], precise=True)
+        truth = load.truth or reference(load.scene, [load.horizon], precise=True)
         size = float(np.abs(truth.omega).max(initial=0.0)) or 1.0
         found.doubt[load.label] = truth.estimate / size
         entries: list[tuple[Ready, Row]] = []
+        if load.kinds:
+            makers.clear()  # no random scene comes twice
         for contender in contenders:
             tell(contender.name)
-            key = (load.scene.case, contender.name)
+            key = (load.scene.case or load.label, contender.name)
             # Compiled code is kept for the same scene with another horizon.
             begin = perf_counter()
             try:

@@ -8,8 +8,9 @@ from typing import Any
 from pyharness.bench.growth import Growth
 from pyharness.bench.measure import TARGETS, Finding, Refusal, Row
 from pyharness.bench.pictures import bench_picture, growth_picture
+from pyharness.bench.random_loads import KINDS
 from pyharness.bench.savings import Saving
-from pyharness.bench.scores import groups, means, scores, yardstick
+from pyharness.bench.scores import groups, means, scores, spreads, yardstick
 from pyharness.model.build import build, machine
 from pyharness.model.report import (
     Column,
@@ -32,13 +33,15 @@ _DRIFT = (
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Report a table for each workload, then the means; the page tells the machine as well.
+    """Report a table for each workload, then the means; of random scenes how ratios spread.
+
+    The page tells the machine as well.
 
     `packages` are those whose versions count, `command` what makes the page again.
     """
-    parts, notes = _parts(finding), _notes(finding)
-    here, built, data = machine(packages), build(), _data(finding)
-
+    drawn, notes = _random(finding), _notes(finding)
+    parts, data = (_spread_parts if drawn else _parts)(finding), _data(finding)
+    here, built = machine(packages), build()
     versions = [
         *here.items(),
         ("pyharness", built.version),
@@ -62,10 +65,43 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
         "bench",
         text=[*parts, notes],
         record=lambda: _record(finding) | {"machine": here, "build": asdict(built)},
-        data=data,
+        data=_spread_data(finding) if drawn else data,
         page=page,
         pictures={"precision": lambda: bench_picture(finding, data)},
     )
+
+
+def _random(finding: Finding) -> bool:
+    return bool(finding.workloads and finding.workloads[0].kinds)
+
+
+def _spread_data(finding: Finding) -> Table:
+    rows = [
+        [each.method, each.kind, each.target, each.scenes, each.reached, each.mean, each.smallest,
+         *each.quartiles]
+        for each in spreads(finding, KINDS)
+    ]  # fmt: skip
+    names = "method kind target scenes reached mean smallest lower_quartile median upper_quartile"
+    return numbers(names, rows)
+
+
+def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
+    """Return title and table of every contender at every error."""
+    heads = ("mean", "smallest", "25 %", "median", "75 %")
+    columns = [
+        Column("kind", left=True),
+        Column("scenes"),
+        *(Column(head, ratio) for head in heads),
+    ]
+    tables: dict[str, list[list[Any]]] = {}
+    for each in spreads(finding, KINDS):
+        title = (
+            f"{yardstick(finding)} time / time of {each.method}, at errors of {_power(each.target)}"
+        )
+        scenes = f"{each.reached} of {each.scenes}"
+        row = [each.kind, scenes, each.mean, each.smallest, *each.quartiles]
+        tables.setdefault(title, []).append(row)
+    return [(title, Table(columns, rows)) for title, rows in tables.items()]
 
 
 def _data(finding: Finding) -> Table:
@@ -113,7 +149,8 @@ def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
 
 
 def _record(finding: Finding) -> dict[str, Any]:
-    return {
+    drawn = _random(finding)
+    found: dict[str, Any] = {
         "rows": [
             _asked(row)
             | {name: getattr(row, name) for name in ("seconds", "error", "evaluations", "kind")}
@@ -122,17 +159,29 @@ def _record(finding: Finding) -> dict[str, Any]:
         ],
         "refused": [_asked(each) | {"reason": each.reason} for each in finding.refused],
         "compile_seconds": [
-            {"case": case, "method": method, "seconds": seconds}
-            for (case, method), seconds in finding.preparation.items()
+            {"scene" if drawn else "case": place, "method": method, "seconds": seconds}
+            for (place, method), seconds in finding.preparation.items()
         ],
         "reference_error": finding.doubt,
     }
+    if drawn:
+        found["spreads"] = [asdict(each) for each in spreads(finding, KINDS)]
+        found["scenes"] = [
+            {
+                "scene": load.scene.name,
+                "kinds": load.kinds,
+                "growth": load.growth,
+                "turns": load.turns,
+            }
+            for load in finding.workloads
+        ]
+    return found
 
 
 def _asked(each: Row | Refusal) -> dict[str, Any]:
     load = each.workload
-    asked = {"case": load.scene.case, "horizon": load.horizon}
-    return asked | {"method": each.method, "setting": each.setting}
+    asked = {"case": load.scene.case} | ({"scene": load.scene.name} if load.kinds else {})
+    return asked | {"horizon": load.horizon} | {"method": each.method, "setting": each.setting}
 
 
 def microseconds(seconds: float | None) -> str:
@@ -155,7 +204,7 @@ def ratio(value: float | None) -> str:
 
 def _parts(finding: Finding) -> list[tuple[str, Table]]:
     """Return title and table of every workload, and of every mean."""
-    targets = [f"{target:.0e}".replace("e-0", "e-") for target in TARGETS]
+    targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]
     for name in targets:
         columns += [Column(name, microseconds, unit="s"), Column("ratio", ratio)]
@@ -184,18 +233,25 @@ def _parts(finding: Finding) -> list[tuple[str, Table]]:
     return parts
 
 
+def _power(target: float) -> str:
+    return f"{target:.0e}".replace("e-0", "e-")
+
+
 def _notes(finding: Finding) -> list[str]:
+    drawn = _random(finding)
+    last = "mean: geometric, over the scenes in which both reach the error."
     lines = [
         f"ratio: time of {yardstick(finding)} over own time, above 1 is faster. A time is that of "
         "the fastest setting whose error, max |w - ref| / max |ref| at T, is at most the one "
-        "named; '-': none is. best: smallest error of any setting.",
+        f"named; '-': none is. {last if drawn else 'best: smallest error of any setting.'}",
     ]
     compiling: dict[str, float] = {}
     for (_, method), seconds in finding.preparation.items():
         compiling[method] = max(seconds, compiling.get(method, 0.0))
     told = [f"{name} {seconds:.2f}" for name, seconds in compiling.items() if seconds >= 0.05]
     if told:
-        lines.append(f"preparation and compiling, not in the times, s a case: {', '.join(told)}")
+        what = "scene" if drawn else "case"
+        lines.append(f"preparation and compiling, not in the times, s a {what}: {', '.join(told)}")
     return lines + not_measured(finding)
 
 
@@ -208,7 +264,7 @@ def not_measured(finding: Finding) -> list[str]:
     came += [(row, row.note.split(" at step")[0]) for row in finding.rows if row.error is None]
     reasons: dict[tuple[str, str], list[str]] = {}
     for each, reason in came:
-        place = f"case {each.workload.label}"
+        place = each.workload.place
         place += "" if each.setting is None else f" at {each.setting:g}"
         reasons.setdefault((each.method, reason), []).append(place)
     lines = []

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from pyharness.bench.measure import TARGETS, Finding, Row, Workload
 
 # The first of these that took part is the one others are measured by.
@@ -18,6 +20,20 @@ class Score:
     seconds: tuple[float | None, ...]  # of the fastest setting with an error of each of `TARGETS`
     best: float | None  # the smallest error of any setting
     ratios: tuple[float | None, ...]  # time of the yardstick over its own: above 1 it is faster
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The ratios of a contender over the random scenes of a kind, at one error."""
+
+    method: str
+    kind: str
+    target: float  # error of omega at T, over the largest component there
+    scenes: int  # of this kind
+    reached: int  # those in which it and the yardstick reach the error, over which is averaged
+    mean: float | None  # geometric
+    smallest: float | None
+    quartiles: tuple[float | None, float | None, float | None]
 
 
 def yardstick(finding: Finding) -> str | None:
@@ -63,6 +79,34 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
         )
         for name in names
     }
+
+
+def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
+    """Return all spreads: by contender, the yardstick left out, then by error, then by kind."""
+    tables = {
+        load.label: {each.method: each.ratios for each in scores(finding, load)}
+        for load in finding.workloads
+    }
+    names = dict.fromkeys(name for table in tables.values() for name in table)
+    return [
+        _spread(name, kind, place, [tables[load.label].get(name) for load in loads])
+        for name in names
+        if name != yardstick(finding)
+        for place in range(len(TARGETS))
+        for kind in kinds
+        if (loads := [load for load in finding.workloads if kind in load.kinds])
+    ]
+
+
+def _spread(
+    name: str, kind: str, place: int, found: Sequence[tuple[float | None, ...] | None]
+) -> Spread:
+    known = [each[place] for each in found if each is not None]
+    ratios = [ratio for ratio in known if ratio is not None]
+    low, middle, high = np.percentile(ratios, (25, 50, 75)).tolist() if ratios else [None] * 3
+    mean = _geometric_mean(ratios) if ratios else None
+    least, quartiles = min(ratios, default=None), (low, middle, high)
+    return Spread(name, kind, TARGETS[place], len(found), len(ratios), mean, least, quartiles)
 
 
 def _time_to(rows: Sequence[Row], target: float) -> float | None:

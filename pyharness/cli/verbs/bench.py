@@ -1,13 +1,16 @@
 """`bench`: run time against error, every method of ours against programs and peers."""
 
 import argparse
+import shlex
 from collections.abc import Sequence
 
 from pyharness.bench import report as reports
 from pyharness.bench.contenders import Contender, own
 from pyharness.bench.measure import Refusal, measure, workloads
 from pyharness.bench.peers import installed, peers
+from pyharness.bench.random_loads import random_load
 from pyharness.cli import options as shared
+from pyharness.compare.random_scenes import weekly_seed
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene_file import case_numbers
 
@@ -16,6 +19,8 @@ _LONGEST = 1e3
 OPTIONS = {
     "--case N": "one case of Table 1 (default: 2 to 7)",
     "--horizon T": "go to this time, s (default: 3; Cases 3 and 4 also 100)",
+    "--random N": "N random scenes, the kinds in turn, in place of the cases",
+    "--seed S": "of the random scenes (default: the week)",
     "--methods A,B": "these of ours only, or none",
     "--peers X,Y": "these peers or packages only, or none",
     "--plan": "what each skip of the plan saves, with and without",
@@ -27,11 +32,12 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Measure and show."""
     if options.plan or options.growth:
-        meaningless = ["case", "horizon", "methods", "peers"]
+        meaningless = ["case", "horizon", "random", "seed", "methods", "peers"]
         meaningless += ["plot", "growth"] if options.plan else []
         shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
         shared.check_outputs(options)
         return _plan(options) if options.plan else _growth(options)
+    count = _count(options)
     shared.check_known("case", options.case, [str(each) for each in case_numbers()])
     horizon = None
     if options.horizon is not None:
@@ -50,7 +56,13 @@ def run(options: argparse.Namespace) -> int:
     if not contenders:
         raise InputError("bench: no method and no peer is left; name one")
     shared.check_outputs(options)
-    loads = workloads(None if options.case is None else int(options.case), horizon)
+    if count:
+        loads = []
+        for number in range(1, count + 1):
+            shared.progress(f"drawing scene {number} of {count}")
+            loads.append(random_load(options.seed, number))
+    else:
+        loads = workloads(None if options.case is None else int(options.case), horizon)
     found = measure(loads, contenders, shared.progress)
     shared.progress("")
     if not found.rows:
@@ -63,6 +75,22 @@ def run(options: argparse.Namespace) -> int:
     packages = sorted({each.package for each in peers()} - {"", "scipy"})
     shared.show(reports.bench_report(found, packages, _again(options)), options)
     return 0
+
+
+def _count(options: argparse.Namespace) -> int:
+    """Return how many random scenes are asked for, 0 for none; without a seed it is the week's."""
+    if options.random is None:
+        if options.seed is not None:
+            raise InputError("--seed has no meaning without --random")
+        return 0
+    shared.refuse(options, "--random", ["case", "horizon", "plot"])
+    count = shared.whole(options.random, "--random")
+    if count <= 0:
+        raise InputError(f"--random: {count}; allowed: a whole number above 0")
+    options.seed = weekly_seed() if options.seed is None else options.seed
+    if not options.seed.isprintable():
+        raise InputError("--seed: has letters that can't be printed; allowed: any others")
+    return count
 
 
 def chosen(
@@ -85,9 +113,9 @@ def chosen(
 def _again(options: argparse.Namespace) -> str:
     """Return the command that makes the page again."""
     command = "pyharness bench"
-    for name in ("case", "horizon", "methods", "peers"):
+    for name in ("case", "horizon", "random", "seed", "methods", "peers"):
         value = getattr(options, name)
-        command += f" --{name} {value}" if value is not None else ""
+        command += f" --{name} {shlex.quote(value)}" if value is not None else ""
     return command + " --format markdown"
 
 

@@ -103,6 +103,14 @@ def chosen_effort(options: argparse.Namespace) -> float:
     return positive(options.effort, "--effort", 1.0)
 
 
+def chosen_seed(options: argparse.Namespace) -> str | None:
+    """Return the seed of random draws; InputError for one that no line could repeat."""
+    if options.seed is not None and not (options.seed and options.seed.isprintable()):
+        raise InputError("--seed: has letters that can't be printed, or none; allowed: any others")
+    seed: str | None = options.seed
+    return seed
+
+
 def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
     """Refuse what is given by the option of that name and not allowed."""
     if name is not None and name not in allowed:

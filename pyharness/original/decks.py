@@ -50,6 +50,7 @@ def deck_text(
     listing: Listing,
     scene: Scene | None = None,
     dialect: str = "1982",
+    terms: int | None = None,
 ) -> str:
     """Return a program as fixed-form FORTRAN, card numbers in columns 73 to 80.
 
@@ -62,6 +63,8 @@ def deck_text(
         was printed: 2 in the collocation decks, 5 in the other, 300 and 100 steps.
     dialect : {"1982", "gfortran"}
         The text, or the text with what a compiler of today needs, marked in column 73.
+    terms : int, optional
+        Of a model that is not printed, made of the four-term deck: a conjecture.
 
     Raises
     ------
@@ -73,10 +76,14 @@ def deck_text(
     if listing.has("initial-torque"):
         raise InputError("no card holds 'initial-torque'; allowed: --conjecture torque-held, none")
     cards = {number: card.text for number, card in deck(listing.program).cards.items()}
+    if terms is not None:
+        cards = _model(terms, listing, scene)
     if scene is not None:
         cards |= _case_cards(listing.program, scene)
     marked = set()
     for each in facts("cards/alterations")["alteration"]:
+        if terms is not None and "dialect" not in each:
+            continue
         if _is_made(each, listing, dialect, scene.case if scene else None):
             for number in numbers(each.get("delete", "")):
                 cards.pop(number, None)
@@ -102,6 +109,98 @@ def _is_made(
         and not ("unless" in alteration and listing.has(named("unless", "")))
         and all(listing.has(alteration[key]) for key in ("keeps", "reading") if key in alteration)
     )
+
+
+def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
+    if listing.program != "four-term" or not 2 <= terms <= 5:
+        raise InputError(f"terms is {terms}; allowed: 2 to 5, with program four-term")
+    if scene is not None and scene.torque.varies:
+        raise InputError("a model of other terms has no torque that varies; allowed: --case 1 to 6")
+    cards = model_cards(terms)
+    if not listing.has("dt-accumulates"):
+        cards = {n: each for n, each in cards.items() if each.strip() != "DT=DT+.01"}
+    return cards
+
+
+def model_cards(terms: int) -> dict[int, str]:
+    """Return the cards of a collocation deck of so many terms, as the four-term deck has them.
+
+    A conjecture: the three- and five-term models, which V.2 used in Case 6, are not printed. The
+    points are k/(n+1) of the interval; cards that there are in another number are numbered anew.
+    """
+    text = [card.text for card in deck("four-term").cards.values()]
+    terms_range = range(1, terms + 1)
+    end = f"T{terms + 1}"
+
+    def made(start: str, last: str, new: list[str]) -> None:
+        """Put cards in the place of those from one to another."""
+        first = next(n for n, each in enumerate(text) if each.strip() == start)
+        after = next(n for n in range(first, len(text)) if text[n].strip() == last)
+        text[first : after + 1] = [f"      {each}" for each in new]
+
+    def polynomial(name: str, column: int, at: str, time: str) -> list[str]:
+        powers = [f"B({k},{column})*{time}" + (f"**{k}" if k > 1 else "") for k in terms_range]
+        head = f"{name}({at})={name}(1)+" + "+".join(powers[:3])
+        more = ["+".join(powers[3:])] if terms > 3 else []
+        return [head + "+", *more] if more else [head]
+
+    matrix = [
+        f"A({j},{k})={k}." + (f"*T{j}" if k > 1 else "") + (f"**{k - 1}" if k > 2 else "")
+        for j in terms_range
+        for k in terms_range
+    ]
+    names = [f"{kind}{axis}" for kind in "UV" for axis in (1, 2, 3)]
+    inside = [(n, c, "L", "T(L)") for c, n in enumerate(names, 1)]
+    at_end = [(n, c, str(terms + 2), end) for c, n in enumerate(names, 1)]
+    made(
+        "DIMENSION A(4,4),B(4,6),WKA(24),T(6),F(6),G(6),H(6),",
+        "DIMENSION A(4,4),B(4,6),WKA(24),T(6),F(6),G(6),H(6),",
+        [f"DIMENSION A({terms},{terms}),B({terms},6),WKA({6 * terms}),T(8),F(8),G(8),H(8),"],
+    )
+    text = [each.replace("X(6),Y(6),Z(6)", "X(8),Y(8),Z(8)") for each in text]
+    made(
+        "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
+        "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
+        ["DIMENSION U1(8),U2(8),U3(8),V1(8),V2(8),V3(8)"],
+    )
+    made("T1=DT*.2", "T5=.01", [f"T{k}=DT*{k}./{terms + 1}." for k in terms_range] + [f"{end}=.01"])
+    made("A(1,1)=1.", "A(4,4)=4.*T4**3", matrix)
+    made(
+        "B(1,1)=F1",
+        "B(4,6)=Z1",
+        [f"B({k},{c})={n}1" for c, n in enumerate("FGHXYZ", 1) for k in terms_range],
+    )
+    made("N=4", "IA=4", [f"N={terms}", f"IA={terms}"])
+    made(
+        "DO 400 L=2,5,1",
+        "CB(4,6)*T(L)**4",
+        [
+            f"DO 400 L=2,{terms + 1},1",
+            *(f"T({k + 1})=T{k}" for k in terms_range),
+            *(line for each in inside for line in polynomial(*each)),
+        ],
+    )
+    second = text.index("C NOW REDO INTERVAL") + 1
+    head, text = text[:second], text[second:]
+    made("A(1,1)=1.", "A(4,4)=4.*T4**3", matrix)
+    made(
+        "B(1,1)=F(2)",
+        "B(4,6)=Z(5)",
+        [f"B({k},{c})={n}({k + 1})" for c, n in enumerate("FGHXYZ", 1) for k in terms_range],
+    )
+    made(
+        "U1(6)=U1(1)+B(1,1)*T5+B(2,1)*T5**2+B(3,1)*T5**3+",
+        "CB(4,6)*T5**4",
+        [line for each in at_end for line in polynomial(*each)],
+    )
+    tail = next(n for n, each in enumerate(text) if each.strip().startswith("WRITE(6,5)"))
+    ending = [each.replace("(6)", f"({terms + 2})") for each in text[tail:]]
+    text = [*head, *text[:tail], *ending]
+    # A statement that ends with an operator goes on.
+    for n, each in enumerate(text[:-1]):
+        if each.rstrip().endswith("+"):
+            text[n + 1] = "     C" + text[n + 1].strip().removeprefix("C")
+    return {100 + 10 * n: each for n, each in enumerate(text)}
 
 
 def _case_cards(program: str, scene: Scene) -> dict[int, str]:

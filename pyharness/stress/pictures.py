@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pyharness.compare.checks import Check
+from pyharness.model.errors import InputError
 from pyharness.model.report import Column, Picture, Table, digits, numbers
 from pyharness.stress.run import Trial
 from pyharness.theory.brouwer import LAWS
@@ -68,6 +69,10 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     from matplotlib.lines import Line2D
 
     drawn = [check for check in checks if check.id.count("/") > 1 and check.value is not None]
+    if not drawn:
+        raise InputError(
+            "--plot: none of these checks has a number to draw; choose others by --only"
+        )
     marks = list(map(_mark, drawn))
     places = _places(marks)
     methods = list(dict.fromkeys(mark.method for mark in marks))

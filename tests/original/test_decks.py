@@ -1,14 +1,16 @@
 """Decks: the text as it stands, what is altered, and a few of them compiled."""
 
+import numpy as np
 import pytest
 
+from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, corrected, names_of, original, subset
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
-from pyharness.original.decks import compiler, deck_text
+from pyharness.original.decks import compiler, deck_text, model_cards, run_deck
 from pyharness.verify.decks import decks
 from pyharness.verify.selection import Selection
 
@@ -119,3 +121,31 @@ def test_without_a_compiler_a_check_says_so(monkeypatch: pytest.MonkeyPatch) -> 
     (check,) = decks(Selection(only=["decks"]))
     assert check.passed
     assert "not run" in check.note
+
+
+def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:
+    printed, made = deck("four-term").cards, model_cards(4)
+    assert set(printed) == set(made)
+    points = {720: "T1=DT*1./5.", 730: "T2=DT*2./5.", 740: "T3=DT*3./5.", 750: "T4=DT*4./5."}
+    sizes = (110, 120, 150)
+    for number, text in made.items():
+        assert text.strip() == points.get(number, printed[number].text.strip()) or number in sizes
+
+
+@pytest.mark.skipif(compiler() is None, reason="no gfortran")
+@pytest.mark.parametrize("terms", [3, 5])
+@pytest.mark.parametrize("is_original", [True, False])
+def test_models_of_case_6_are_those_of_the_claims(terms: int, is_original: bool) -> None:
+    """The decks that V.2 used and did not print, against the laboratory's own."""
+    listing = (original if is_original else corrected)("four-term")
+    run = run_deck(deck_text(listing, case_scene(6), "gfortran", terms))
+    wanted = Laboratory(is_original).models(6, terms)
+    np.testing.assert_allclose(run.tape5[:, 1:4], wanted, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("program", "terms", "case"), [("two-term", 3, 6), ("four-term", 6, 6), ("four-term", 3, 7)]
+)
+def test_models_that_no_deck_can_be_are_refused(program: str, terms: int, case: int) -> None:
+    with pytest.raises(InputError, match="allowed"):
+        deck_text(original(program), case_scene(case), "gfortran", terms)

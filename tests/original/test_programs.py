@@ -14,7 +14,7 @@ from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
 from pyharness.original.cells import all_cells, all_listings, cell_name
-from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
+from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
 
 
@@ -219,3 +219,17 @@ def test_sum_of_stages_may_overflow_where_no_stage_does(axis: tuple[float, float
     scene = Scene("", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), torque=law, step_size=0.5, steps=1)
     run = compiled.run(scene, corrected("runge-kutta"), may_stop=False, velocity=False)
     assert (run.ended, run.steps) == ("overflow", 0)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_torque_that_table_1_gives_initially_acts_over_the_first_step(program: str) -> None:
+    """By a conjecture: N h / I more than without, and nothing where the table gives none."""
+    plain = original(program)
+    assumed = replace(plain, conjectures=plain.conjectures | {"initial-torque"})
+    scene = case_scene(7)
+    with_it, without = (run_program(scene, each).omega for each in (assumed, plain))
+    change = [100.0 / 40.0 * 0.01, 200.0 / 30.0 * 0.01, 150.0 / 20.0 * 0.01]
+    np.testing.assert_allclose(with_it[0] - without[0], change, rtol=0.1)
+    other = case_scene(5)
+    with_it, without = (run_program(other, each).omega for each in (assumed, plain))
+    np.testing.assert_array_equal(with_it, without)

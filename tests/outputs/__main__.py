@@ -39,7 +39,7 @@ steps = 200
 
 def main() -> int:
     """Record or compare."""
-    folders = [Path(each) for each in sys.argv[1:]]
+    folders = [Path(each) for each in sys.argv[1:] if not each.startswith("-")]
     if len(folders) == 1:
         return _record(folders[0])
     if len(folders) == 2:

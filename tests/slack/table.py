@@ -24,6 +24,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.linear_solver import SINGULAR
+from pyharness.stress.run import TRIALS, trial
 from pyharness.stress.trials import length, step_size
 from pyharness.theory import brouwer
 from pyharness.truth.reference import Reference, reference
@@ -46,6 +47,10 @@ _TURNED = "pyharness.stress.trials.invariance"
 _REGIONS = "pyharness.stress.trials.regions"
 _STEPS = "pyharness.stress.trials.step_size"
 _MATRICES = "pyharness.stress.trials.matrices"
+
+# A room that is imported while something is planted would keep it.
+for _name in TRIALS:
+    trial(_name)
 
 Plant = Callable[[float], AbstractContextManager[Any]]
 

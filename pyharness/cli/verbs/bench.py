@@ -87,9 +87,7 @@ def _count(options: argparse.Namespace) -> int:
     count = shared.whole(options.random, "--random")
     if count <= 0:
         raise InputError(f"--random: {count}; allowed: a whole number above 0")
-    options.seed = weekly_seed() if options.seed is None else options.seed
-    if not options.seed.isprintable():
-        raise InputError("--seed: has letters that can't be printed; allowed: any others")
+    options.seed = shared.chosen_seed(options) or weekly_seed()
     return count
 
 

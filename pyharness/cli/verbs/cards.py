@@ -19,7 +19,8 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Show the cards; with a scan, what they do not explain, and 1 where there is any."""
     if options.classes:
-        shared.refuse(options, "--classes", ("cards", "scan"))
+        shared.refuse(options, "--classes", ("scan",))
+        _no_card(options, "--classes")
         shared.check_outputs(options)
         shared.show(classes_report(), options)
         return 0
@@ -28,7 +29,7 @@ def run(options: argparse.Namespace) -> int:
         shared.check_outputs(options)
         shared.show(cards_report(found), options)
         return 0
-    shared.refuse(options, "--scan", ("cards",))
+    _no_card(options, "--scan")
     faults, undeclared_ = unexplained(_text(options.scan)), undeclared()
     shared.check_outputs(options)
     shared.show(scan_report(faults, undeclared_, len(expected_lines())), options)
@@ -41,3 +42,8 @@ def _text(path: str) -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "is no text"
         raise InputError(f"--scan '{path}': {reason}; give the text of a scan") from None
+
+
+def _no_card(options: argparse.Namespace, chosen: str) -> None:
+    if options.cards is not None:
+        raise InputError(f"cards {options.cards!r} has no meaning with {chosen}; give one of them")

@@ -15,6 +15,7 @@ OPTIONS = {
     "--case N": "a case of Table 1, 1 to 7 (default: the case that was printed)",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"{' or '.join(DIALECTS)} (default {DIALECTS[0]})",
+    "--terms N": "a model that is not printed, of 2 to 5 terms, made of the four-term deck",
     **shared.outputs(FORMATS, plot=""),
 }
 
@@ -29,11 +30,12 @@ def run(options: argparse.Namespace) -> int:
         shared.check_known("case", options.case, [str(each) for each in case_numbers()])
         scene = case_scene(int(options.case))
     dialect = options.dialect or DIALECTS[0]
-    lines = deck_text(listing, scene, dialect).splitlines()
+    terms = None if options.terms is None else shared.whole(options.terms, "--terms")
+    lines = deck_text(listing, scene, dialect, terms).splitlines()
     shared.check_outputs(options)
     record = {
         "program": listing.program, "case": scene and scene.case, "dialect": dialect,
-        "listing": listing_record(listing), "lines": lines,
+        "terms": terms, "listing": listing_record(listing), "lines": lines,
     }  # fmt: skip
     report = Report("deck", [[Line(each) for each in lines]], record=lambda: {"deck": record})
     shared.show(report, options)

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from pyharness.cli import options as shared
 from pyharness.compare.checks import Check
@@ -83,7 +84,8 @@ def _selection(options: argparse.Namespace) -> Selection:
     draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
     if draws < 0:
         raise InputError(f"--draws: {draws}; allowed: 0 or more")
-    changes = {} if options.seed is None else {"seed": options.seed}
+    seed = shared.chosen_seed(options)
+    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
     record = RECORD if options.record is None else Path(options.record)
     if options.record is not None and not options.update and not record.is_dir():
         raise InputError(f"--record '{options.record}': is not a folder; verify --update makes one")

@@ -52,7 +52,9 @@ def card_record(card: Card) -> dict[str, Any]:
     }
 
 
-def scan_report(faults: Sequence[str], undeclared: Sequence[str], lines: int) -> Report:
+def scan_report(
+    faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
+) -> Report:
     """Report whether the tables explain a scan, with every line that they don't."""
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -63,15 +65,19 @@ def scan_report(faults: Sequence[str], undeclared: Sequence[str], lines: int) ->
         f"in {pairs} places, {sum(each.printed is not None for each in cards)} in their number; "
         f"the scan has {counted(lines, 'line')}"
     )
+    read = next(each["sha256"] for each in facts("cards/scan")["witness"] if "sha256" in each)
+    told += (
+        "; it is " + ("the text that was read" if digest == read else "another text") + " (SHA-256)"
+    )
     end = "nothing is unexplained" if not (faults or undeclared) else (
         f"{len(faults) + len(undeclared)} unexplained"
     )  # fmt: skip
     return Report(
         "cards",
-        [[told], [Line(each) for each in (*faults, *undeclared)], [end]],
+        [[told], [*faults, *undeclared], [end]],
         record=lambda: {
             "lines": lines, "cards": len(cards), "lost": lost, "deviating": deviating,
-            "differences": pairs, "unexplained": [*faults, *undeclared],
+            "differences": pairs, "sha256": digest, "unexplained": [*faults, *undeclared],
         },
         data=columns("unexplained", [[each] for each in (*faults, *undeclared)]),
     )  # fmt: skip

@@ -1,10 +1,12 @@
 """The text of the edition: explained to the last character, and where port and twin have it."""
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 
+from pyharness.cli.main import main
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
@@ -185,3 +187,38 @@ def test_ranges() -> None:
 def test_a_scan_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="not this thesis"):
         unexplained(text)
+
+
+def test_scan_is_told_in_a_line_each(
+    scan: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "scan.txt"
+    path.write_text(scan)
+    assert main(["cards", "--scan", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert "nothing is unexplained" in told
+    assert "it is another text" in told
+    path.write_text(scan.replace("300-U1(1)=0.", "300-U1(1)=8."))
+    assert main(["cards", "--scan", str(path), "--format", "json"]) == 1
+    (fault,) = json.loads(capsys.readouterr().out)["unexplained"]
+    assert "two-term:300" in fault
+
+
+@pytest.mark.parametrize("asked", ["1260", "two-term:330-380", "runge-kutta:1010-1040", ""])
+def test_cards_are_told_in_100_columns(asked: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["cards", *([asked] if asked else [])]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 100
+
+
+def test_record_of_a_card(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["cards", "two-term:1650-1660", "--format", "json"]) == 0
+    first, second = json.loads(capsys.readouterr().out)["cards"]
+    assert (first["card"], first["scan"]) == (1650, "1650-U3(1)=U3(4)")
+    assert first["statement"] == "V3(1)=V3(4)"
+    assert (second["scan"], second["entries"]) == (None, ["dt-accumulates", "step-literals"])
+    for places in (second["fortran"], second["twin"]):
+        assert places[0]["text"].upper().startswith("DT = DT +")
+    assert second["parallels"] == ["four-term:2250"]
+    assert main(["defects", "two-term:1660"]) == 0
+    assert "dt-accumulates: DT grows" in capsys.readouterr().out

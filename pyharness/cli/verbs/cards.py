@@ -1,6 +1,7 @@
 """`cards`: the text of the edition, card by card, beside the scan, the port and the twin."""
 
 import argparse
+from hashlib import sha256
 from pathlib import Path
 
 from pyharness.cli import options as shared
@@ -30,9 +31,11 @@ def run(options: argparse.Namespace) -> int:
         shared.show(cards_report(found), options)
         return 0
     _no_card(options, "--scan")
-    faults, undeclared_ = unexplained(_text(options.scan)), undeclared()
+    text = _text(options.scan)
+    faults, undeclared_ = unexplained(text), undeclared()
+    digest = sha256(text.encode()).hexdigest()
     shared.check_outputs(options)
-    shared.show(scan_report(faults, undeclared_, len(expected_lines())), options)
+    shared.show(scan_report(faults, undeclared_, len(expected_lines()), digest), options)
     return 1 if faults or undeclared_ else 0
 
 

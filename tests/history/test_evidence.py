@@ -63,3 +63,26 @@ def test_evidence_is_told(printed: Printed) -> None:
     assert scores == sorted(scores, reverse=True)
     assert set(record["discriminating"]) <= set(record["combinations"][0]["verdicts"])
     assert "Every combination" in record["rule"]
+
+
+def test_what_the_report_says_of_each_choice() -> None:
+    """docs/findings.md: what each choice does to the score, all others kept."""
+    found = list(evidence())
+    steps, held, last, c1 = (
+        _effects(found, axis)
+        for axis in ("steps", "conjecture torque-held", "reading do-variable", "reading c1-for-c")
+    )
+    assert max(steps) < 0.0
+    assert min(held) < max(held) == 0.0
+    assert min(last) < max(last) == 0.0
+    assert min(c1) == 0.0
+    assert max(c1) == 0.5
+
+
+def _effects(found: list[Combination], axis: str) -> list[float]:
+    scores: dict[tuple[tuple[str, str], ...], dict[str, float]] = {}
+    for each in found:
+        choices = each.choices()
+        chosen = choices.pop(axis)
+        scores.setdefault(tuple(choices.items()), {})[chosen] = each.score
+    return [second - first for first, second in (each.values() for each in scores.values())]

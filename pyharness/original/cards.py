@@ -4,18 +4,16 @@ A line of the scan is a number, a dash and the text of a card; blanks do not cou
 in `data/cards`: the decks, the pages of the scan in its order, and where a card is in the twins.
 """
 
-import difflib
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 
-HEADING = "APPENDIX AND PROGRAMS"
 _MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
 _SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
 _PACKAGE = Path(__file__).parent.parent
@@ -91,7 +89,7 @@ class Card(NamedTuple):
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
-        return f"{number}-{applied(_tight(self.text), self.differences)}"
+        return f"{number}-{applied(tight(self.text), self.differences)}"
 
     @property
     def deviates(self) -> bool:
@@ -212,7 +210,7 @@ def parallels(card: Card) -> list[Card]:
         other
         for program in PROGRAMS
         if program != card.program
-        for other in _by_text(program).get(_tight(card.text), [])
+        for other in _by_text(program).get(tight(card.text), [])
     ]
 
 
@@ -220,7 +218,7 @@ def parallels(card: Card) -> list[Card]:
 def _by_text(program: str) -> dict[str, list[Card]]:
     found: dict[str, list[Card]] = {}
     for card in deck(program).cards.values():
-        found.setdefault(_tight(card.text), []).append(card)
+        found.setdefault(tight(card.text), []).append(card)
     return found
 
 
@@ -275,89 +273,6 @@ def applied(text: str, differences: Iterable[Difference]) -> str:
     return scans + rest
 
 
-def expected_lines() -> list[tuple[str, str]]:
-    """Return all that the appendix should have: a line without blanks, and what it is."""
-    found = []
-    for page in facts("cards/scan")["page"]:
-        for item in page["lines"]:
-            if isinstance(item, str):
-                for card in (find(page["program"], number) for number in numbers(item)):
-                    assert card.scan is not None
-                    found.append((card.scan, card.name))
-            else:
-                kind = "furniture" if "furniture" in item else "phantom"
-                found.append((_tight(item[kind]), kind))
-    return found
-
-
-def unexplained(scan: str) -> list[str]:
-    """Return what the tables do not explain of a scan, a sentence each; none where they do.
-
-    Raises
-    ------
-    InputError
-        Where the text has no appendix with cards.
-    """
-    _, heading, appendix = scan.rpartition(HEADING)
-    if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
-        raise InputError(f"the scan has no line {HEADING!r} with cards after it: not this thesis")
-    first = scan.count("\n", 0, len(scan) - len(appendix)) + 1
-    lines = [(n, _tight(text)) for n, text in enumerate(appendix.split("\n"), first)]
-    lines = [(n, text) for n, text in lines if text not in ("", "```")]
-    expected = expected_lines()
-    found, wanted = [text for _, text in lines], [text for text, _ in expected]
-    if len(found) == len(wanted):
-        pairs = zip(lines, expected, strict=True)
-        return [_differs(n, text, *want) for (n, text), want in pairs if text != want[0]]
-    faults = []
-    matcher = difflib.SequenceMatcher(None, wanted, found, autojunk=False)
-    for what, i, j, k, m in matcher.get_opcodes():
-        if what != "equal":
-            faults += [f"line {n}: {text!r} is in no table" for n, text in lines[k:m]]
-            faults += [f"{name}: {text!r} is not in the scan" for text, name in expected[i:j]]
-    return faults
-
-
-def undeclared() -> list[str]:
-    """Return what cards and entries say otherwise, a sentence each; none where they agree."""
-    used: set[tuple[Any, ...]] = set()
-    for card in chosen(()):
-        for each in card.differences:
-            used.add((each.entry, card.program, card.number, each.ours, each.scans))
-        if card.printed:
-            used.add(
-                (card.printed[1], card.program, card.number, str(card.number), card.printed[0])
-            )
-    declared: set[tuple[Any, ...]] = set()
-    for entry in facts("apparatus")["entry"]:
-        for ours, scans, cards in entry.get("pairs", ()):
-            for program, ranges in cards.items():
-                declared |= {(entry["id"], program, n, ours, scans) for n in numbers(ranges)}
-        for program, ranges, first, step in entry.get("printed", ()):
-            for index, number in enumerate(numbers(ranges)):
-                shown = str(first + step * index)
-                declared.add((entry["id"], program, number, str(number), shown))
-    faults = [
-        f"{program}:{number} {ours!r} read {scans!r}: {entry} does not declare it"
-        for entry, program, number, ours, scans in sorted(used - declared)
-    ]
-    faults += [
-        f"{entry} declares {ours!r} read {scans!r} of {program}:{number}: the card does not have it"
-        for entry, program, number, ours, scans in sorted(declared - used)
-    ]
-    names = {each["id"]: each for each in facts("apparatus")["entry"]}
-    for card in chosen(()):
-        if card.lost and names.get(card.lost, {}).get("kind") != "missing text":
-            faults.append(f"{card.name} is lost by {card.lost}: no entry of missing text")
-        if not (card.lost or card.scan):
-            faults.append(f"{card.name}: neither in the scan nor lost")
-    return faults
-
-
-def _differs(line: int, text: str, wanted: str, name: str) -> str:
-    return f"line {line}, {name}: {text!r}, where the table has {wanted!r}"
-
-
 def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
     found: dict[int, list[Place]] = {}
     for cards, place in places:
@@ -379,5 +294,6 @@ def _lines(path: Path) -> list[str]:
     return path.read_text(encoding="utf-8").splitlines()
 
 
-def _tight(text: str) -> str:
+def tight(text: str) -> str:
+    """Return a text without its blanks, which do not count."""
     return "".join(text.split())

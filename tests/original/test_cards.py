@@ -10,15 +10,9 @@ from pyharness.cli.main import main
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.original import cards
-from pyharness.original.cards import (
-    chosen,
-    deck,
-    expected_lines,
-    numbers,
-    undeclared,
-    unexplained,
-)
+from pyharness.original import collation
+from pyharness.original.cards import chosen, deck, numbers
+from pyharness.original.collation import HEADING, expected_lines, undeclared, unexplained
 
 SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
 # What the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
@@ -33,7 +27,7 @@ FORMS = (
 def scan() -> str:
     """Return a scan that the tables explain: made of them."""
     lines = [text for text, _ in expected_lines()]
-    return "\n".join(["the thesis", cards.HEADING, "", *lines[:40], "```", "", *lines[40:]])
+    return "\n".join(["the thesis", HEADING, "", *lines[:40], "```", "", *lines[40:]])
 
 
 def test_decks_are_whole() -> None:
@@ -65,7 +59,7 @@ def test_what_is_not_declared_is_found(change: str, monkeypatch: pytest.MonkeyPa
             entry["printed"] = [[p, c, first + 10, step] for p, c, first, step in entry["printed"]]
     real = facts
     monkeypatch.setattr(
-        cards, "facts", lambda name: {"entry": entries} if name == "apparatus" else real(name)
+        collation, "facts", lambda name: {"entry": entries} if name == "apparatus" else real(name)
     )
     assert undeclared()
 
@@ -77,7 +71,7 @@ def test_scan_of_the_tables_is_explained(scan: str) -> None:
 @pytest.mark.parametrize("change", ["replaced", "removed", "added"])
 def test_a_character_changed_anywhere_is_found(scan: str, change: str) -> None:
     """At every place of every line: the k-th characters of all lines at once, each line found."""
-    head, heading, appendix = scan.partition(cards.HEADING)
+    head, heading, appendix = scan.partition(HEADING)
     lines = appendix.split("\n")
     kept = [n for n, line in enumerate(lines) if line not in ("", "```")]
     for k in range(max(map(len, lines)) + 1):
@@ -183,7 +177,7 @@ def test_ranges() -> None:
     assert numbers("") == []
 
 
-@pytest.mark.parametrize("text", ["", "no appendix", f"{cards.HEADING}\nno cards"])
+@pytest.mark.parametrize("text", ["", "no appendix", f"{HEADING}\nno cards"])
 def test_a_scan_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="not this thesis"):
         unexplained(text)

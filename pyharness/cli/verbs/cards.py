@@ -7,7 +7,8 @@ from pathlib import Path
 from pyharness.cli import options as shared
 from pyharness.history.cards_report import cards_report, classes_report, scan_report
 from pyharness.model.errors import InputError
-from pyharness.original.cards import chosen, expected_lines, undeclared, unexplained
+from pyharness.original.cards import chosen
+from pyharness.original.collation import expected_lines, undeclared, unexplained
 
 OPTIONS = {
     "cards CARDS": "two-term, 1660, 1040-1090, two-term:1660; all where nothing is named",

@@ -31,7 +31,7 @@ LISTING = {
     "--fix NAME,...": "correct these defects",
     "--keep NAME,...": "keep these; alone: correct all others",
     "--reading NAME,...": "select readings not adopted",
-    "--conjecture NAME,...": "assume this where no card exists; none: nothing",
+    "--conjecture NAME,...": "assume these where no card exists, and no other; none: nothing",
     "--lipschitz L": "constant of the stop test (default 500)",
     "--no-stop": "run on where the stop test would end the run",
 }
@@ -105,8 +105,8 @@ def chosen_effort(options: argparse.Namespace) -> float:
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
     """Return the seed of random draws; InputError for one that no line could repeat."""
-    if options.seed is not None and not (options.seed and options.seed.isprintable()):
-        raise InputError("--seed: has letters that can't be printed, or none; allowed: any others")
+    if options.seed is not None and not options.seed.isprintable():
+        raise InputError("--seed: has letters that can't be printed; allowed: any others")
     seed: str | None = options.seed
     return seed
 

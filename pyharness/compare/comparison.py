@@ -139,7 +139,7 @@ def compare_programs(
             listed(listing, each, lipschitz, may_stop, effort=effort) for each in IMPLEMENTATIONS
         )
         run, other = compiled.rows(scene), twin.rows(scene)
-        judged = not listing.defects and not listing.readings
+        judged = not (listing.defects or listing.readings or listing.conjectures)
         program = PROGRAM_REGISTRY[listing.program]
         order = measured_order(scene, program, listing, truth) if judged else None
         (seconds,) = timed([partial(compiled.rows, scene)], _TIMING_SECONDS, _TIMING_BATCHES)

@@ -136,7 +136,7 @@ def _limit(
     program = asked[plan.number]
     if program is None or plan.set != "original":
         return None
-    omega, _ = limit_solution(program, scene, scene.times(), truths[plan.case])
+    omega = limit_solution(program, scene, scene.times(), truths[plan.case])
     return f"limit of {program}", omega
 
 

@@ -86,7 +86,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
-    wanted, tends_to = limit_solution(program, scene, times, truth, effort)
+    wanted, tends_to, blow_up = _limit_solution(program, scene, times, truth, effort)
     found = []
     for parts in (2**k for k in range(halvings + 1)):
         finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
@@ -103,8 +103,6 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
     # A rounding in every step, of what is as large as omega.
     noise = 2.0**-50 * scale * scene.steps * 2**halvings
     finite = math.isfinite(before) and math.isfinite(last) and last > noise
-    lost = np.flatnonzero(~np.isfinite(wanted).all(axis=1))
-    blow_up = times[lost[0]] if len(lost) and tends_to != NOTHING else None
     return Limit(
         program, tends_to, tuple(found), math.log2(before / last) if finite else None, blow_up
     )
@@ -112,21 +110,29 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
-) -> tuple[Array, str]:
-    """Return the limit at `times`, NaN where there is none, and its name."""
+) -> Array:
+    """Return the limit (rad/s) at `times`, NaN where there is none."""
+    return _limit_solution(program, scene, times, truth, effort)[0]
+
+
+def _limit_solution(
+    program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
+) -> tuple[Array, str, float | None]:
+    """Return the limit at `times`, its name, and when it leaves every bound (s), if it does."""
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
     if program == "runge-kutta":
         if not scene.torque.varies:
             half = reference(scene, [t / 2.0 for t in times], effort=effort)
-            return 2.0 * half.omega - np.array(scene.omega), TENDS_TO[program]
-        rows = _solved(_slow_slopes(scene), start + start, times, scale, effort)
-        return rows[:, 3:], SLOW_SLOPES
+            return 2.0 * half.omega - np.array(scene.omega), TENDS_TO[program], None
+        rows, end = _solved(_slow_slopes(scene), start + start, times, scale, effort)
+        return rows[:, 3:], SLOW_SLOPES, end
     if scene.torque.varies:
-        return np.full((len(times), 3), math.nan), NOTHING
+        return np.full((len(times), 3), math.nan), NOTHING, None
     if program == "four-term":
-        return truth.omega, TENDS_TO[program]
-    return _solved(_extrapolated(scene), start, times, scale, effort), TENDS_TO[program]
+        return truth.omega, TENDS_TO[program], None
+    rows, end = _solved(_extrapolated(scene), start, times, scale, effort)
+    return rows, TENDS_TO[program], end
 
 
 def _extrapolated(scene: Scene) -> Rate:
@@ -164,16 +170,17 @@ def _slow_slopes(scene: Scene) -> Rate:
 
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
-) -> Array:
-    """Return the solution at `times`; NaN from where it leaves every bound."""
+) -> tuple[Array, float | None]:
+    """Return the solution at `times`, NaN from where it leaves every bound, and that time (s)."""
     from scipy.integrate import solve_ivp
 
-    evaluations = 0
+    evaluations, latest = 0, 0.0
     most = effort * _MOST_EVALUATIONS
 
     def counted(time: float, state: Sequence[float]) -> list[float]:
-        nonlocal evaluations
+        nonlocal evaluations, latest
         evaluations += 1
+        latest = max(latest, time)
         if evaluations > most:
             needed = effort * times[-1] / time if time else None
             raise InputError(
@@ -194,7 +201,8 @@ def _solved(
     rows = np.full((len(times), len(start)), math.nan)
     if len(result.t):  # else y is an empty list
         rows[: len(result.t)] = result.y.T
-    return rows
+    # It ends at the bound, or just before, where no step is short enough.
+    return rows, latest if result.status else None
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:

@@ -129,7 +129,10 @@ def _solved(weighting: str, length: float, rates: Array, mistake: str, second: b
         # LEQT1F leaves its factors in A; the second call takes them for the matrix.
         matrix = _factors(matrix)
     if mistake == "unscaled-solver":
-        return np.linalg.solve(matrix, right.T)
+        (a, b), (c, d) = matrix
+        x, y = right.T
+        second = (y - c / a * x) / (d - c / a * b)
+        return np.array([(x - b * second) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
     return np.array(solutions).T
 
@@ -183,7 +186,8 @@ def lost_report(found: Sequence[Ranked]) -> Report:
         ]
         for each in found
     ]  # fmt: skip
-    best = found[0]
+    most = max(each.in_both for each in found)
+    best = " and ".join(each.mistake for each in found if each.in_both == most)
     text: list[Section] = [
         [
             "Conjectures: mistakes that the programs for three weightings may have had, which IV.2 "
@@ -192,9 +196,9 @@ def lost_report(found: Sequence[Ranked]) -> Report:
         ],
         [Table(_TABLE, rows)],
         [
-            f"{best.mistake} fails in both cases with {best.in_both} of {len(WEIGHTINGS)} "
-            "weightings, the most of all; a mistake in the products alone can't fail Case 1, where "
-            "A = B = C = 0 and the products count nothing.",
+            f"{best}: in both cases with {most} of {len(WEIGHTINGS)} weightings, the most of all; "
+            f"{'none' if most < len(WEIGHTINGS) else 'as IV.2 says,'} with all. A mistake in the "
+            "products alone can't fail Case 1, where A = B = C = 0 and the products count nothing.",
         ],
     ]
     return Report(

@@ -141,7 +141,11 @@ def subset(
     fixed, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
     for name in sorted(fixed & kept):
         raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
-    assumed = None if conjectures is None else _names("conjectures", conjectures) - {"none"}
+    assumed = None if conjectures is None else _names("conjectures", conjectures)
+    if assumed is not None and "none" in assumed:
+        if len(assumed) > 1:
+            raise InputError("--conjecture: 'none' beside a name; give one of them")
+        assumed = frozenset()
     for option, kind, names in (
         ("--fix", "defect", fixed),
         ("--keep", "defect", kept),

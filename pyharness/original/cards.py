@@ -239,7 +239,12 @@ def _cards_of(asked: str) -> list[Card]:
     first, last = int(match[1]), match[2]
     if last is None:
         having = [each for each in programs if first in deck(each).cards]
-        return [find(each, first) for each in having or programs]
+        if having:
+            return [find(each, first) for each in having]
+        every = [card for each in programs for card in deck(each).cards.values()]
+        near = sorted(every, key=lambda card: abs(card.number - first))[:2]
+        told = " and ".join(card.name for card in sorted(near, key=lambda card: card.number))
+        raise InputError(f"card {first}: there is none; the nearest are {told}")
     found = [
         card
         for each in programs

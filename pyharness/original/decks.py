@@ -21,6 +21,7 @@ from pyharness.model.scene import Scene
 from pyharness.original.cards import deck, numbers
 
 DIALECTS = ("1982", "gfortran")
+MODELS = (3, 5)  # terms of the models that V.2 used in Case 6 and did not print
 COMPILER = "gfortran"
 # Numbers are binary64 and 0 until they are set; no operation is joined with another.
 FLAGS = (
@@ -112,8 +113,8 @@ def _is_made(
 
 
 def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
-    if listing.program != "four-term" or not 2 <= terms <= 5:
-        raise InputError(f"terms is {terms}; allowed: 2 to 5, with program four-term")
+    if listing.program != "four-term" or terms not in MODELS:
+        raise InputError(f"terms is {terms}; allowed: 3 or 5, with program four-term")
     if scene is not None and scene.torque.varies:
         raise InputError("a model of other terms has no torque that varies; allowed: --case 1 to 6")
     cards = model_cards(terms)
@@ -163,6 +164,8 @@ def model_cards(terms: int) -> dict[int, str]:
         "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
         ["DIMENSION U1(8),U2(8),U3(8),V1(8),V2(8),V3(8)"],
     )
+    name = {3: "THREE", 5: "FIVE"}.get(terms, "FOUR")
+    text[text.index("C FOUR TERM APPROXIMATION")] = f"C {name} TERM APPROXIMATION, A CONJECTURE"
     made("T1=DT*.2", "T5=.01", [f"T{k}=DT*{k}./{terms + 1}." for k in terms_range] + [f"{end}=.01"])
     made("A(1,1)=1.", "A(4,4)=4.*T4**3", matrix)
     made(

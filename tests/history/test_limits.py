@@ -50,7 +50,12 @@ def test_runge_kutta_in_case_2_is_twice_a_slow_sine() -> None:
 def test_two_term_in_case_6_follows_its_limit_into_the_blow_up() -> None:
     """The limit equation leaves every bound before t = 1; before that the program follows it."""
     assert _tends_elsewhere(limit("two-term", replace(case_scene(6), steps=30)))
-    assert math.isinf(limit("two-term", case_scene(6), 2).halvings[0].from_limit)
+    found = limit("two-term", case_scene(6), 2)
+    assert math.isinf(found.halvings[0].from_limit)
+    coarse = limit("two-term", replace(case_scene(6), step_size=0.07, steps=14), 2)
+    for each in (found, coarse):
+        assert each.blow_up == pytest.approx(0.4929, abs=1e-4)
+        assert "leaves every bound at t = 0.493 s" in each.approach
 
 
 @pytest.mark.parametrize("program", ["two-term", "four-term"])

@@ -146,8 +146,8 @@ def _as_on_card(statement: str) -> str:
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
-        (["1665"], "the nearest are 1660 and 1670"),
-        (["two-term:99"], "the nearest are 100 and 110"),
+        (["1665"], "the nearest are two-term:1660 and two-term:1670"),
+        (["two-term:99"], "the nearest are two-term:100 and two-term:110"),
         (["9000-9100"], "the range is empty; the decks have two-term 100-1680"),
         (["1090-1040"], "the range is empty"),
         (["three-term"], "neither a program"),

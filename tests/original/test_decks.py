@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
@@ -116,18 +117,23 @@ def test_page_and_records_after_the_stop_are_looked_at(
     assert (told in check.note) if told else check.passed
 
 
-def test_without_a_compiler_a_check_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pyharness.verify.decks.compiler", lambda: None)
-    (check,) = decks(Selection(only=["decks"]))
-    assert check.passed
-    assert "not run" in check.note
+def test_without_a_compiler_verify_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for room in ("verify.decks", "cli.verbs.verify"):
+        monkeypatch.setattr(f"pyharness.{room}.compiler", lambda: None)
+    assert list(decks(Selection(only=["decks"]))) == []
+    assert main(["verify", "--only", "decks"]) == 2
+    assert "no gfortran" in capsys.readouterr().err
+    assert main(["verify", "--only", "decks,orders/rk4/case-5"]) == 0
+    assert "decks: not run" in capsys.readouterr().out
 
 
 def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:
     printed, made = deck("four-term").cards, model_cards(4)
     assert set(printed) == set(made)
     points = {720: "T1=DT*1./5.", 730: "T2=DT*2./5.", 740: "T3=DT*3./5.", 750: "T4=DT*4./5."}
-    sizes = (110, 120, 150)
+    sizes = (110, 120, 150, 190)
     for number, text in made.items():
         assert text.strip() == points.get(number, printed[number].text.strip()) or number in sizes
 
@@ -144,7 +150,7 @@ def test_models_of_case_6_are_those_of_the_claims(terms: int, is_original: bool)
 
 
 @pytest.mark.parametrize(
-    ("program", "terms", "case"), [("two-term", 3, 6), ("four-term", 6, 6), ("four-term", 3, 7)]
+    ("program", "terms", "case"), [("two-term", 3, 6), ("four-term", 4, 6), ("four-term", 3, 7)]
 )
 def test_models_that_no_deck_can_be_are_refused(program: str, terms: int, case: int) -> None:
     with pytest.raises(InputError, match="allowed"):

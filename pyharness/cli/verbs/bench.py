@@ -87,7 +87,8 @@ def _count(options: argparse.Namespace) -> int:
     count = shared.whole(options.random, "--random")
     if count <= 0:
         raise InputError(f"--random: {count}; allowed: a whole number above 0")
-    options.seed = shared.chosen_seed(options) or weekly_seed()
+    seed = shared.chosen_seed(options)
+    options.seed = weekly_seed() if seed is None else seed
     return count
 
 

@@ -15,7 +15,7 @@ OPTIONS = {
     "--case N": "a case of Table 1, 1 to 7 (default: the case that was printed)",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"{' or '.join(DIALECTS)} (default {DIALECTS[0]})",
-    "--terms N": "a model that is not printed, of 2 to 5 terms, made of the four-term deck",
+    "--terms N": "3 or 5: a model that is not printed, made of the four-term deck, a conjecture",
     **shared.outputs(FORMATS, plot=""),
 }
 
@@ -30,6 +30,11 @@ def run(options: argparse.Namespace) -> int:
         shared.check_known("case", options.case, [str(each) for each in case_numbers()])
         scene = case_scene(int(options.case))
     dialect = options.dialect or DIALECTS[0]
+    if dialect == "1982" and (options.case == "7" or listing.has("do-variable")):
+        shared.warn(
+            "the torque of Case 7 and what becomes of a DO variable are on no card; --dialect "
+            "gfortran has both"
+        )
     terms = None if options.terms is None else shared.whole(options.terms, "--terms")
     lines = deck_text(listing, scene, dialect, terms).splitlines()
     shared.check_outputs(options)

@@ -8,6 +8,7 @@ from pyharness.cli import options as shared
 from pyharness.compare.checks import Check
 from pyharness.compare.checks_report import checks_report, samples, summary
 from pyharness.model.errors import InputError
+from pyharness.original.decks import compiler
 from pyharness.verify.kinds import KINDS, verify
 from pyharness.verify.random_methods import ROUNDING
 from pyharness.verify.selection import DRAWS, RECORD, Selection
@@ -44,6 +45,8 @@ def run(options: argparse.Namespace) -> int:
         if len(checks) % 20 == 0 or check.kind != "cells":
             shared.progress(f"{len(checks)}: {check.id}")
     if not checks:
+        if chosen.may_ask("decks") and compiler() is None:
+            raise InputError("decks are compiled, and there is no gfortran on the PATH")
         if not chosen.record.is_dir() and chosen.may_ask("golden"):
             raise InputError("there is no golden record here; give --record DIR, or a checkout")
         asked = f"--only {options.only}" if options.only else "--draws 0"
@@ -100,7 +103,9 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Say that figures of the user's were not judged: no failure shows it."""
+    """Say what was not judged, as no failure shows it: decks, and figures of the user's."""
+    if chosen.may_ask("decks") and compiler() is None:
+        return ["decks: not run, as there is no gfortran on the PATH"]
     count = sum(check.passed and check.value is None for check in checks)
     if chosen.problems is None or not count:
         return []

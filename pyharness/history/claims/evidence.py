@@ -1,9 +1,9 @@
 """Evidence in place of yes or no: every combination of what the thesis leaves open, scored.
 
-A combination chooses omega(0) where it is not given, the readings, the conjectures and the number
-of steps. It is scored by the claims about the original programs: one point for each that is
-reproduced, a half for one reproduced in part, none otherwise; claims that are not testable do not
-count. Nothing is weighted and nothing is tuned.
+A combination chooses omega(0), one for all cases in which it is not given or those that we adopt,
+the readings, the conjectures and the number of steps. It is scored by the claims about the original
+programs: one point for each that is reproduced, a half for one reproduced in part, none otherwise;
+claims that are not testable do not count. Nothing is weighted and nothing is tuned.
 """
 
 from collections.abc import Iterator
@@ -43,7 +43,7 @@ class Combination:
         given = self.assumptions
         start = given.start or ()
         return {
-            "omega(0)": ",".join(f"{x:g}" for x in start),
+            "omega(0)": ",".join(f"{x:g}" for x in start) or "adopted",
             **{f"reading {name}": _said(name in given.readings) for name in _names("reading")},
             **{
                 f"conjecture {name}": _said(name in (given.conjectures or ()))
@@ -67,9 +67,11 @@ def evidence() -> Iterator[Combination]:
 def evidence_rule() -> str:
     """Say how a combination is scored."""
     return (
-        "Every combination of starts, readings, conjectures and steps, scored by the claims about "
-        "the original programs: 1 for each reproduced, 1/2 in part, 0 otherwise; not testable ones "
-        "do not count. No weights."
+        "Every combination of starts (one for all cases in which none is given, or those adopted), "
+        "readings, conjectures and steps, scored by the claims about the original programs: 1 for "
+        "each reproduced, 1/2 in part, 0 otherwise; not testable ones do not count. No weights: "
+        "abstract-superior and vi-superior are one measure, v2-case-2-growing and "
+        "v2-case-2-no-error turn against each other."
     )
 
 
@@ -78,14 +80,17 @@ def combinations() -> list[Assumptions]:
     return [
         Assumptions(start, frozenset(readings), steps, frozenset(conjectures))
         for start, readings, conjectures, steps in product(
-            starts(), _subsets(_names("reading")), _subsets(_names("conjecture")), STEPS
+            [None, *starts()], _subsets(_names("reading")), _subsets(_names("conjecture")), STEPS
         )
     ]
 
 
 def discriminating(found: list[Combination]) -> list[str]:
     """Return the claims whose verdict is not the same in all combinations."""
-    return [name for name in found[0].verdicts if len({each.verdicts[name] for each in found}) > 1]
+    every = dict.fromkeys(name for each in found for name in each.verdicts)
+    return [
+        name for name in every if len({each.verdicts.get(name, NOT_TESTABLE) for each in found}) > 1
+    ]
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:

@@ -25,7 +25,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
 from pyharness.original.cells import subsets
-from pyharness.original.decks import solver_cards
+from pyharness.original.decks import deck_text, solver_cards
 from pyharness.original.operations import operations_per_step
 from pyharness.original.programs import run_program
 
@@ -201,7 +201,7 @@ def seconds(lab: Laboratory) -> Judged:
 
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Count the cards of each deck, without a matrix subroutine and with our own LEQT1F."""
-    cards = facts("cases")["cards"]
+    cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
     numbers["LEQT1F, ours: cards"] = float(solver_cards())
     ratios = []

@@ -74,8 +74,8 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
     text: list[Section] = [
         [
             "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
-            "shows,",
-            "the claims about that case alone, for the original programs:",
+            "shows, and (1, 1, 1), which is ours, the claims about that case alone, for the "
+            "original programs; those that hold with no start do not count:",
         ]
     ]
     holding = []
@@ -84,7 +84,7 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
         lines = [f"Case {case}"]
         for each in starts:
             start = ", ".join(f"{x:g}" for x in each.start)
-            told = "all can hold" if each.holds else "they can not all hold"
+            told = "all others hold" if each.holds else "they do not all hold"
             lines.append(f"  ({start}): {told}")
             lines += [f"      {verdict:20s}{name}" for name, verdict in each.verdicts.items()]
         text.append(list(map(Line, lines)))

@@ -19,7 +19,7 @@ from pyharness.history.claims.laboratory import (
     ranges,
     starts,
 )
-from pyharness.model.listing import PROGRAMS, Listing, names_of
+from pyharness.model.listing import PROGRAMS, Listing, names_of, original
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.cells import subsets
@@ -126,12 +126,20 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
         Listing("runge-kutta", defects, lab.listing("runge-kutta").readings)
         for defects in subsets(names_of("defect", "runge-kutta"))
     ]
-    stops = [run_program(lab.scene(case), each).stop for each in every]
-    there = sum(each is not None and each.step == step for each in stops)
+    there = []
+    for each in every:
+        other = run_program(lab.scene(case), each).stop
+        if other is not None and other.step == step:
+            mended = sorted(original(each.program).defects - each.defects)
+            there.append(f"original but for {', '.join(mended)}" if mended else "original")
     numbers = {
         "stopped at step": found,
-        f"of {len(every)} subsets of the defects, stop there": float(there),
+        f"of {len(every)} subsets of the defects, stop there": float(len(there)),
+        **{f"stops there: {each}": float(step) for each in there},
     }
+    if stop is None:
+        numbers["steps that it ran"] = float(lab.run("runge-kutta", case).steps)
+        del numbers["stopped at step"]
     return graded(numbers, found == step, stop is not None)
 
 

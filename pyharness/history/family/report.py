@@ -83,7 +83,11 @@ def _tables(found: Sequence[OrderFinding]) -> list[Section]:
         return Table([*names, *(Column(f"k={k}", write) for k in corrections)], rows)
 
     return [
-        ["order derived / measured, by terms n and corrections k", table(_order)],
+        [
+            "order derived / measured, by terms n and corrections k",
+            "(?: the measured order had not settled before rounding took over)",
+            table(_order),
+        ],
         ["largest error of any w over these steps (rad/s)", table(_error)],
     ]
 

@@ -186,7 +186,7 @@ def test_literals_of_the_step_all_or_none_are_a_step(
     program: str, terms: int, changed: frozenset[str], parts: int
 ) -> None:
     lab = Laboratory(True)
-    found = by_literals([lab.scene(case) for case in (2, 3, 5)], terms, changed, 10)
+    found = by_literals(tuple(map(lab.scene, (2, 3, 5))), terms, changed, 10)
     for case, omega in zip((2, 3, 5), found, strict=True):
         run = lab.run(program, case, parts=parts)
         assert np.abs(omega - run.omega[parts - 1 :: parts]).max() < 1e-12
@@ -198,7 +198,7 @@ def test_one_literal_alone_is_another_experiment(judged: dict[str, Judgement]) -
     assert numbers["two-term, .001 in DT+: of 5 cases improve"] == 4
     assert numbers["two-term, .001 in DT=, T=, DT+: of 5 cases improve"] == 1
     lab = Laboratory(True)
-    (second,) = by_literals([lab.scene(2)], 2, {"DT+"}, 10)
+    (second,) = by_literals((lab.scene(2),), 2, frozenset({"DT+"}), 10)
     error = float(np.abs(second - lab.truth(2).omega).max())
     assert error == pytest.approx(lab.error("two-term", 2), rel=1e-9)
 

@@ -1,7 +1,7 @@
 """Where claims are tested: the programs in one state, under stated assumptions, run once each."""
 
 import math
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -160,7 +160,10 @@ LITERALS = ("DT=", "T=", "DT+")
 """Where the collocation decks have the step: before the loop, as the interval's end, as growth."""
 
 
-def by_literals(scenes: Sequence[Scene], terms: int, changed: Set[str], parts: int) -> Array:
+@cache
+def by_literals(
+    scenes: tuple[Scene, ...], terms: int, changed: frozenset[str], parts: int
+) -> Array:
     """Run original collocation decks in which some literals of the step are so much smaller.
 
     Of constant torque, to rounding, side by side; omega (rad/s) of every scene at the steps that

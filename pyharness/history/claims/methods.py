@@ -132,7 +132,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
     """Count the cases that improve, by which of the step's literals were changed to a tenth."""
-    scenes = [lab.scene(case) for case in cases]
+    scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
         before = [lab.error(program, case) for case in cases]

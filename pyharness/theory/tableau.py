@@ -7,7 +7,9 @@ themselves are never formed.
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
+from operator import mul
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -38,7 +40,7 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     n = terms
     if weighting == "collocation":
         nodes = grid(points, n)
-        projection = np.linalg.inv(basis(nodes, n))
+        tests, quadrature = np.eye(n), np.ones(n)
     else:
         if weighting == "subdomain":
             part, quadrature = _gauss(n + 1)
@@ -52,9 +54,33 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
             tests = basis(nodes, n)
             if weighting == "galerkin":
                 tests = tests * nodes[:, None]
-        weighted = (tests * quadrature[:, None]).T
-        projection = np.linalg.solve(weighted @ basis(nodes, n), weighted)
-    return Tableau(nodes, _integrals(nodes, n) @ projection, projection[0])
+    weighted = _exact((tests * quadrature[:, None]).T)
+    # In fractions, or the numbers of the family would hang on the LAPACK in use.
+    projection = _solved(_product(weighted, _exact(basis(nodes, n))), weighted)
+    matrix = _product(_exact(_integrals(nodes, n)), projection)
+    return Tableau(nodes, np.array(matrix, dtype=float), np.array(projection[0], dtype=float))
+
+
+def _exact(values: Array) -> list[list[Fraction]]:
+    return [[Fraction(x) for x in row] for row in values.tolist()]
+
+
+def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
+    columns = list(zip(*b, strict=True))
+    return [[sum(map(mul, row, c), Fraction()) for c in columns] for row in a]
+
+
+def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
+    """Return x of a x = b, by elimination."""
+    rows = [[*left, *right] for left, right in zip(a, b, strict=True)]
+    for k in range(len(rows)):
+        pivot = next(i for i in range(k, len(rows)) if rows[i][k])
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [x / rows[k][k] for x in rows[k]]
+        for i in range(len(rows)):
+            if i != k and rows[i][k]:
+                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
+    return [row[len(a) :] for row in rows]
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
@@ -68,8 +94,23 @@ def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
 
 def _gauss(m: int) -> tuple[Array, Array]:
     """Return nodes and weights of Gauss and Legendre on the unit interval."""
-    x, w = legendre.leggauss(m)
-    return np.asarray((x + 1.0) / 2.0, dtype=float), np.asarray(w / 2.0, dtype=float)
+    nodes, weights = [], []
+    for near in legendre.leggauss(m)[0].tolist():
+        # One step of Newton's takes off what the eigenvalues err by.
+        value, slope = _legendre(m, Fraction(near))
+        x = (Fraction(near) - value / slope).limit_denominator(10**36)
+        _, slope = _legendre(m, x)
+        nodes.append(float((x + 1) / 2))
+        weights.append(float(1 / ((1 - x * x) * slope * slope)))
+    return np.array(nodes), np.array(weights)
+
+
+def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
+    """Return the Legendre polynomial of degree m and its derivative, inside (-1, 1)."""
+    before, value = Fraction(1), x
+    for k in range(2, m + 1):
+        before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
+    return value, m * (x * value - before) / (x * x - 1)
 
 
 def basis(s: Array, n: int) -> Array:

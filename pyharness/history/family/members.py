@@ -163,14 +163,20 @@ def march(scene: Scene, members: Sequence[Member]) -> Array:
             for k in range(1, most + 1):
                 rates = _rates(scene, torque, estimate)
                 done = corrections == k
-                end[done] = start[done] + h * (weights[done] @ rates[done])
+                end[done] = start[done] + h * _sums(weights[done], rates[done])
                 if k < most:
-                    estimate = start + h * (matrix @ rates)
+                    estimate = start + h * _sums(matrix, rates)
             start = end
             result[:, step] = end[:, 0]
             if not np.isfinite(end).any():
                 break
     return result
+
+
+def _sums(factors: Array, rates: Array) -> Array:
+    """Return a product of matrices for every member, summed in order and not by a BLAS."""
+    total: Array = np.einsum("mij,mjk->mik", factors, rates)
+    return total
 
 
 def _rates(scene: Scene, torque: Array, omega: Array) -> Array:

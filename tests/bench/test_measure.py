@@ -336,6 +336,16 @@ MISTAKES = [
     ("--horizon nan", "not finite"),
     ("--horizon 1e9", "--horizon: 1e+09; allowed"),
     ("--case 8", "unknown case '8'"),
+    ("--random 0", "--random: 0; allowed: a whole number above 0"),
+    ("--random -3", "--random: -3; allowed: a whole number above 0"),
+    ("--random 1.5", "--random: '1.5' where a whole number belongs"),
+    ("--random 2 --case 5", "--case has no meaning with --random"),
+    ("--random 2 --horizon 5", "--horizon has no meaning with --random"),
+    ("--random 2 --plot a.svg", "--plot has no meaning with --random"),
+    ("--random 2 --plan", "--random has no meaning with --plan"),
+    ("--growth --seed 5", "--seed has no meaning with --growth"),
+    ("--seed 5", "--seed has no meaning without --random"),
+    ("--random 2 --seed \udcff", "--seed: has letters that can't be printed"),
 ]
 
 

@@ -163,25 +163,3 @@ def test_verb_gives_rows_and_spreads(capsys: Capture, monkeypatch: pytest.Monkey
     assert main([*command, "--format", "markdown"]) == 0
     told = f"`pyharness bench --random 2 --seed {SEED} --methods auto,rk4 --peers none"
     assert told in capsys.readouterr().out
-
-
-MISTAKES = [
-    ("--random 0", "--random: 0; allowed: a whole number above 0"),
-    ("--random -3", "--random: -3; allowed: a whole number above 0"),
-    ("--random 1.5", "--random: '1.5' where a whole number belongs"),
-    ("--random 2 --case 5", "--case has no meaning with --random"),
-    ("--random 2 --horizon 5", "--horizon has no meaning with --random"),
-    ("--random 2 --plot a.svg", "--plot has no meaning with --random"),
-    ("--random 2 --plan", "--random has no meaning with --plan"),
-    ("--growth --seed 5", "--seed has no meaning with --growth"),
-    ("--seed 5", "--seed has no meaning without --random"),
-    ("--random 2 --seed \udcff", "--seed: has letters that can't be printed"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "words"), MISTAKES)
-def test_mistake_is_one_line(arguments: str, words: str, capsys: Capture) -> None:
-    assert main(["bench", *arguments.split()]) == 2
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err.count("\n")) == ("", 1)
-    assert words in captured.err

@@ -5,7 +5,7 @@
 #define ARGUMENTS                                                                              \
   const void *problem, const double *omega, const double *tolerance, const double *effort,     \
       int n_times, const double *times, double *rows, int *n_rows, int *status,                \
-      int64_t *steps, double *needed
+      int64_t *steps, double *needed, double *found
 
 #define QUICK_ARGUMENTS                                                                        \
   const void *problem, const double *omega, const double *tolerance, const double *effort,     \
@@ -61,7 +61,7 @@ __attribute__((constructor)) static void choose_best(void) { choose_level(2); }
 
 void taylor_solve(ARGUMENTS)
 {
-  chosen(problem, omega, tolerance, effort, n_times, times, rows, n_rows, status, steps, needed);
+  chosen(problem, omega, tolerance, effort, n_times, times, rows, n_rows, status, steps, needed, found);
 }
 
 void quick_solve(QUICK_ARGUMENTS)

@@ -12,7 +12,7 @@ module prepared
                     TOLERANCE, WAVES
   use problem, only: problem_t
   use sphere, only: sphere_rows
-  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
   use torque_free, only: torque_free_rows
   implicit none(type, external)
   private
@@ -46,7 +46,7 @@ contains
       call solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps)
     end if
     ! Not ieee_value: that module ties the binary to libgfortran.
-    if (status /= COMPLETE) omega = transfer(huge(0_int64), 1.0_dp)
+    if (status /= COMPLETE .and. status /= SENSITIVE) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
 
   subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps)
@@ -132,7 +132,7 @@ contains
     real(dp) :: tolerance_left
     integer :: code, n_rows, quick_steps
     integer(int64) :: evaluations
-    real(dp) :: needed
+    real(dp) :: needed, found(2)
 
     code = int(packed(METHOD))
     times(1) = t_end
@@ -144,7 +144,7 @@ contains
       if (ended == REFUSED .and. code == CLOSED_FORM_OR_TAYLOR) then
         call unpack(packed, n_packed, problem)
         call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
-                          n_rows, ended, count, needed)
+                          n_rows, ended, count, needed, found)
       end if
     case (SPHERE)
       call unpack(packed, n_packed, problem)
@@ -162,7 +162,7 @@ contains
       end if
       if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
         call taylor_solve(problem, omega0, tolerance_left, packed(EFFORT), 1, times, omega, &
-                          n_rows, ended, count, needed)
+                          n_rows, ended, count, needed, found)
       end if
     case (IMPROVED_EULER:RK4)
       call unpack(packed, n_packed, problem)

@@ -1,7 +1,7 @@
 module scaled_motion
   !! Unknowns scaled so that every product has the coefficient 1 or -1, and the integral of the
   !! torque in them; waves that are fast and weak are averaged, to second order.
-  use euler_equations, only: sine_cosine
+  use torque_terms, only: sine_cosine
   use kinds, only: dp
   use problem, only: problem_t
   use statuses, only: COMPLETE, REFUSED

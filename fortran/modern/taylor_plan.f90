@@ -2,28 +2,27 @@ module taylor_plan
   !! What a Taylor series is begun with: the order from the digits that are asked for, the share of
   !! the error that a step may have, the first step from the rates of the problem.
   use, intrinsic :: iso_fortran_env, only: int64
-  use euler_equations, only: MOST_ORDER
   use kinds, only: dp
   use problem, only: problem_t
+  use torque_terms, only: MOST_ORDER
   implicit none(type, external)
   private
 
-  real(dp), parameter :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
+  integer, parameter :: LEAST_ORDER = 8
+  real(dp), parameter, public :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
   real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
 
   public :: plan
 
 contains
 
-  pure subroutine plan(problem, varies, scale, tolerance, time, best, most, share, h)
+  pure subroutine plan(problem, scale, tolerance, time, order, share, h)
     !! Order from the tolerance, the first step from the rates of the problem.
     type(problem_t), intent(in) :: problem
-    logical, intent(in) :: varies           !! torque with time
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: time            !! to go, s
-    integer, intent(out) :: best            !! order
-    integer, intent(out) :: most            !! order
+    integer, intent(out) :: order
     real(dp), intent(out) :: share          !! part of the scale that the last terms may have
     real(dp), intent(out) :: h              !! s
     real(dp) :: coupling
@@ -57,8 +56,7 @@ contains
     ! Waves ask for more steps, and those may all err alike.
     share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain) + ALIKE*turned)
     share = max(share, LEAST_SHARE)
-    best = order_for(share, varies)
-    most = min(best + 4, MOST_ORDER)
+    order = order_for(share)
   end subroutine plan
 
   pure subroutine add_wave_rates(wave, is_sine, coupling, time, gain, rate, turned)
@@ -82,15 +80,13 @@ contains
     end if
   end subroutine add_wave_rates
 
-  pure integer function order_for(share, varies)
-    !! Even order with the least work, a line through measured ones. A torque that varies costs
-    !! the same at every order, so that fewer and longer steps pay.
+  pure integer function order_for(share)
+    !! Even order with the least work, a line through measured ones.
     real(dp), intent(in) :: share
-    logical, intent(in) :: varies  !! torque with time
     integer(int64) :: bits  ! of accuracy
 
     bits = 1023 - ishft(transfer(share, bits), -52)
-    order_for = min(MOST_ORDER - 4, 2*int((30 + 2*bits)/10) + merge(2, 0, varies))
+    order_for = min(MOST_ORDER, LEAST_ORDER + 2*int((16*bits + 50)/100))
   end function order_for
 
 end module taylor_plan

@@ -1,145 +1,296 @@
-"""Write a hot module for one instruction set: other names, and the marked loops written out."""
+"""Write the hot modules for one instruction set: other names, and the marked loops written out.
+
+In one file: within it the compiler may put a procedure where it is called.
+
+One recurrence is printed twice: as Fortran, a statement for each axis, and as C, a statement for a
+register of all three. No Fortran compiler makes the turns of a register's lanes that this needs.
+"""
 
 import re
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 MODULES = (
-    "euler_equations",
+    "torque_terms",
     "scaled_motion",
     "scaled_march",
     "scaled_runge_kutta",
     "taylor_plan",
     "taylor_series",
+    "taylor_error",
     "taylor",
 )
-MOST_ORDER = 28
-FIRST_CHECK = 6
-# From this order on the products of the three equations are summed side by side.
-WIDE = 10
-# Numbers just stored one by one can't be loaded together without a wait: the newest two terms of
-# each factor stay out of the wide sums.
-LAG = 2
-LOCALS = [f"{name}{axis}" for name in ("p", "pp", "q", "qq", "tail") for axis in (1, 2, 3)]
+LEAST_ORDER, MOST_ORDER = 8, 24
+ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
+ORDER_CARRIED = 8
+# The two factors of the products in equations 13-15.
 FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
-PLACES = {
-    "x": ("left(2", "left(3"),
-    "y": ("left(1", "right(3"),
-    "z": ("right(1", "right(2"),
-}
+# Where series_t has them, from its beginning.
+TORQUE = 4 * (MOST_ORDER + 1)
+RATES = TORQUE + 4 * MOST_ORDER
+CHANGE = RATES + 4
+LANES = CHANGE + 4
 
 
-def main(source: str, target: str, level: str) -> None:
-    """Read `source`, write `target`; names in it end in `level`."""
-    with open(source) as file:
-        text = file.read()
+def main(level: str, target: str, *sources: str) -> None:
+    """Write `target`, Fortran from `sources` or C; names in it end in `level`."""
+    if target.endswith(".c"):
+        written = "\n".join(c_source(level)) + "\n"
+    else:
+        written = "".join(fortran_source(Path(source).read_text(), level) for source in sources)
+    Path(target).write_text(written)
+
+
+# ---- The recurrence -----------------------------------------------------------------------------
+
+
+def recurrence(order: int) -> Iterator[str]:
+    """Yield the terms up to `order`, each statement of three unknowns at once.
+
+    Term k is t, turned by one axis a and by two axes b; m is what the torque adds to it, f the step
+    times A, B, C, i one over k. Products of older terms are summed ahead, those of the newest come
+    last: from one term to the next there is a turn and two sums.
+    """
+    yield from ("g = f*a0", "h = f*b0", "t1 = g*b0 + m1")
+    for k in range(2, order + 1):
+        n = k - 1
+        pairs = sorted(((j, n - j) for j in range(1, n)), key=max)
+        # Two sums, so that one need not wait for itself.
+        sums = ("q", "r") if len(pairs) > 3 else ("q",)
+        for m, (j, i) in enumerate(pairs):
+            place = f"{sums[m % len(sums)]}{k}"
+            yield f"{place} = a{j}*b{i}" + (f" + {place}" if m >= len(sums) else "")
+        if len(sums) > 1:
+            yield f"q{k} = q{k} + r{k}"
+        yield f"v{k} = g*i{k}"
+        yield f"w{k} = h*i{k}"
+        if pairs:
+            yield f"u{k} = f*i{k}"
+            yield f"s{k} = q{k}*u{k} + m{k}"
+            yield f"s{k} = v{k}*b{n} + s{k}"
+        else:
+            yield f"s{k} = v{k}*b{n} + m{k}"
+        yield f"t{k} = w{k}*a{n} + s{k}"
+
+
+def woven(order: int) -> Iterator[str]:
+    """Yield the recurrence with the differences carried in the time that it waits for itself."""
+    waiting = list(carried())
+    share = len(waiting) // (order - 1) + 1
+    for line in recurrence(order):
+        yield line
+        term = re.match(r"t(\d+) ", line)
+        if not term:
+            continue
+        k = int(term[1])
+        if k == 5:
+            yield "c = t4 + t5"
+        elif k > 5:
+            yield f"c = c + t{k}"
+        for _ in range(share):
+            if waiting and waiting[0][0] < k:
+                yield waiting.pop(0)[1]
+    yield from (line for _, line in waiting)
+    yield from (f"c = c + t{k}" for k in (3, 2, 1))
+
+
+def tail(order: int) -> Iterator[str]:
+    """Yield the sum of the terms, small ones first as far as they need not be waited for."""
+    yield "c = t4 + t5"
+    yield from (f"c = c + t{k}" for k in range(6, order + 1))
+    yield from (f"c = c + t{k}" for k in (3, 2, 1))
+
+
+def carried() -> Iterator[tuple[int, str]]:
+    """Yield what small differences become over the step, and which term each statement needs.
+
+    The linear part of the recurrence: x, y, z are the differences, side by side in four lanes; X, Y,
+    Z the terms, in all of them.
+    """
+    for k in range(1, ORDER_CARRIED + 1):
+        for axis, (name, (u, v)) in enumerate(zip("xyz", FACTORS, strict=True)):
+            more = ""
+            for j in range(k - 1, -1, -1):
+                for one, other in ((u, v), (v, u)):
+                    yield j, f"{name}{k} = {one.upper()}{j}*{other}{k - 1 - j}{more}"
+                    more = f" + {name}{k}"
+            yield 0, f"{name}{k} = {name}{k}*{'jkl'[axis]}{k}"
+    for name in "xyz":
+        yield from ((0, f"{name}0 = {name}0 + {name}{k}") for k in range(1, ORDER_CARRIED + 1))
+
+
+# ---- Fortran ------------------------------------------------------------------------------------
+
+
+def fortran_source(text: str, level: str) -> str:
+    """Return a module for one instruction set."""
     for module in MODULES:
         text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{level}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
-    blocks = re.split(r" *! unroll: m (\d+)\n.*?! end unroll\n", text, flags=re.DOTALL)
-    unknowns = [f"{name}{k}" for k in range(MOST_ORDER + 1) for name in "xyz"]
+    expand = fortran_terms() if level == "plain" else fortran_door(level)
+    written = {"expand": expand, "carry": fortran_carry()}
+    blocks = re.split(r" *! unroll: (\w+)\n.*?! end unroll\n", text, flags=re.DOTALL)
     parts = [blocks[0]]
-    for orders, rest in zip(blocks[1::2], blocks[2::2], strict=True):
-        reals = [*unknowns, *LOCALS, "even", "odd", "last"]
-        parts += [f"    real(dp) :: {each}\n" for each in reals]
-        parts += ["    integer :: i\n"]
-        parts += [f"    {line}\n" for line in series(int(orders))]
-        parts += [rest]
-    with open(target, "w") as file:
-        file.write("".join(parts))
+    for name, rest in zip(blocks[1::2], blocks[2::2], strict=True):
+        parts += [f"  {line}\n" for line in written[name]] + [rest]
+    return "".join(parts)
 
 
-def series(torque_orders: int) -> Iterator[str]:
-    """Yield the statements; the torque has terms in the first `torque_orders` orders."""
-    for name, (place, _) in PLACES.items():
-        yield f"{name}0 = s%{place}, 0)"
-    for n in range(0, MOST_ORDER, 2):
-        if n < WIDE:
-            yield from known(n)
-        yield from finish(n + 1, "p", torque_orders)
-        yield from finish(n + 2, "q", torque_orders)
-        if n + 2 >= FIRST_CHECK:
-            yield from check(n + 2)
+def fortran_door(level: str) -> Iterator[str]:
+    """Yield the call of the C that does it for this instruction set."""
+    yield from f"""subroutine expand(order, s)
+  integer(c_int), intent(in), value :: order
+  type(series_t), intent(inout) :: s
+  interface
+    subroutine terms(order, s) bind(c, name="taylor_terms_{level}")
+      import :: c_int, series_t
+      implicit none(type, external)
+      integer(c_int), intent(in), value :: order
+      type(series_t), intent(inout) :: s
+    end subroutine terms
+  end interface
+  call terms(order, s)
+end subroutine expand""".splitlines()
 
 
-def known(n: int) -> Iterator[str]:
-    """Yield p1 ... p3 and q1 ... q3: of the Cauchy products n and n + 1, what is known by now.
-
-    From the middle outwards, so that the newest terms come last; two orders at once, so that a
-    term that is loaded serves twice; two sums for each, so that one need not wait for itself.
-    """
-    begun = set()
-    for j in range((n + 1) // 2, 0, -1):
-        for total, i in (("p", n - j), ("q", n + 1 - j)):
-            if i < j or i >= n:
-                continue
-            for low, high in ((j, i), (i, j)) if i > j else ((j, i),):
-                for axis, (u, v) in enumerate(FACTORS, 1):
-                    place = f"{total}{axis}" if low <= high else f"{total}{total}{axis}"
-                    start = f"{place} + " if place in begun else ""
-                    begun.add(place)
-                    yield f"{place} = {start}{u}{low}*{v}{high}"
-    for place in sorted(begun):
-        if len(place) == 3:
-            yield f"{place[1:]} = {place[1:]} + {place}"
-
-
-def wide(n: int) -> Iterator[str]:
-    """Yield the Cauchy products n of the three equations in one loop, the newest terms left out."""
-    yield "do i = 1, 4"
-    begun = set()
-    for m, j in enumerate(sorted(range(LAG, n - LAG + 1), key=lambda j: max(j, n - j))):
-        place = "odd" if m % 2 else "even"
-        start = f"{place} + " if place in begun else ""
-        begun.add(place)
-        yield f"  {place} = {start}s%left(i, {j})*s%right(i, {n - j})"
-    yield "  s%sums(i) = even + odd"
-    yield "end do"
+def fortran_terms() -> Iterator[str]:
+    """Yield the recurrence to each order, each unknown by itself."""
+    statements = list(recurrence(MOST_ORDER))
+    names = {name for line in statements for name in re.findall(r"\b[tqrvwusgh]\d*\b", line)}
+    yield "subroutine expand(order, s)"
+    yield "  integer(c_int), intent(in), value :: order"
+    yield "  type(series_t), intent(inout) :: s"
+    for name in sorted(names | {"t0", "c"}):
+        yield f"  real(dp) :: {name}_1, {name}_2, {name}_3"
+    yield from (f"  t0_{axis} = s%terms({axis}, 0)" for axis in (1, 2, 3))
+    for line in statements:
+        yield from (f"  {fortran(line, axis)}" for axis in range(3))
+        term = re.match(r"t(\d+) ", line)
+        if not term:
+            continue
+        k = int(term[1])
+        yield from (f"  s%terms({axis}, {k}) = t{k}_{axis}" for axis in (1, 2, 3))
+        yield f"  s%terms(4, {k}) = 0.0_dp"
+        if k == LEAST_ORDER:
+            yield from (f"  {fortran(each, axis)}" for each in list(tail(k))[:-3] for axis in range(3))
+        elif k > LEAST_ORDER:
+            yield from (f"  {fortran(f'c = c + t{k}', axis)}" for axis in range(3))
+        if k in ORDERS[:-1]:
+            yield f"  if (order == {k}) then"
+            yield from end_of_terms("    ")
+            yield "    return"
+            yield "  end if"
+    yield from end_of_terms("  ")
+    yield "end subroutine expand"
 
 
-def finish(k: int, total: str, torque_orders: int) -> Iterator[str]:
-    """Yield term k of the three unknowns from the sums so far and the newest products."""
-    n = k - 1
-    if n >= WIDE:
-        yield from wide(n)
-        newest = [pair for j in range(LAG - 1, -1, -1) for pair in ((j, n - j), (n - j, j))]
-    else:
-        newest = [(1, n - 1), (n - 1, 1)] if total == "q" and n > 2 else []
-        newest += [(0, n), (n, 0)] if n else [(0, 0)]
-    for axis, (u, v) in enumerate(FACTORS, 1):
-        place = f"{total}{axis}"
-        start = f"s%sums({axis}) + " if n >= WIDE else f"{place} + " if n == 2 or n > 3 else ""
-        for low, high in newest:
-            yield f"{place} = {start}{u}{low}*{v}{high}"
-            start = f"{place} + "
-    for axis, name in enumerate("xyz", 1):
-        torque = f" + s%m({axis}, {k})" if k <= torque_orders else ""
-        # A table costs more than it saves where the torque keeps the processor busy.
-        factor = f"s%k{axis}({k})" if torque_orders == 1 else f"(s%k{axis}(1)*INVERSE({k}))"
-        yield f"{name}{k} = {factor}*{total}{axis}{torque}"
-        first, second = PLACES[name]
-        yield f"s%{first}, {k}) = {name}{k}"
-        if LAG <= k <= MOST_ORDER - LAG:
-            yield f"s%{second}, {k}) = {name}{k}"
-        if k == 4:
-            yield f"tail{axis} = {name}{k}"
-        elif k > 4:
-            yield f"tail{axis} = tail{axis} + {name}{k}"
-
-
-def check(k: int) -> Iterator[str]:
-    """Yield the end of the series at order k, where its last two terms are small enough."""
-    yield f"if (least <= {k}) then"
-    yield f"  last = (abs(x{k}) + abs(x{k - 1})) + (abs(y{k}) + abs(y{k - 1})) &"
-    yield f"         + (abs(z{k}) + abs(z{k - 1}))"
-    yield f"  if (last <= allowed .or. most <= {k}) then"
-    yield f"    s%order = {k}"
-    yield "    s%last = last"
+def end_of_terms(indent: str) -> Iterator[str]:
+    """Yield the largest terms' part in the sum, and the differences over the step."""
     for axis in (1, 2, 3):
-        yield f"    s%tail({axis}) = tail{axis}"
-    yield "    return"
-    yield "  end if"
-    yield "end if"
+        terms = f"((c_{axis} + t3_{axis}) + t2_{axis}) + t1_{axis}"
+        yield f"{indent}s%change({axis}) = {terms}"
+    yield f"{indent}s%change(4) = 0.0_dp"
+    yield f"{indent}call carry(s)"
+
+
+def fortran(line: str, axis: int) -> str:
+    """Return a statement for one axis, 0 to 2."""
+
+    def place(found: re.Match[str]) -> str:
+        kind, k = found[1], found[2]
+        if kind in "ab":
+            return f"t{k}_{(axis + 'ab'.index(kind) + 1) % 3 + 1}"
+        known = {"f": f"s%factors({axis + 1})", "i": f"(1.0_dp/{k}.0_dp)"}
+        return known.get(kind, f"s%torque({axis + 1}, {k})" if kind == "m" else f"{kind}{k}_{axis + 1}")
+
+    return re.sub(r"\b([a-z])(\d*)\b", place, line)
+
+
+def fortran_carry() -> Iterator[str]:
+    """Yield the linear part of the recurrence, for vectors side by side."""
+    names = [f"{name}{k}" for k in range(ORDER_CARRIED + 1) for name in "xyz"]
+    yield "pure subroutine carry(s)"
+    yield "  type(series_t), intent(inout) :: s"
+    yield from (f"  real(dp) :: {name}" for name in names)
+    yield "  integer :: i"
+    yield "  do i = 1, 4"
+    yield from (f"    {name}0 = s%lanes(i, {axis})" for axis, name in enumerate("xyz", 1))
+    for _, line in carried():
+        line = re.sub(r"([XYZ])(\d+)", lambda found: f"s%terms({'XYZ'.index(found[1]) + 1}, {found[2]})", line)
+        line = re.sub(r"([jkl])(\d+)", lambda found: f"(s%factors({'jkl'.index(found[1]) + 1})*(1.0_dp/{found[2]}.0_dp))", line)
+        yield f"    {line}"
+    yield from (f"    s%lanes(i, {axis}) = {name}0" for axis, name in enumerate("xyz", 1))
+    yield "  end do"
+    yield "end subroutine carry"
+
+
+# ---- C ------------------------------------------------------------------------------------------
+
+
+def c_source(level: str) -> Iterator[str]:
+    """Yield a function for each order, and one that chooses."""
+    yield from """/* Written by unroll.py: the Taylor terms of a step, one register a term. */
+#include <immintrin.h>
+
+/* Lanes x y z and an idle one: turned by one axis, and by two. */
+#define TURNED_ONCE(v) _mm256_permute4x64_pd(v, _MM_SHUFFLE(3, 0, 2, 1))
+#define TURNED_TWICE(v) _mm256_permute4x64_pd(v, _MM_SHUFFLE(3, 1, 0, 2))
+""".splitlines()
+    for order in ORDERS:
+        yield f"static void terms_{order}(double *restrict s)"
+        yield "{"
+        yield f"  const __m256d f = {load(RATES)}, t0 = {load(0)};"
+        yield "  const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
+        for axis, name in enumerate("xyz"):
+            yield f"  __m256d {name}0 = {load(LANES + 4 * axis)};"
+            yield f"  const __m256d {'jkl'[axis]} = _mm256_broadcast_sd(s + {RATES + axis});"
+            yield f"  const __m256d {name.upper()}0 = _mm256_broadcast_sd(s + {axis});"
+        known = {"x0", "y0", "z0"}
+        for line in woven(order):
+            yield f"  {c(line, known)}"
+            term = re.match(r"t(\d+) ", line)
+            if not term:
+                continue
+            k = int(term[1])
+            yield f"  _mm256_store_pd(s + {4 * k}, t{k});"
+            if k < order:
+                yield f"  const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
+            if k < ORDER_CARRIED:
+                for axis, name in enumerate("XYZ"):
+                    yield f"  const __m256d {name}{k} = _mm256_broadcast_sd(s + {4 * k + axis});"
+        yield f"  _mm256_store_pd(s + {CHANGE}, c);"
+        yield from (f"  _mm256_store_pd(s + {LANES + 4 * axis}, {name}0);" for axis, name in enumerate("xyz"))
+        yield "}\n"
+    yield f"void taylor_terms_{level}(int order, double *s)"
+    yield "{"
+    yield "  switch (order) {"
+    yield from (f"  case {order}: terms_{order}(s); break;" for order in ORDERS)
+    yield "  }"
+    yield "}"
+
+
+def c(line: str, known: set[str]) -> str:
+    """Return a statement for a register, declaring what it names first."""
+    target, value = line.split(" = ")
+    value = re.sub(r"\b([jkl])(\d+)", r"_mm256_mul_pd(\1, _mm256_set1_pd(1.0 / \2))", value)
+    value = re.sub(r"\bi(\d+)", r"_mm256_set1_pd(1.0 / \1)", value)
+    value = re.sub(r"\bm(\d+)", lambda found: load(TORQUE + 4 * int(found[1]) - 4), value)
+    first, _, second = value.partition(" + ")
+    if "*" not in first:
+        value = f"_mm256_add_pd({first}, {second})"
+    elif second:
+        value = f"_mm256_fmadd_pd({first.replace('*', ', ')}, {second})"
+    else:
+        value = f"_mm256_mul_pd({first.replace('*', ', ')})"
+    declared = "" if target in known else "__m256d "
+    known.add(target)
+    return f"{declared}{target} = {value};"
+
+
+def load(place: int) -> str:
+    """Return what stands at a place of series_t."""
+    return f"_mm256_load_pd(s + {place})"
 
 
 if __name__ == "__main__":

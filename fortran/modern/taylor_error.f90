@@ -1,0 +1,153 @@
+module taylor_error
+  !! What the steps of a series leave out, and what the motion makes of it: the remainder of each
+  !! step, blocks through the linearised motion, and with it the derivative of omega at the end by
+  !! omega on the way, whose largest norm is the growth of a small difference.
+  use kinds, only: dp
+  use taylor_series, only: series_t
+  use torque_terms, only: MOST_ORDER
+  implicit none(type, external)
+  private
+
+  integer, parameter :: STEPS_IN_BLOCK = 8
+  integer, parameter :: MOST_BLOCKS = 64  ! even
+  real(dp), parameter :: RIDGE = 1.001_dp   ! so that one pole, or none, does for the pair
+  real(dp), parameter :: LEAST = tiny(1.0_dp)
+  real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! lane
+  real(dp), parameter :: LARGEST = 1e100_dp ! beyond it no growth says more
+  real(dp), parameter :: UNIT(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
+                                               0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
+
+  ! Since each block's beginning, to be merged by pairs where there is no room for more.
+  type, public :: blocks_t
+    real(dp) :: derivatives(3, 3, MOST_BLOCKS) !! of omega at a block's end by that at its beginning
+    integer :: steps        !! in the open one
+    integer :: closed
+    integer :: steps_a_block
+  end type blocks_t
+
+  public :: begin, count_step, growth_of, leave_out
+
+contains
+
+  pure subroutine begin(lanes, blocks)
+    !! In the lanes: no error, and each axis where it is.
+    real(dp), intent(out) :: lanes(4, 3)
+    type(blocks_t), intent(inout) :: blocks
+
+    lanes(1, :) = 0.0_dp
+    lanes(2:, :) = UNIT
+    blocks%steps = 0
+    blocks%closed = 0
+    blocks%steps_a_block = STEPS_IN_BLOCK
+  end subroutine begin
+
+  pure subroutine leave_out(s, order, unit, left)
+    !! Sum of the terms that a step leaves out, as if one pair of poles made its last four:
+    !! v(k + 1) = a v(k) - b v(k - 1), by least squares; the error has it from here on.
+    type(series_t), intent(inout) :: s
+    integer, intent(in) :: order
+    real(dp), intent(in) :: unit       !! over which terms are near 1, s/rad
+    real(dp), intent(out) :: left(4)   !! rad/s
+    real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
+    real(dp) :: x, u, v, w
+    real(dp) :: a, b, determinant
+    integer :: i
+
+    do i = 1, 4
+      x = unit*s%terms(i, order)
+      u = unit*s%terms(i, order - 1)
+      v = unit*s%terms(i, order - 2)
+      w = unit*s%terms(i, order - 3)
+      uu(i) = u*u + v*v
+      vv(i) = v*v + w*w
+      uv(i) = u*v + v*w
+      ux(i) = u*x + v*u
+      vx(i) = v*x + w*u
+    end do
+    uu(1) = RIDGE*((uu(1) + uu(2)) + uu(3))
+    vv(1) = RIDGE*((vv(1) + vv(2)) + vv(3))
+    uv(1) = (uv(1) + uv(2)) + uv(3)
+    ux(1) = (ux(1) + ux(2)) + ux(3)
+    vx(1) = (vx(1) + vx(2)) + vx(3)
+    determinant = uu(1)*vv(1) - uv(1)*uv(1)
+    a = vv(1)*ux(1) - uv(1)*vx(1)
+    b = uv(1)*ux(1) - uu(1)*vx(1)
+    ! Poles within the step, or nearly, are none of a series that converges.
+    determinant = max((determinant - a) + b, abs(a - b), abs(b), LEAST)
+    a = (a - b)/determinant
+    b = b/determinant
+    do i = 1, 4
+      left(i) = a*s%terms(i, order) - b*s%terms(i, order - 1)
+    end do
+    do i = 1, 4
+      s%lanes(i, 1) = s%lanes(i, 1) - FIRST(i)*left(1)
+      s%lanes(i, 2) = s%lanes(i, 2) - FIRST(i)*left(2)
+      s%lanes(i, 3) = s%lanes(i, 3) - FIRST(i)*left(3)
+    end do
+  end subroutine leave_out
+
+  pure subroutine count_step(lanes, blocks)
+    !! One more step: where its block is full, the derivative is put aside and begun anew.
+    real(dp), intent(inout) :: lanes(4, 3)
+    type(blocks_t), intent(inout) :: blocks
+    integer :: n
+
+    blocks%steps = blocks%steps + 1
+    if (blocks%steps < blocks%steps_a_block) return
+    blocks%steps = 0
+    blocks%closed = blocks%closed + 1
+    blocks%derivatives(:, :, blocks%closed) = lanes(2:, :)
+    lanes(2:, :) = UNIT
+    if (blocks%closed < MOST_BLOCKS) return
+    do n = 1, MOST_BLOCKS/2
+      blocks%derivatives(:, :, n) = composed(blocks%derivatives(:, :, 2*n), &
+                                             blocks%derivatives(:, :, 2*n - 1))
+    end do
+    blocks%closed = MOST_BLOCKS/2
+    blocks%steps_a_block = 2*blocks%steps_a_block
+  end subroutine count_step
+
+  pure real(dp) function growth_of(lanes, blocks)
+    !! Largest norm of the derivative of omega at the end by omega where a block began.
+    real(dp), intent(in) :: lanes(4, 3)
+    type(blocks_t), intent(in) :: blocks
+    real(dp) :: derivative(3, 3)
+    integer :: n
+
+    derivative = lanes(2:, :)
+    growth_of = norm(derivative)
+    do n = blocks%closed, 1, -1
+      derivative = composed(derivative, blocks%derivatives(:, :, n))
+      growth_of = max(growth_of, norm(derivative))
+    end do
+  end function growth_of
+
+  pure real(dp) function norm(a)
+    !! Of a matrix of determinant 1: about its largest singular value, and 1 of a rotation.
+    real(dp), intent(in) :: a(3, 3)
+    integer :: i, j
+
+    norm = -2.0_dp
+    do j = 1, 3
+      do i = 1, 3
+        norm = norm + a(i, j)*a(i, j)
+      end do
+    end do
+    norm = sqrt(max(1.0_dp, norm))
+  end function norm
+
+  pure function composed(a, b)
+    !! Of two derivatives, which are rows of where each axis leads: that of b's motion, then a's.
+    real(dp), intent(in) :: a(3, 3), b(3, 3)
+    real(dp) :: composed(3, 3)
+    integer :: i, j
+
+    do j = 1, 3
+      do i = 1, 3
+        composed(i, j) = b(i, 1)*a(1, j) + b(i, 2)*a(2, j) + b(i, 3)*a(3, j)
+        composed(i, j) = max(-LARGEST, min(LARGEST, composed(i, j)))
+      end do
+    end do
+  end function composed
+
+end module taylor_error

@@ -1,5 +1,6 @@
 """What a campaign has to say: what exceeds, estimates by kind, who is silent."""
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
@@ -57,7 +58,7 @@ def _entrances(found: Sequence[Answer]) -> Section:
 
 
 def _worst(found: Iterable[Answer]) -> Section:
-    """List the worst of each fault, to be had again by --only NUMBER."""
+    """List the worst scenes of each fault, to be had again by --only NUMBER."""
     faults: list[tuple[str, Callable[[Answer], bool], Callable[[Answer], float]]] = [
         ("exceeds", lambda each: each.exceeds, lambda each: each.error / each.limit),
         ("silent", lambda each: each.is_silent, lambda each: each.lost),
@@ -65,14 +66,13 @@ def _worst(found: Iterable[Answer]) -> Section:
     ]
     rows = []
     for name, applies, size in faults:
-        some = sorted(filter(applies, found), key=size, reverse=True)[:_WORST]
-        for each in some:
-            truth, of = each.draw.truth, each.draw
-            kinds = ", ".join(of.kinds[1:-1])
-            rows.append(
-                [name, of.number, each.entrance, of.tolerance, truth.growth, each.error,
-                 each.estimate, each.growth, kinds]
-            )  # fmt: skip
+        by_number: dict[int, Answer] = {}
+        for each in sorted(filter(applies, found), key=size, reverse=True):
+            by_number.setdefault(each.draw.number, each)
+        for number, each in itertools.islice(by_number.items(), _WORST):
+            of = each.draw
+            values = [of.tolerance, of.truth.growth, each.error, each.estimate, each.growth]
+            rows.append([name, number, each.entrance, *values, ", ".join(of.kinds[1:-1])])
     if not rows:
         return ["no faults"]
     columns = [Column("fault", left=True), Column("--only"), Column("entrance", left=True)]

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw
+from pyharness.model.report import short
+from pyharness.model.trajectory import Trajectory
 from pyharness.model.turned_scenes import shifted
 from pyharness.truth.reference import reference
+from pyharness.views.table import write
 from tests.estimates.campaign import COLUMNS, ENTRANCES, SENSITIVE, Answer, answers, main
+from tests.estimates.report import report
 from tests.estimates.scenes import COARSEST, FINEST, KINDS, Draw, drawn
 from tests.estimates.truth import Truth, compiler_here, truth_of
 from tests.random_scenes import triple
@@ -152,9 +156,14 @@ def test_faults(growth: float, ended: str, error: float, faults: str) -> None:
 
 def test_answer_that_says_more_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
     """The attributes that a kernel may have: error, growth, runs."""
-    from pyharness.model.trajectory import Trajectory
-
     for name, value in (("error", 1e-11), ("growth", 7.0), ("runs", 2)):
         monkeypatch.setattr(Trajectory, name, value, raising=False)
-    found = next(answers(drawn("test", 0)))
-    assert (found.estimate, found.growth, found.runs) == (1e-11, 7.0, 2)
+    of = drawn("test", 0)
+    found = [next(answers(replace(of, truth=replace(of.truth, growth=3.5))))]
+    assert (found[0].estimate, found[0].growth, found[0].runs) == (1e-11, 7.0, 2)
+    ratio = 1e-11 / max(found[0].error, 2.0**-53)
+    lines = [line.split() for line in write(report(found, "test")).splitlines()]
+    assert ["solve", "taylor", "1", "1", "0"] in [line[:5] for line in lines]
+    assert "100.00" in {line[-1] for line in lines if line}
+    said = [str(1), *[short(ratio)] * 3, str(1), *[short(2.0)] * 5]
+    assert ["all", *said] in lines

@@ -104,7 +104,7 @@ def _library() -> ctypes.CDLL:
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "pairs.so"
         # A sum contracted to a fused operation would lose what two-term sums are after.
-        flags = ["-O3", "-march=native", "-ffp-contract=off", "-shared", "-fPIC"]
+        flags = ["-O3", "-march=native", "-ffp-contract=off", "-Wno-psabi", "-shared", "-fPIC"]
         command = [COMPILER, *flags, "-o", str(library), str(source), "-lm"]
         subprocess.run(command, check=True)
         return ctypes.CDLL(str(library))

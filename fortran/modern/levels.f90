@@ -16,7 +16,7 @@ module levels
     end function choose_level
 
     subroutine taylor_solve(problem, omega, tolerance, effort, n_times, times, rows, n_rows, &
-                            status, steps, needed) bind(c, name="taylor_solve")
+                            status, steps, needed, found) bind(c, name="taylor_solve")
       !! As in taylor.f90.
       import :: c_double, c_int, c_int64_t
       implicit none(type, external)
@@ -27,11 +27,11 @@ module levels
       real(c_double), intent(inout) :: rows(3, n_times)
       integer(c_int), intent(out) :: n_rows, status
       integer(c_int64_t), intent(out) :: steps
-      real(c_double), intent(out) :: needed
+      real(c_double), intent(out) :: needed, found(2)
     end subroutine taylor_solve
 
     subroutine quick_solve(problem, omega, tolerance, effort, t_end, contest, result, status, &
-                           steps) bind(c, name="quick_solve")
+                           steps, error) bind(c, name="quick_solve")
       !! As in scaled_runge_kutta.f90.
       import :: c_double, c_int
       implicit none(type, external)
@@ -40,6 +40,7 @@ module levels
       integer(c_int), intent(in), value :: contest
       real(c_double), intent(out) :: result(3)
       integer(c_int), intent(out) :: status, steps
+      real(c_double), intent(out) :: error
     end subroutine quick_solve
   end interface
 

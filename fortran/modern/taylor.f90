@@ -35,7 +35,7 @@ module taylor
 contains
 
   subroutine taylor_solve(problem_at, omega, tolerance, effort, n_times, times, rows, n_rows, &
-                          status, steps, needed) &
+                          status, steps, needed, found) &
     bind(c, name="taylor_solve_level")
     !! Solution at `times`, which lead away from 0 on one side.
     type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
@@ -49,6 +49,7 @@ contains
     integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted
     integer(c_int64_t), intent(out) :: steps            !! of the last march
     real(c_double), intent(out) :: needed               !! effort, as far as known; where it gave up
+    real(c_double), intent(out) :: found(2)             !! error and growth; below 0 where unknown
     type(problem_t), pointer :: problem
     real(dp) :: growth  ! of a small difference on the way
     real(dp) :: known   ! the same, as far as it was reckoned with
@@ -63,6 +64,7 @@ contains
     most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
     spent = 0.0_dp
     needed = 0.0_dp
+    found = -1.0_dp
     do
       call march(problem, omega, tolerance*(PLANNED/known), most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, c_int64_t), n_times, times, rows, n_rows, &

@@ -10,6 +10,7 @@ class Statuses:
     REFUSED = 3  # the method can't take these coefficients
     GAVE_UP = 4  # no digit of the phase is left, or too many steps
     INTERRUPTED = 5  # by the user; an exception is set
+    SENSITIVE = 6  # every row is a result, but rounding times growth exceeds the tolerance
 
 
 class Methods:

@@ -76,7 +76,7 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
     figure = Figure(figsize=(7.0, 7.0), dpi=110, layout="constrained")
     marker = "o" if len(trajectory.time) == 1 else ""
     style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "marker": marker}
-    note = f"x: {ending(trajectory)}" if trajectory.ended != "complete" else ""
+    note = f"x: {ending(trajectory)}" if not trajectory.has_all_rows else ""
     axes = figure.subplots(3, 1, sharex=True)
     for row in range(3):
         axes[row].plot(trajectory.time, trajectory.omega[:, row], **style)

@@ -8,7 +8,7 @@ import numpy as np
 from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
-from pyharness.model.scene_report import ending, heading
+from pyharness.model.scene_report import ending, estimates, heading
 from pyharness.model.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def trajectory_report(
                 "recorded_time": trajectory.recorded_time.tolist(),
                 "omega": trajectory.omega.tolist(),
                 "velocity": None if velocity is None else velocity.tolist(),
+                **records.estimate_record(trajectory),
             },
             **records.ending_record(trajectory),
             "build": records.build_record(),
@@ -62,7 +63,7 @@ def trajectory_report(
 
     return Report(
         "run",
-        text=[[*heading(scene), title], [counted], [ending(trajectory)]],
+        text=[[*heading(scene), title], [counted], [ending(trajectory), *estimates(trajectory)]],
         record=record,
         data=numbers,
         pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},

@@ -164,9 +164,7 @@ def compare_programs(
 
     methods = [_method(scene, name, tolerance, effort, truth) for name in SCIPY_METHODS]
     growth = motion_growth(scene, scene.times()[-1])
-    return Comparison(
-        scene, lipschitz, truth, tuple(programs), tuple(methods), tolerance, growth
-    )
+    return Comparison(scene, lipschitz, truth, tuple(programs), tuple(methods), tolerance, growth)
 
 
 def listings_for(

@@ -85,9 +85,7 @@ def gauss(stages: int) -> Integrator:
                     status = SENSITIVE if is_sensitive(growth, tolerance) else COMPLETE
                     error = 2.0 * difference / (known * scale) if difference else 0.0
                     error += ROUNDING * (growth or 1.0)
-                    return trajectory_of(
-                        times, found.rows, n, status, count, spent, error, growth
-                    )
+                    return trajectory_of(times, found.rows, n, status, count, spent, error, growth)
                 if found.blows_up(before, start):
                     return trajectory_of(times, found.rows, n, found.status, count, spent)
             before, previous = found, counts

@@ -34,6 +34,9 @@ contains
     real(dp) :: total(3)      ! sums of the derivative's rows
     integer :: power, n_rows, n, status, i, axis
 
+    growth = 1.0_dp
+    ! At rest it stays, and so does what is beside it, to first order.
+    if (.not. any(abs(omega0) > 0.0_dp)) return
     power = exponent(max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3))))
     start = scale(omega0, -power)
     time = scale(t_end, power)

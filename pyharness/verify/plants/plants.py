@@ -145,8 +145,8 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 def _too_large(packed: Array, answer: _Answer) -> _Answer:
     """Let the results of the fixed-step methods and of Gauss collocation be too large."""
-    omega, *rest = answer
-    return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, *rest)
+    omega, status, steps, found = answer
+    return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
 
 
 def _half_step(scene: Scene) -> Scene:

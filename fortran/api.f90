@@ -85,11 +85,10 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   real(8), intent(in) :: times(n_times)         ! s
   real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|
   !f2py real(8), optional, intent(inout) :: effort(4) = 1.0
-  real(8), intent(inout) :: effort(4)           ! factor on the limits; out: what it should be,
-  ! error (relative) and growth, below 0 where unknown
+  real(8), intent(inout) :: effort(4) ! factor on the limits; out: due, error, growth (or below 0)
   real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
   integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up, 6 sensitive
   integer(8), intent(out) :: steps
 
   call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
@@ -123,6 +122,19 @@ subroutine torque_free_solution(coefficients, omega0, n_times, times, rows, n_ro
 
   call torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
 end subroutine torque_free_solution
+
+subroutine torque_free_growth(coefficients, omega0, t_end, growth)
+  ! How much the closed form of a body without torque makes of a small difference.
+  !f2py threadsafe
+  use torque_free_differences, only: torque_free_growth_of
+  implicit none
+  real(8), intent(in) :: coefficients(3)  ! A, B, C
+  real(8), intent(in) :: omega0(3)        ! rad/s at time 0
+  real(8), intent(in) :: t_end            ! s
+  real(8), intent(out) :: growth          ! at least 1; below 0 where there is no closed form
+
+  growth = torque_free_growth_of(coefficients, omega0, t_end)
+end subroutine torque_free_growth
 
 subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
                            n_times, times, effort, rows, n_rows, status)
@@ -211,7 +223,7 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
                        steps, evaluations, effort(2))
 end subroutine fixed_step_solution
 
-subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps)
+subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, found)
   ! A prepared solver's call: see fortran/modern/prepared.f90 for what is packed. solver.c calls it
   ! by its address, and has its arguments written down once more.
   !f2py threadsafe
@@ -221,10 +233,11 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps)
   real(8), intent(in) :: packed(n_packed)
   real(8), intent(in) :: omega0(3)   ! rad/s
   real(8), intent(in) :: t_end       ! s
-  real(8), intent(out) :: omega(3)   ! rad/s; NaN unless the status is 0
+  real(8), intent(out) :: omega(3)   ! rad/s; NaN unless the status is 0 or 6
   integer(4), intent(out) :: status
   integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation; below 0 of quick,
   ! where the kernel chose it
+  real(8), intent(out) :: found(2)   ! estimated error, relative, and growth; below 0 where unknown
 
-  call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps)
+  call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)
 end subroutine solve_packed

@@ -9,7 +9,8 @@
 
 #define QUICK_ARGUMENTS                                                                        \
   const void *problem, const double *omega, const double *tolerance, const double *effort,     \
-      const double *t_end, int contest, double *result, int *status, int *steps
+      const double *t_end, int contest, double *result, int *status, int *steps,               \
+      double *error
 
 typedef void solver(ARGUMENTS);
 typedef void quick_solver(QUICK_ARGUMENTS);
@@ -61,10 +62,11 @@ __attribute__((constructor)) static void choose_best(void) { choose_level(2); }
 
 void taylor_solve(ARGUMENTS)
 {
-  chosen(problem, omega, tolerance, effort, n_times, times, rows, n_rows, status, steps, needed, found);
+  chosen(problem, omega, tolerance, effort, n_times, times, rows, n_rows, status, steps, needed,
+         found);
 }
 
 void quick_solve(QUICK_ARGUMENTS)
 {
-  chosen_quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps);
+  chosen_quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps, error);
 }

@@ -31,7 +31,7 @@ module levels
     end subroutine taylor_solve
 
     subroutine quick_solve(problem, omega, tolerance, effort, t_end, contest, result, status, &
-                           steps) bind(c, name="quick_solve")
+                           steps, error) bind(c, name="quick_solve")
       !! As in scaled_runge_kutta.f90.
       import :: c_double, c_int
       implicit none(type, external)
@@ -40,6 +40,7 @@ module levels
       integer(c_int), intent(in), value :: contest
       real(c_double), intent(out) :: result(3)
       integer(c_int), intent(out) :: status, steps
+      real(c_double), intent(out) :: error
     end subroutine quick_solve
   end interface
 

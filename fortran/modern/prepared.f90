@@ -28,8 +28,8 @@ module prepared
 
 contains
 
-  subroutine solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps)
-    !! Angular velocity at `t_end` by the method that was prepared; NaN unless `status` is 0.
+  subroutine solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)
+    !! Angular velocity at `t_end` by the method that was prepared; NaN where there is none.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
@@ -37,19 +37,20 @@ contains
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
+    real(dp), intent(out) :: found(2)  !! estimated error, relative, and growth; below 0: unknown
     real(dp) :: largest
 
     largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
     if (largest <= LARGE .and. largest*LARGE >= 1.0_dp) then
-      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps)
+      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps, found)
     else
-      call solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps)
+      call solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps, found)
     end if
     ! Not ieee_value: that module ties the binary to libgfortran.
-    if (status /= COMPLETE .and. status /= SENSITIVE) omega = transfer(huge(0_int64), 1.0_dp)
+    if (.not. is_result(status)) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
 
-  subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps)
+  subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps, found)
     !! The same in units that bring omega near 1, by a power of two: it changes no digit.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
@@ -59,6 +60,7 @@ contains
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: status     !! of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
+    real(dp), intent(out) :: found(2)  !! relative, so that no unit changes it
     real(dp), target :: copy(0:n_packed - 1)
     real(dp) :: start(3)
     real(dp) :: reach      ! omega0 and what the torque gives, rad/s
@@ -101,15 +103,15 @@ contains
     if (.not. (all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
                .and. (abs(time) >= tiny(time) .or. .not. abs(t_end) > 0.0_dp))) power = 0
     if (power == 0) then
-      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps)
+      call solve_as_given(packed, n_packed, omega0, t_end, omega, status, steps, found)
       return
     end if
     do i = 1, 3
       start(i) = scale(omega0(i), -power)
     end do
-    call solve_as_given(copy, n_packed, start, time, omega, status, steps)
+    call solve_as_given(copy, n_packed, start, time, omega, status, steps, found)
     ! Else omega means nothing, and may be no number at all.
-    if (status == COMPLETE) then
+    if (is_result(status)) then
       do i = 1, 3
         omega(i) = scale(omega(i), power)
       end do
@@ -117,8 +119,8 @@ contains
     end if
   end subroutine solve_near_one
 
-  subroutine solve_as_given(packed, n_packed, omega0, t_end, omega, ended, count)
-    !! The same without a look at the scale; omega means nothing unless `ended` is 0.
+  subroutine solve_as_given(packed, n_packed, omega0, t_end, omega, ended, count, found)
+    !! The same without a look at the scale; omega means nothing where there is no result.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
@@ -126,6 +128,7 @@ contains
     real(dp), intent(out) :: omega(3)  !! rad/s
     integer, intent(out) :: ended      !! of the module statuses
     integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
+    real(dp), intent(out) :: found(2)  !! estimated error, relative, and growth; below 0: unknown
     type(problem_t) :: problem
     real(dp) :: times(1)
     real(dp) :: reached(4)
@@ -137,6 +140,7 @@ contains
     code = int(packed(METHOD))
     times(1) = t_end
     count = 0
+    found = -1.0_dp
     select case (code)
     case (CLOSED_FORM, CLOSED_FORM_OR_TAYLOR)
       call torque_free_rows(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, 1, times, omega, &
@@ -156,7 +160,8 @@ contains
       if (code /= TAYLOR) then
         tolerance_left = AUTO_SHARE*tolerance_left
         call quick_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), t_end, &
-                         merge(1, 0, code == QUICK_OR_TAYLOR), omega, ended, quick_steps)
+                         merge(1, 0, code == QUICK_OR_TAYLOR), omega, ended, quick_steps, &
+                         found(1))
         ! Whoever let the kernel choose learns by the sign what it chose.
         count = merge(-quick_steps, quick_steps, code == QUICK_OR_TAYLOR)
       end if
@@ -174,10 +179,17 @@ contains
                       omega, reached, n_rows, ended, count)
     end select
     ! A start that is not finite may come back as it is, at time 0 for one.
-    if (ended == COMPLETE) then
+    if (is_result(ended)) then
       if (.not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
     end if
   end subroutine solve_as_given
+
+  pure logical function is_result(status)
+    !! Whether there is an omega, though rounding may have cost it its digits.
+    integer, intent(in) :: status
+
+    is_result = status == COMPLETE .or. status == SENSITIVE
+  end function is_result
 
   subroutine unpack(packed, n_packed, problem)
     !! The waves stay where they are.

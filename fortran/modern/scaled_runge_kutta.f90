@@ -39,7 +39,7 @@ module scaled_runge_kutta
 contains
 
   subroutine quick_solve(problem_at, omega, tolerance, effort, t_end, contest, result, status, &
-                         steps) &
+                         steps, error) &
     bind(c, name="quick_solve_level")
     !! Angular velocity at `t_end`.
     type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
@@ -51,6 +51,7 @@ contains
     real(c_double), intent(out) :: result(3)            !! rad/s
     integer(c_int), intent(out) :: status               !! any but STOPPED
     integer(c_int), intent(out) :: steps                !! of the last try
+    real(c_double), intent(out) :: error                !! estimated, relative; where complete
     type(problem_t), pointer :: problem
     type(motion_t) :: motion
     logical :: varies
@@ -68,7 +69,6 @@ contains
     real(dp) :: aim          ! error, relative
     real(dp) :: faint        ! what averaging may cost, rad/s
     real(dp) :: left_out     ! what it costs, in the unknowns
-    real(dp) :: error        ! relative
     real(dp) :: far          ! what the second gap says of the error
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: cost         ! in steps under constant torque
@@ -79,6 +79,7 @@ contains
     aim = SHARE*tolerance
     status = REFUSED
     steps = 0
+    error = 0.0_dp
     result = omega
     call c_f_pointer(problem_at, problem)
     if (problem%n_sines + problem%n_cosines > MOST_WAVES) return
@@ -144,6 +145,7 @@ contains
       end if
       status = GAVE_UP
       gaps(:, 1) = gaps(:, 1)/GAIN
+      error = 0.0_dp
       if (all(abs(gaps) <= 0.0_dp)) exit
       far = max(1.0_dp/(GAIN*(GAIN + 1.0_dp)), aim/FARTHEST)
       error = max(maxval(abs(gaps(:, 1)*motion%scale)), far*maxval(abs(gaps(:, 2)*motion%scale))) &

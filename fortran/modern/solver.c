@@ -13,13 +13,18 @@
 
 /* solve_packed of api.f90. */
 typedef void kernel(const double *packed, const int *n_packed, const double *omega0,
-                    const double *t_end, double *omega, int *status, int64_t *steps);
+                    const double *t_end, double *omega, int *status, int64_t *steps,
+                    double *found);
 
-/* How a thread's last call ended. A thread's number is never given again, as its address is. */
+/* How a thread's last call ended, and what it was: what a closed form did to rounding is worked out
+   when it is asked for. A thread's number is never given again, as its address is. */
 typedef struct {
   uint64_t thread;
   int status;
   int64_t steps;
+  double found[2]; /* estimated error and growth, below 0 where unknown */
+  double start[3];
+  double time;
 } ending;
 
 typedef struct {
@@ -85,7 +90,7 @@ static ending *add_ending(bound_kernel *self, uint64_t thread)
     }
   }
   self->latest = self->n_endings++;
-  self->endings[self->latest] = (ending){thread, 0, 0};
+  self->endings[self->latest] = (ending){.thread = thread, .found = {-1.0, -1.0}};
   return self->endings + self->latest;
 }
 
@@ -93,8 +98,9 @@ static PyObject *get_ending(PyObject *object, void *Py_UNUSED(closure))
 {
   const ending *own =
     find_ending((bound_kernel *)object, PyThreadState_GetID(PyThreadState_Get()));
-  return own ? Py_BuildValue("(iL)", own->status, (long long)own->steps)
-             : Py_BuildValue("(ii)", 0, 0);
+  if (own == NULL) Py_RETURN_NONE;
+  return Py_BuildValue("(iLdd(ddd)d)", own->status, (long long)own->steps, own->found[0],
+                       own->found[1], own->start[0], own->start[1], own->start[2], own->time);
 }
 
 /* ---- Arguments ---------------------------------------------------------------------------- */
@@ -250,31 +256,36 @@ static int read_slowly(bound_kernel *self, const arguments *given, double start[
 
 /* ---- The call ----------------------------------------------------------------------------- */
 
+/* Copy numbers that a kernel of another kind returned. */
+static int copy_numbers(PyObject *values, npy_intp count, double *numbers)
+{
+  PyArrayObject *array =
+    (PyArrayObject *)PyArray_FROM_OTF(values, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
+  if (array == NULL) return 0;
+  const int is_right = PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == count;
+  if (is_right) memcpy(numbers, PyArray_DATA(array), (size_t)count * sizeof(double));
+  else PyErr_Format(PyExc_ValueError, "the kernel returned no %d numbers", (int)count);
+  Py_DECREF(array);
+  return is_right;
+}
+
 /* Enter a kernel of another kind, one that stands in f2py's place. */
-static int call_object(bound_kernel *self, const double start[3], double time, double omega[3],
-                       ending *found)
+static int call_object(bound_kernel *self, double omega[3], ending *now)
 {
   int is_right = 0;
   long long steps = 0;
-  PyObject *result = NULL, *values;
-  PyArrayObject *array = NULL;
+  PyObject *result = NULL, *values, *found;
   PyObject *omega0 = PyArray_SimpleNew(1, three, NPY_DOUBLE);
   if (omega0 == NULL) return 0;
-  memcpy(PyArray_DATA((PyArrayObject *)omega0), start, 3 * sizeof(double));
-  result = PyObject_CallFunction(self->callable, "OOd", self->packed, omega0, time);
+  memcpy(PyArray_DATA((PyArrayObject *)omega0), now->start, 3 * sizeof(double));
+  result = PyObject_CallFunction(self->callable, "OOd", self->packed, omega0, now->time);
   if (result != NULL && !PyTuple_Check(result)) {
     PyErr_SetString(PyExc_TypeError, "the kernel returned no tuple");
   } else if (result != NULL &&
-             PyArg_ParseTuple(result, "OiL", &values, &found->status, &steps)) {
-    found->steps = steps;
-    array = (PyArrayObject *)PyArray_FROM_OTF(values, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
+             PyArg_ParseTuple(result, "OiLO", &values, &now->status, &steps, &found)) {
+    now->steps = steps;
+    is_right = copy_numbers(values, 3, omega) && copy_numbers(found, 2, now->found);
   }
-  if (array != NULL) {
-    is_right = is_three(array);
-    if (is_right) memcpy(omega, PyArray_DATA(array), 3 * sizeof(double));
-    else PyErr_SetString(PyExc_ValueError, "the kernel returned no three numbers");
-  }
-  Py_XDECREF(array);
   Py_XDECREF(result);
   Py_DECREF(omega0);
   return is_right;
@@ -285,8 +296,8 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   bound_kernel *self = (bound_kernel *)object;
   const Py_ssize_t count = PyVectorcall_NARGS(n_given);
   arguments found = {NULL, NULL, NULL};
-  double start[3], time, omega[3];
-  ending now = {0, 0, 0};
+  double omega[3];
+  ending now;
 
   if (count == 2 && names == NULL) {
     found = (arguments){given[0], given[1], Py_None};
@@ -296,22 +307,23 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   } else if (!sort_arguments(&found, given, count, names)) {
     return NULL;
   }
-  if (!(read_start(found.omega0, start) && read_number(found.t_end, &time) &&
+  if (!(read_start(found.omega0, now.start) && read_number(found.t_end, &now.time) &&
         (found.out == Py_None || is_buffer(found.out)))) {
-    if (!read_slowly(self, &found, start, &time)) return NULL;
+    if (!read_slowly(self, &found, now.start, &now.time)) return NULL;
   }
 
   if (self->address != NULL) {
     const double *packed = PyArray_DATA(self->packed);
     const int n_packed = (int)PyArray_DIM(self->packed, 0);
     PyThreadState *thread = PyEval_SaveThread();
-    self->address(packed, &n_packed, start, &time, omega, &now.status, &now.steps);
+    self->address(packed, &n_packed, now.start, &now.time, omega, &now.status, &now.steps,
+                  now.found);
     PyEval_RestoreThread(thread);
     /* Ctrl-C, which a kernel asks about now and then, ends it with this set. */
     if (PyErr_Occurred()) return NULL;
     now.thread = PyThreadState_GetID(thread);
   } else {
-    if (!call_object(self, start, time, omega, &now)) return NULL;
+    if (!call_object(self, omega, &now)) return NULL;
     now.thread = PyThreadState_GetID(PyThreadState_Get());
   }
 
@@ -415,7 +427,7 @@ static PyMethodDef methods[] = {
 };
 
 static PyGetSetDef attributes[] = {
-  {"_ending", get_ending, NULL, "Status and steps of this thread's last call.", NULL},
+  {"_ending", get_ending, NULL, "This thread's last call, None before one: status, steps, error, growth, omega0, t_end.", NULL},
   {NULL, NULL, NULL, NULL, NULL},
 };
 

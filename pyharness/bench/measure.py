@@ -222,7 +222,7 @@ def _first_calls(
         spent += first
         before, last = last, first
         error = relative_error(end.omega, truth)
-        if error is None and end.ended == "complete":
+        if error is None and end.has_result:
             end = not_finite()
         errors.append(error)
         counted = None if error is None else end.evaluations

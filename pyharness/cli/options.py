@@ -36,6 +36,7 @@ LISTING = {
     "--no-stop": "run on where the stop test would end the run",
 }
 EFFORT = {"--effort F": "factor on the work that is done before giving up (default 1)"}
+STRICT = {"--strict": "exit with 1 where the motion makes more of rounding than the tolerance"}
 _NEGATIVE = re.compile(r"-[.\d]")
 
 

@@ -15,7 +15,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, STOPPED, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import STOP_VARIABLES, Array, Trajectory
+from pyharness.model.trajectory import STOP_VARIABLES, WITH_ALL_ROWS, Array, Trajectory
 from pyharness.original.compiled import program_arguments
 from pyharness.original.programs import PROGRAM_REGISTRY
 
@@ -35,6 +35,11 @@ class End:
     def is_refused(self) -> bool:
         """Whether the kernel of a prepared solver would not, or gave up."""
         return self.ended in ("refused", "gave up")
+
+    @property
+    def has_result(self) -> bool:
+        """Whether it got there, though it may be sensitive."""
+        return self.ended in WITH_ALL_ROWS
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,12 @@ from pyharness.compare.candidates import listed, solved
 from pyharness.compare.orders import Order, measured_order
 from pyharness.compare.timing import seconds as timed
 from pyharness.methods.registry import SCIPY_METHODS
+from pyharness.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
 from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
@@ -67,6 +68,18 @@ class Comparison:
     reference: Reference
     programs: tuple[ProgramFinding, ...]
     methods: tuple[MethodFinding, ...]
+    tolerance: float  # of the methods
+    growth: float | None  # of a small difference on the way, where it is known
+
+    @property
+    def digits(self) -> float | None:
+        """Decimal digits that the motion leaves of rounding, whoever solves it."""
+        return None if self.growth is None else digits_left(ROUNDING * self.growth)
+
+    @property
+    def is_sensitive(self) -> bool:
+        """Whether the motion makes more of rounding than the methods are allowed."""
+        return is_sensitive(self.growth, self.tolerance)
 
     @property
     def unexpected(self) -> tuple[str, ...]:
@@ -150,7 +163,8 @@ def compare_programs(
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
     methods = [_method(scene, name, tolerance, effort, truth) for name in SCIPY_METHODS]
-    return Comparison(scene, lipschitz, truth, tuple(programs), tuple(methods))
+    growth = motion_growth(scene, scene.times()[-1])
+    return Comparison(scene, lipschitz, truth, tuple(programs), tuple(methods), tolerance, growth)
 
 
 def listings_for(

@@ -4,7 +4,13 @@ from typing import Any
 
 from pyharness.compare.agreement import Accuracy
 from pyharness.compare.comparison import Comparison, MethodFinding, ProgramFinding
-from pyharness.model.records import build_record, ending_record, listing_record, scene_record
+from pyharness.model.records import (
+    build_record,
+    ending_record,
+    estimate_record,
+    listing_record,
+    scene_record,
+)
 from pyharness.model.report import (
     Column,
     Picture,
@@ -15,7 +21,7 @@ from pyharness.model.report import (
     short,
     words,
 )
-from pyharness.model.scene_report import heading
+from pyharness.model.scene_report import heading, sensitive
 from pyharness.model.trajectory import Trajectory
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
@@ -35,6 +41,12 @@ def comparison_report(comparison: Comparison) -> Report:
         "stop: variable and its Lipschitz quotient against the limit. us/step: Fortran, the call "
         "included."
     )
+    motion = []
+    if comparison.growth is not None and comparison.digits is not None:
+        motion.append(
+            f"growth of a small difference {short(comparison.growth)}: "
+            f"rounding leaves {comparison.digits:.1f} digits"
+        )
     failures = [f"failed: {x.method}: {x.failure}" for x in comparison.methods if x.failure]
     told, programs, methods = verdict(comparison), _programs(comparison), _methods(comparison)
 
@@ -45,7 +57,7 @@ def comparison_report(comparison: Comparison) -> Report:
 
     return Report(
         "compare",
-        text=[[*scene, reference], [programs], [methods], [legend, *failures, *told]],
+        text=[[*scene, reference, *motion], [programs], [methods], [legend, *failures, *told]],
         record=lambda: _record(comparison),
         data=_data(comparison),
         page=[scene, [programs], [methods], told],
@@ -56,6 +68,8 @@ def comparison_report(comparison: Comparison) -> Report:
 def verdict(comparison: Comparison) -> list[str]:
     """Return the verdict: one sentence, or one for each thing that is not as it should be."""
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
+    if comparison.is_sensitive:
+        told.append(sensitive(comparison.growth, comparison.digits))
     return told + [f"not judged: {each}" for each in comparison.not_judged]
 
 
@@ -153,6 +167,9 @@ def _record(comparison: Comparison) -> dict[str, Any]:
         "reference": {name: getattr(truth, name) for name in ("source", "estimate", "error")},
         "programs": list(map(_program, comparison.programs)),
         "methods": list(map(_method, comparison.methods)),
+        "growth": comparison.growth,
+        "digits": comparison.digits,
+        "sensitive": comparison.is_sensitive,
         "unexpected": list(comparison.unexpected),
         "not_judged": list(comparison.not_judged),
         "build": build_record(),
@@ -183,8 +200,11 @@ def _method(each: MethodFinding) -> dict[str, Any]:
 
 
 def _run(run: Trajectory, accuracy: Accuracy) -> dict[str, Any]:
+    estimated = estimate_record(run)
     return {
         **ending_record(run),
+        "estimated_error": estimated.pop("error"),
+        **estimated,
         "error": list(accuracy.omega),
         "velocity_error": accuracy.velocity,
         "energy_drift": accuracy.energy,

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyharness.methods.problem import normalized, trajectory_of
+from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive
 from pyharness.model.effort import advice, waves
 from pyharness.model.errors import InputError, TimedError
-from pyharness.model.extension import GAVE_UP, REFUSED, extension
+from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, extension
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
@@ -15,7 +16,7 @@ from pyharness.model.trajectory import Trajectory
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene that has a closed form; the tolerance plays no part."""
+    """Solve a scene that has a closed form; the tolerance tells only whether it is sensitive."""
     work = np.array([effort, 0.0])
     if not any(scene.euler_coefficients):
         rows, n_rows, status = extension().sphere_solution(
@@ -46,4 +47,8 @@ def known_solution(
             "take a shorter time",
             times[n_rows],
         )
-    return trajectory_of(times, rows, n_rows, status, len(times), 0)
+    if status != COMPLETE:
+        return trajectory_of(times, rows, n_rows, status, len(times), 0)
+    error, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, times[-1])
+    status = SENSITIVE if is_sensitive(growth, tolerance) else COMPLETE
+    return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth)

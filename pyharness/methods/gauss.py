@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.methods.problem import normalized, trajectory_of
+from pyharness.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import TimedError
-from pyharness.model.extension import COMPLETE, extension
+from pyharness.model.extension import COMPLETE, SENSITIVE, extension
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 
 # Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
 # as much as half of one.
@@ -77,8 +78,15 @@ def gauss(stages: int) -> Integrator:
                 if known > 0.0 and allowed > 0.0:
                     excess = difference / (allowed * (known + 1.0))
                     more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
-                if (close and found.status == COMPLETE) or found.blows_up(before, start):
-                    count = int(counts.sum())
+                count = int(counts.sum())
+                if close and found.status == COMPLETE:
+                    # Rounding parts a motion from what was asked for, whatever solves it.
+                    growth = motion_growth(scene, times[-1])
+                    status = SENSITIVE if is_sensitive(growth, tolerance) else COMPLETE
+                    error = 2.0 * difference / (known * scale) if difference else 0.0
+                    error += ROUNDING * (growth or 1.0)
+                    return trajectory_of(times, found.rows, n, status, count, spent, error, growth)
+                if found.blows_up(before, start):
                     return trajectory_of(times, found.rows, n, found.status, count, spent)
             before, previous = found, counts
             step *= 0.5

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
-from pyharness.methods.problem import normalized
+from pyharness.methods.problem import known, normalized
+from pyharness.methods.registry import GAUSS
+from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, motion_growth
 from pyharness.model.codes import Methods, Places
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import ENDS, extension
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory, digits_left
 from pyharness.model.values import (
     Number,
     Numbers,
@@ -59,7 +61,7 @@ class Solver(BoundKernel):
     with an InputError, and `out` stays as it was. Fastest is an array of floats for `omega0`.
 
     Where the kernel could not finish the result is NaN and `status` says why; so it is from a
-    start, or to a time, that is not finite.
+    start, or to a time, that is not finite. `error`, `growth` and `digits` say how good it is.
 
     Threads may share a solver and call it at once: the kernel releases the GIL. Solvers can be
     copied and pickled; a copy has made no call yet.
@@ -94,26 +96,77 @@ class Solver(BoundKernel):
 
     @property
     def status(self) -> str:
-        """How this thread's last call ended: complete, overflow, refused or gave up.
+        """How this thread's last call ended: complete, sensitive, overflow, refused or gave up.
 
-        ``complete``, in 0 steps, before one. What was refused at the door, or interrupted, is none.
+        ``sensitive`` is a result too, but what the motion makes of rounding exceeds the tolerance:
+        `digits` says what is left. A closed form and Gauss collocation work that out when they are
+        asked, in microseconds and milliseconds. ``complete``, in 0 steps, before a call. What was
+        refused at the door, or interrupted, is none.
         """
-        return ENDS[self._ending[0]]
+        return self._found()[0]
+
+    @property
+    def error(self) -> float | None:
+        """Estimated error of this thread's last result, over the largest omega on the way.
+
+        None where the method estimates none, and where there is no result.
+        """
+        return self._found()[1]
+
+    @property
+    def growth(self) -> float | None:
+        """What the motion of this thread's last call makes of a small difference, at least 1.
+
+        The largest norm of the derivative of omega at the end by omega at any time before; None
+        where it is unknown.
+        """
+        return self._found()[2]
+
+    @property
+    def digits(self) -> float | None:
+        """Decimal digits that are left of this thread's last result; None where unknown."""
+        return digits_left(self.error)
 
     @property
     def steps(self) -> int:
         """Steps of this thread's last call; right-hand sides of Gauss, 0 of a closed form."""
-        return abs(self._ending[1])
+        return abs(self._counted())
 
     @property
     def method(self) -> str:
         """The method of this thread's last call, where the kernel chose; else that of the plan."""
-        steps = self._ending[1]
+        steps = self._counted()
         if not steps:
             return self.plan.method
         if self.plan.method == EITHER:
             return "quick" if steps < 0 else "taylor"
         return self.plan.fallback or self.plan.method
+
+    def _counted(self) -> int:
+        """Return the steps of this thread's last call, as the kernel counts them."""
+        ending = self._ending
+        return 0 if ending is None else ending[1]
+
+    def _found(self) -> tuple[str, float | None, float | None]:
+        """Return status, error and growth of this thread's last call."""
+        from dataclasses import replace
+
+        ending = self._ending
+        if ending is None:
+            return "complete", None, None
+        number, steps, of_kernel, grown, omega0, t_end = ending
+        status = ENDS[number]
+        if status not in WITH_ALL_ROWS:
+            return status, None, None
+        error, growth = known(of_kernel), known(grown)
+        scene = self.plan.scene
+        if self.plan.closed_form and not steps:
+            error, growth = closed_form_estimate(scene.euler_coefficients, omega0, t_end)
+        elif self.plan.method in GAUSS:
+            growth = motion_growth(replace(scene, omega=omega0), t_end)
+        else:
+            return status, error, growth
+        return "sensitive" if is_sensitive(growth, self._given[0]) else status, error, growth
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return rows from another start (rad/s) at `times` (s), strictly monotonic, on any side.

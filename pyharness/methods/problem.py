@@ -1,13 +1,14 @@
 """A scene as the modern kernels take it, and a trajectory of what they give."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pyharness.model.errors import InputError
-from pyharness.model.extension import COMPLETE, columns
+from pyharness.model.extension import ENDS, columns
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
@@ -35,12 +36,28 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     return found
 
 
+def known(estimate: float) -> float | None:
+    """Return what a kernel estimated; None where it is below 0, which it is where unknown."""
+    return float(estimate) if estimate >= 0.0 else None
+
+
 def trajectory_of(
-    times: Sequence[float], rows: Array, n_rows: int, status: int, steps: int, evaluations: int
+    times: Sequence[float],
+    rows: Array,
+    n_rows: int,
+    status: int,
+    steps: int,
+    evaluations: int,
+    error: float | None = None,
+    growth: float | None = None,
 ) -> Trajectory:
-    """Return the rows of a kernel, which come in columns, as a trajectory."""
-    ended = "complete" if status == COMPLETE else "overflow"
-    return rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
+    """Return the rows of a kernel, which come in columns, as a trajectory.
+
+    Error and growth are those at the last of the times, and unknown where that was not reached.
+    """
+    ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
+    found = rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
+    return replace(found, error=error, growth=growth) if found.has_all_rows else found
 
 
 def rows_trajectory(

@@ -8,7 +8,7 @@ import numpy as np
 from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
-from pyharness.model.scene_report import ending, heading
+from pyharness.model.scene_report import ending, estimates, heading
 from pyharness.model.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def trajectory_report(
                 "recorded_time": trajectory.recorded_time.tolist(),
                 "omega": trajectory.omega.tolist(),
                 "velocity": None if velocity is None else velocity.tolist(),
+                **records.estimate_record(trajectory),
             },
             **records.ending_record(trajectory),
             "build": records.build_record(),
@@ -62,7 +63,7 @@ def trajectory_report(
 
     return Report(
         "run",
-        text=[[*heading(scene), title], [counted], [ending(trajectory)]],
+        text=[[*heading(scene), title], [counted], [ending(trajectory), *estimates(trajectory)]],
         record=record,
         data=numbers,
         pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
@@ -76,7 +77,7 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
     figure = Figure(figsize=(7.0, 7.0), dpi=110, layout="constrained")
     marker = "o" if len(trajectory.time) == 1 else ""
     style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "marker": marker}
-    note = f"x: {ending(trajectory)}" if trajectory.ended != "complete" else ""
+    note = f"x: {ending(trajectory)}" if not trajectory.has_all_rows else ""
     axes = figure.subplots(3, 1, sharex=True)
     for row in range(3):
         axes[row].plot(trajectory.time, trajectory.omega[:, row], **style)

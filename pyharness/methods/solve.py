@@ -19,6 +19,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, number, several, tolerance_of
 
 _ROWS = ("time", "recorded_time", "omega")
+_WORST_FIRST = ("overflow", "sensitive", "complete")
 
 
 def solve(
@@ -112,8 +113,8 @@ def by_plan(
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
     try:
-        # A closed form is as good as rounding lets it be, whatever is asked.
-        return method.solve(scene, times, max(tolerance, method.finest), effort)
+        # A closed form is as good as rounding lets it be, and may be asked for more than it claims.
+        return method.solve(scene, times, tolerance, effort)
     except InputError as refusal:
         if chosen.fallback is None:
             raise
@@ -153,11 +154,18 @@ def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
         name: np.concatenate([getattr(x, name) for x in both]) for name in _ROWS
     }
     return replace(
-        after if before.ended == "complete" else before,
+        after,
         **rows,
+        ended=min((x.ended for x in both), key=_WORST_FIRST.index),
+        error=_larger(before.error, after.error),
+        growth=_larger(before.growth, after.growth),
         steps=before.steps + after.steps,
         evaluations=before.evaluations + after.evaluations,
     )
+
+
+def _larger(first: float | None, second: float | None) -> float | None:
+    return None if first is None or second is None else max(first, second)
 
 
 def _ascending(times: object) -> tuple[list[float], bool]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.methods.problem import normalized, trajectory_of
+from pyharness.methods.problem import known, normalized, trajectory_of
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
@@ -16,7 +16,7 @@ def taylor(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
     """Solve a scene by Taylor series, each counted as one evaluation."""
-    work = np.array([effort, 0.0])
+    work = np.array([effort, 0.0, -1.0, -1.0])
     rows, n_rows, status, steps = extension().taylor_rows(
         *normalized(scene), scene.omega, times, tolerance, effort=work
     )
@@ -27,4 +27,5 @@ def taylor(
             + advice("take a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )
-    return trajectory_of(times, rows, n_rows, status, steps, steps)
+    error, growth = map(known, work[2:])
+    return trajectory_of(times, rows, n_rows, status, steps, steps, error, growth)

@@ -11,6 +11,7 @@ from pyharness.model.trajectory import Array
 
 COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
 REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
+SENSITIVE = Statuses.SENSITIVE
 # What a user reads.
 ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.isupper())
 

@@ -53,6 +53,11 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
     }
 
 
+def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
+    """Return what a method says of its own error, null where unknown."""
+    return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
+
+
 def build_record() -> dict[str, Any]:
     """Return how this installation was built."""
     return asdict(build())

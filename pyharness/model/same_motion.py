@@ -94,5 +94,7 @@ def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> T
     finite = np.isfinite(omega).all(axis=1)
     count = len(omega) if finite.all() else int(np.argmin(finite))
     time = np.array(times[:count], dtype=float)
-    ended = trajectory.ended if count == len(trajectory.omega) else "overflow"
-    return replace(trajectory, time=time, recorded_time=time, omega=omega[:count], ended=ended)
+    found = replace(trajectory, time=time, recorded_time=time, omega=omega[:count])
+    if count == len(trajectory.omega):
+        return found
+    return replace(found, ended="overflow", error=None, growth=None)

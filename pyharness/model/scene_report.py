@@ -1,5 +1,6 @@
 """What reports say of a scene and of the end of a run."""
 
+import math
 from collections.abc import Sequence
 
 from pyharness.model.report import counted, short
@@ -53,4 +54,23 @@ def ending(trajectory: Trajectory) -> str:
         )
     if trajectory.ended == "overflow":
         return f"overflow: the rows end before the first omega that is not finite ({counts})"
+    if trajectory.ended == "sensitive":
+        return f"{sensitive(trajectory.growth, trajectory.digits)} ({counts})"
     return f"complete ({counts})"
+
+
+def sensitive(growth: float | None, digits: float | None) -> str:
+    """Say that rounding times the growth of a small difference exceeds the tolerance."""
+    left = counted(math.floor(digits or 0.0), "digit")
+    return f"sensitive: rounding grows by {short(growth)} on the way; {left} left"
+
+
+def estimates(trajectory: Trajectory) -> list[str]:
+    """Say in a line what a method knows of its own error; nothing where it knows nothing."""
+    told = []
+    if trajectory.error is not None and trajectory.digits is not None:
+        told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")
+        told.append(f"digits left {trajectory.digits:.1f}")
+    if trajectory.growth is not None:
+        told.append(f"growth of a small difference {short(trajectory.growth)}")
+    return ["; ".join(told)] if told else []

@@ -1,5 +1,6 @@
 """Trajectories: what a method makes of a scene."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Of a number in binary64, relative.
+ROUNDING = 2.0**-53
+# Endings with every row that was asked for.
+WITH_ALL_ROWS = ("complete", "sensitive")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 
 
@@ -45,12 +50,19 @@ class Trajectory:
         Velocity along the body axes, m/s.
     steps, evaluations : int
         Steps taken, and right-hand sides evaluated.
-    ended : {"complete", "stopped", "overflow"}
+    ended : {"complete", "sensitive", "stopped", "overflow"}
         Why it ended; after an overflow the rows end before the first omega that is not finite.
+        Sensitive: every row is there, but what the motion makes of rounding exceeds the tolerance.
     stop : Stop or None
         What the Lipschitz test found.
     ier : ndarray of int, shape (n,), or None
         IER as the collocation programs print it.
+    error : float or None
+        Estimated error of any component at the times asked for, over the largest of omega on the
+        way; None where the method estimates none, and after an overflow.
+    growth : float or None
+        Largest norm of the derivative of omega at the end by omega at any time before; None where
+        it is unknown.
     """
 
     time: Array
@@ -62,3 +74,20 @@ class Trajectory:
     ended: str = "complete"
     stop: Stop | None = None
     ier: NDArray[np.int32] | None = None
+    error: float | None = None
+    growth: float | None = None
+
+    @property
+    def digits(self) -> float | None:
+        """Decimal digits that are left at the end; None where the error is unknown."""
+        return digits_left(self.error)
+
+    @property
+    def has_all_rows(self) -> bool:
+        """Whether every row that was asked for is there, though it may be sensitive."""
+        return self.ended in WITH_ALL_ROWS
+
+
+def digits_left(error: float | None) -> float | None:
+    """Return how many decimal digits an error (relative) leaves: 0 to 15.95, those of binary64."""
+    return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))

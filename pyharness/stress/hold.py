@@ -56,8 +56,8 @@ class Truth:
     exact: bool = False
 
     def wrong(self, end: End) -> float:
-        """Return the error of an end, over the largest omega; infinite of one not complete."""
-        if end.ended != "complete":
+        """Return the error of an end, over the largest omega; infinite of one without a result."""
+        if not end.has_result:
             return math.inf
         return float(np.abs(end.omega - self.omega).max()) / self.flow.largest
 
@@ -183,7 +183,7 @@ def _held(
     if isinstance(run, Check):
         yield run
         return
-    complete = run.ended == "complete"
+    complete = run.has_result
     # The steps after which the method rounds omega and forgets what it took off.
     if tolerance is None:
         rounded = 0.0 if name in GAUSS else float(_steps(scene, truth.time))

@@ -82,7 +82,7 @@ def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
     # Beside the separatrix an integrated path would be another one after a few turns.
     method = "closed-form" if closed_form(scene) else "taylor"
     path = solve(scene, times[1:].tolist(), method, 1e-13)
-    return np.vstack([scene.omega, path.omega]), path.ended == "complete"
+    return np.vstack([scene.omega, path.omega]), path.has_all_rows
 
 
 def _nodes(scene: Scene, time: float) -> Array:

@@ -99,7 +99,7 @@ def _solved(name: str, drawn: Draw, truth: Truth) -> Answer:
         run = solved(name, tolerance).rows(drawn.scene, truth.times)
     except InputError as refusal:
         return Answer(name, tolerance, None, f"{REFUSED}{refusal}")
-    if run.ended != "complete" or run.time.tolist() != truth.times:
+    if not run.has_all_rows or run.time.tolist() != truth.times:
         return Answer(name, tolerance, None, f"{run.ended}, other times than asked for")
     return Answer(name, tolerance, run.omega)
 
@@ -107,7 +107,7 @@ def _solved(name: str, drawn: Draw, truth: Truth) -> Answer:
 def _prepared(name: str, drawn: Draw, truth: Truth) -> Answer:
     tolerance = drawn.tolerance(REGISTRY[name].finest)
     end = called(name, tolerance, primed=True).end(drawn.scene, truth.times[-1])
-    if end.ended != "complete":
+    if not end.has_result:
         return Answer(name, tolerance, None, f"{REFUSED}{end.ended}")
     return Answer(name, tolerance, end.omega[None, :])
 

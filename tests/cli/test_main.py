@@ -2,18 +2,20 @@
 
 import csv
 import json
+import math
 import os
 import shlex
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness import case_scene
+from pyharness import case_scene, solve
 from pyharness.cli.main import main
 from pyharness.model import extension
 from pyharness.model.errors import NotBuiltError
@@ -84,6 +86,60 @@ def test_run_json_of_a_method_and_of_an_overflow(printed: Printed) -> None:
     record = _record(printed, "run --case 6 --program two-term")
     assert record["ended"] == "overflow"
     assert len(record["trajectory"]["omega"]) == record["steps"] == 56
+
+
+_FAR = "run --case 3 --method auto --times 1,1000000 --tolerance"
+# Beside the middle axis, which it leaves.
+_BESIDE = "compare --case 3 --program two-term --omega0 1e-5,10,0 --steps 1500 --tolerance 1e-11"
+
+
+def test_run_tells_of_error_growth_and_digits(printed: Printed) -> None:
+    found = solve(case_scene(3), [1.0, 1e6], tolerance=1e-12)
+    told = {"error": found.error, "growth": found.growth, "digits": found.digits}
+    for tolerance, ended in (("1e-12", "sensitive"), ("1e-9", "complete")):
+        record = _record(printed, f"{_FAR} {tolerance}")
+        assert record["ended"] == ended
+        assert told == {name: record["trajectory"][name] for name in told}
+    lines = printed(f"{_FAR} 1e-12").splitlines()
+    assert lines[-2].startswith("sensitive: rounding grows by 5.0e5 on the way; 10 digits left (2 ")
+    assert lines[-1] == (
+        "estimated error 5.6e-11 of the largest |omega|; digits left 10.3; growth of a small "
+        "difference 5.0e5"
+    )
+    assert max(map(len, lines)) <= 100
+    assert printed("run --case 3 --method rk4 --times 1").splitlines()[-1].startswith("complete")
+    record = _record(printed, "run --case 3 --program two-term")
+    assert {name: record["trajectory"][name] for name in told} == dict.fromkeys(told)
+
+
+def test_strict_takes_what_is_sensitive_for_a_failure(capsys: Capture) -> None:
+    for command, code in (
+        (f"{_FAR} 1e-12", 0),
+        (f"{_FAR} 1e-12 --strict", 1),
+        (f"{_FAR} 1e-9 --strict", 0),
+        (f"{_BESIDE}", 0),
+        (f"{_BESIDE} --strict", 1),
+        ("compare --case 3 --program two-term --strict", 0),
+    ):
+        assert main(command.split()) == code, command
+        assert capsys.readouterr().out
+
+
+def test_compare_tells_of_the_growth_of_the_motion(printed: Printed) -> None:
+    record = _record(printed, _BESIDE)
+    assert record["sensitive"] is True
+    scene = replace(case_scene(3), omega=(1e-5, 10.0, 0.0), steps=1500)
+    assert record["growth"] == solve(scene, scene.times()).growth
+    assert record["digits"] == pytest.approx(-math.log10(2.0**-53 * record["growth"]))
+    lines = printed(_BESIDE).splitlines()
+    assert any(line.startswith("sensitive: rounding grows by ") for line in lines)
+    assert any(line.startswith("growth of a small difference ") for line in lines)
+    assert max(map(len, lines)) <= 100
+    record = _record(printed, "compare --case 3 --program two-term")
+    assert record["sensitive"] is False
+    for each in record["programs"] + record["methods"]:
+        assert each["estimated_error"] is each["growth"] is each["digits"] is None
+        assert len(each["error"]) == 3
 
 
 def test_run_csv_round_trips_and_both_implementations_agree(printed: Printed) -> None:

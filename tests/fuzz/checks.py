@@ -22,6 +22,7 @@ from pyharness.cli.main import main
 from pyharness.compare.agreement import differences
 from pyharness.model.extension import ENDS
 from pyharness.model.listing import subset
+from pyharness.model.trajectory import WITH_ALL_ROWS
 from pyharness.original.programs import PROGRAM_REGISTRY
 from tests.fuzz import strategies
 from tests.fuzz.command_lines import CommandLine, command_line, furnish
@@ -91,8 +92,10 @@ def _method(given: strategies.MethodInput, folder: Path) -> None:
     rows = len(found.time)
     assert found.omega.shape == (rows, 3)
     assert np.isfinite(found.omega).all(), f"{found.ended}, but omega is {found.omega.tolist()}"
-    assert found.ended in ("complete", "overflow"), found.ended
-    assert (rows == len(given.times)) == (found.ended == "complete"), f"{found.ended}, {rows} rows"
+    assert found.ended in (*WITH_ALL_ROWS, "overflow"), found.ended
+    assert (rows == len(given.times)) == found.has_all_rows, f"{found.ended}, {rows} rows"
+    assert found.error is None or found.error >= 0.0, found.error
+    assert found.growth is None or found.growth >= 1.0, found.growth
     assert set(found.time.tolist()) <= set(given.times)
 
 
@@ -104,8 +107,8 @@ def _prepared(given: strategies.PreparedInput, folder: Path) -> None:
         return
     found = solver(np.array(given.omega0), given.t_end)
     assert solver.status in ENDS
-    if solver.status == "complete":
-        assert np.isfinite(found).all(), f"complete, but omega is {found.tolist()}"
+    if solver.status in WITH_ALL_ROWS:
+        assert np.isfinite(found).all(), f"{solver.status}, but omega is {found.tolist()}"
     else:
         assert np.isnan(found).all(), f"{solver.status}, but omega is {found.tolist()}"
 

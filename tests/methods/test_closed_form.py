@@ -140,7 +140,7 @@ def _packed_end(coefficients: Triple, omega: Triple, time: float) -> tuple[Array
     packed = np.zeros(20)
     packed[0] = 1.0
     packed[5:8] = coefficients
-    found, status, _ = extension().solve_packed(packed, np.array(omega), time)
+    found, status, *_ = extension().solve_packed(packed, np.array(omega), time)
     return found, status
 
 

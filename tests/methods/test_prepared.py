@@ -272,9 +272,9 @@ def test_many_threads_leave_nothing_behind(solver: Solver) -> None:
         thread = threading.Thread(target=solver, args=(start, 1.0))
         thread.start()
         thread.join()
-    assert sys.getsizeof(solver) < size + 100
+    assert sys.getsizeof(solver) < size + 300
     _in_threads(50, lambda number: solver(start, 1.0))
-    assert size + 500 < sys.getsizeof(solver) < size + 5000
+    assert size + 1500 < sys.getsizeof(solver) < size + 15000
 
 
 @pytest.mark.parametrize("method", ["auto", "quick", "gauss-3"])
@@ -307,10 +307,15 @@ def test_another_kernel_may_stand_in_its_place(monkeypatch: pytest.MonkeyPatch) 
         (np.array([1.0, 2.0, 3.0]), 3, 7, "refused"),
         ([4, 5, 6], 0, 1, "complete"),
     ):
-        answers.append((found, status, steps))
+        answers.append((found, status, steps, (1e-9, 2.0)))
         assert solver(np.ones(3), 2.0).tolist() == list(found)
         assert (solver.status, solver.steps) == (word, steps)
-    for answer in ((np.ones(4), 0, 0), (np.ones(3), 0), None, ("abc", 0, 0)):
+        assert (solver.error, solver.growth) == ((1e-9, 2.0) if status == 0 else (None, None))
+    good = np.ones(2)
+    for answer in (
+        (np.ones(4), 0, 0, good), (np.ones(3), 0, 0), None, ("abc", 0, 0, good),
+        (np.ones(3), 0, 0, np.ones(3)),
+    ):  # fmt: skip
         answers.append(answer)
         with pytest.raises((TypeError, ValueError)):
             solver(np.ones(3), 2.0)

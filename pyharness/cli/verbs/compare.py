@@ -17,6 +17,7 @@ OPTIONS = {
     "--program P": "this program only",
     "--tolerance E": "asked of solve_ivp (default 1e-8)",
     "--ablate": "every subset of the defects, sorted by effect",
+    **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),
 }
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     effort = shared.chosen_effort(options)
     found = compare_programs(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
     shared.show(comparison_report(found), options)
-    return 1 if found.unexpected else 0
+    return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
 
 
 def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) -> int:
@@ -59,6 +60,7 @@ def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) 
         "no_stop",
         "tolerance",
         "plot",
+        "strict",
     )
     shared.refuse(options, "--ablate", meaningless)
     readings = shared.names(options.reading)

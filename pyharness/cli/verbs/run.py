@@ -22,13 +22,14 @@ OPTIONS = {
     **shared.LISTING,
     "--times T1,T2,...": "where results are wanted, s (methods)",
     "--tolerance E": "error at these times over the largest |omega| (methods)",
+    **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(FORMATS),
 }
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run and show."""
+    """Run and show; 1 where a result is sensitive and that is not to be passed over."""
     scene = shared.chosen_scene(options)
     if (options.program is None) == (options.method is None):
         from pyharness.methods.registry import METHODS
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
 
     report = trajectory_report(scene, name, listing, title, trajectory)
     shared.show(report, options, {"printer": page, "tape5": tape})
-    return 0
+    return 1 if options.strict and trajectory.ended == "sensitive" else 0
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
@@ -75,7 +76,7 @@ def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) 
 
 
 def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, str, Trajectory]:
-    shared.refuse(options, "--program", ("times", "tolerance"))
+    shared.refuse(options, "--program", ("times", "tolerance", "strict"))
     listing = shared.chosen_listing(options)
     name = listing.program
     lipschitz = shared.chosen_lipschitz(options)

@@ -180,7 +180,7 @@ def _held(
         yield end
         return
     limit = truth.flow.limit(tolerance) + truth.error / truth.flow.largest
-    yield bounded(id, truth.wrong(end), limit, "" if end.ended == "complete" else end.ended)
+    yield bounded(id, truth.wrong(end), limit, "" if end.has_result else end.ended)
 
 
 def _describe_axial(circumstance: str, scene: Scene) -> Iterator[Attempt]:

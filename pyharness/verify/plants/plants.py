@@ -108,8 +108,8 @@ def _stale() -> Callable[[Trajectory], Trajectory]:
     return change
 
 
-# What the kernel of a prepared solver returns: omega, status, steps.
-_Answer = tuple[Array, int, int]
+# What the kernel of a prepared solver returns: omega, status, steps, error and growth.
+_Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextManager[Any]:
@@ -135,8 +135,8 @@ def _stale_solver() -> AbstractContextManager[Any]:
 
 
 def _refuses(packed: Array, answer: _Answer) -> _Answer:
-    omega, _, steps = answer
-    refused = omega * np.nan, extension.REFUSED, steps
+    omega, _, steps, found = answer
+    refused = omega * np.nan, extension.REFUSED, steps, found
     return refused if packed[Places.METHOD] == Methods.QUICK else answer
 
 
@@ -145,8 +145,8 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 def _too_large(packed: Array, answer: _Answer) -> _Answer:
     """Let the results of the fixed-step methods and of Gauss collocation be too large."""
-    omega, status, steps = answer
-    return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps)
+    omega, status, steps, found = answer
+    return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
 
 
 def _half_step(scene: Scene) -> Scene:

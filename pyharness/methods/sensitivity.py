@@ -1,0 +1,62 @@
+"""What a motion makes of rounding: growth of small differences, and the error that it implies."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pyharness.methods.problem import known, normalized
+from pyharness.model.extension import extension
+from pyharness.model.same_motion import factor_near_one, scaled
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.trajectory import ROUNDING
+
+# Of the tolerance: rounding times growth beyond it is told of. One third either way is left to the
+# norm of the growth, and to how many differences were followed.
+_SHARE = 0.3
+# Beside the growth of one rounding, relative: the bound that `tests/methods/test_closed_form.py`
+# holds the closed form to.
+_CLOSED_FORM_ERROR = 16.0 * ROUNDING
+# The series is asked for the growth alone: few digits, and a twentieth of a second at the most.
+_COARSE = 1e-3
+_LITTLE_WORK = 5e-3
+
+
+def is_sensitive(growth: float | None, tolerance: float) -> bool:
+    """Whether rounding times a known growth exceeds the tolerance (relative)."""
+    return growth is not None and ROUNDING * growth > _SHARE * tolerance
+
+
+def closed_form_estimate(
+    coefficients: Triple, omega0: Triple, t_end: float
+) -> tuple[float | None, float | None]:
+    """Return error and growth of a closed form, started with omega0 (rad/s), at `t_end` (s).
+
+    Coefficients that are all zero are a sphere's, whose differences stay as they are. The error is
+    relative to the largest omega on the way; both are None where there is no closed form.
+    """
+    growth: float | None = 1.0
+    if any(coefficients):
+        growth = known(extension().torque_free_growth(coefficients, omega0, t_end))
+    return None if growth is None else ROUNDING * growth + _CLOSED_FORM_ERROR, growth
+
+
+def motion_growth(scene: Scene, t_end: float) -> float | None:
+    """Return the growth of a small difference until `t_end` (s), whatever method solves the scene.
+
+    That is the largest norm of the derivative of omega at the end by omega at any time before:
+    from a closed form where there is one, else from the Taylor series; None where neither tells.
+    """
+    # Here, since the plan knows all methods, and those that call this are among them.
+    from pyharness.methods.plan import closed_form
+
+    if closed_form(scene):
+        _, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, t_end)
+        if growth is not None:
+            return growth
+    factor = factor_near_one(scene, t_end)
+    near_one = scaled(replace(scene, step_size=1.0, steps=1), factor)
+    work = np.array([_LITTLE_WORK, 0.0, -1.0, -1.0])
+    _, n_rows, _, _ = extension().taylor_rows(
+        *normalized(near_one), near_one.omega, [t_end / factor], _COARSE, effort=work
+    )
+    return known(work[3]) if n_rows else None

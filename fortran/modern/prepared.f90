@@ -135,7 +135,7 @@ contains
     real(dp) :: tolerance_left
     integer :: code, n_rows, quick_steps
     integer(int64) :: evaluations
-    real(dp) :: needed, found(2)
+    real(dp) :: needed
 
     code = int(packed(METHOD))
     times(1) = t_end

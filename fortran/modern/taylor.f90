@@ -170,7 +170,7 @@ contains
     logical, intent(out) :: finest  !! the share is the least there is
     real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
     real(dp) :: left(4)       ! by the step, rad/s
-    real(dp) :: before(4, 3)  ! lanes at its beginning, rad/s
+    real(dp) :: before(3)     ! the error at its beginning, rad/s
     real(dp) :: h             ! step, s
     real(dp) :: rest          ! time to go, s
     real(dp) :: next          ! the step after this one, s
@@ -225,7 +225,6 @@ contains
       end do
       call torque_terms_at(constant, rate, now%t, now%t_low, h, order, longest, now%since == 0, &
                            waves, s%torque)
-      before = s%lanes
       call expand(order, s)
       last = size_of(s, order)
       if (steps == 0) then
@@ -245,7 +244,6 @@ contains
             status = OVERFLOW
             exit
           end if
-          s%lanes = before
           h = h*0.0625_dp
           if (size(waves) > MANY_WAVES) then
             if (interrupt_raised() /= 0) then
@@ -260,14 +258,13 @@ contains
         at_end = abs(next) >= abs(rest)
         if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
         call rescale(s, order, next/h)
-        s%lanes = before
-        call carry(s)
         now%since = AFRESH
         h = next
       end if
+      before = s%lanes(1, :)
+      call carry(s)
       call leave_out(s, order, 1.0_dp/allowed, left)
-      call add_rows(s, order, h, at_end, before(1, :), left(:3), n_times, times, now, rows, n_rows, &
-                    status)
+      call add_rows(s, order, h, at_end, before, left(:3), n_times, times, now, rows, n_rows, status)
       if (status /= COMPLETE) exit
       call count_step(s%lanes, blocks)
       call add_change(s%change, now)

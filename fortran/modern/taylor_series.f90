@@ -4,7 +4,7 @@ module taylor_series
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use torque_terms, only: MOST_ORDER
+  use torque_terms, only: LEAST_ORDER, MOST_ORDER
   implicit none(type, external)
   private
 
@@ -17,7 +17,12 @@ module taylor_series
     real(c_double) :: lanes(4, 3)            !! small differences, a vector in each lane, rad/s
   end type series_t
 
-  integer, parameter :: ORDER_CARRIED = 8
+  integer, parameter :: ORDER_CARRIED = 7 ! of the exponential
+  integer :: k_
+  ! Of term k: its integral over the step, and that times the time from the middle.
+  real(dp), parameter :: MEANS(LEAST_ORDER) = [(1.0_dp/real(k_ + 1, dp), k_=1, LEAST_ORDER)]
+  real(dp), parameter :: MOMENTS(LEAST_ORDER) = &
+                         [(real(k_, dp)/real(2*(k_ + 1)*(k_ + 2), dp), k_=1, LEAST_ORDER)]
 
   public :: carry, expand, fitting, following, inside, rescale, size_of
 
@@ -25,9 +30,9 @@ contains
 
   ! unroll: expand
   subroutine expand(order, s)
-    !! Terms 1 to `order`, even, of equations 13-15, and their sum; the lanes carried over the step.
+    !! Terms 1 to `order`, even, of equations 13-15, and their sum.
     integer(c_int), intent(in), value :: order
-    type(series_t), intent(inout) :: s !! terms(:, 0), torque, factors and lanes are given
+    type(series_t), intent(inout) :: s !! terms(:, 0), torque and factors are given
     real(dp) :: products(3)            ! of equations 13-15, (rad/s)**2
     integer :: j, k
 
@@ -40,32 +45,55 @@ contains
       s%terms(4, k) = 0.0_dp
     end do
     s%change = sum(s%terms(:, order:1:-1), dim=2)
-    call carry(s)
   end subroutine expand
   ! end unroll
 
-  ! unroll: carry
   pure subroutine carry(s)
-    !! Small differences over a step: the linear part of the recurrence of the terms.
+    !! Small differences over a step, by Magnus's series to fourth order: the exponential of the
+    !! mean of the Jacobian, less its commutator with the first moment about the middle.
     type(series_t), intent(inout) :: s
-    real(dp) :: d(4, 3, 0:ORDER_CARRIED)
-    integer :: i, j, k
+    real(dp), dimension(4) :: mean, moment
+    real(dp) :: c(3)                   ! their cross product
+    real(dp) :: o(6)                   ! the matrix, by rows; its diagonal is 0
+    integer :: i
 
-    d(:, :, 0) = s%lanes
-    do k = 1, ORDER_CARRIED
-      d(:, :, k) = 0.0_dp
-      do j = 0, k - 1
-        do i = 1, 4
-          d(i, :, k) = d(i, :, k) + cshift(s%terms(:3, j), 1)*cshift(d(i, :, k - 1 - j), 2) &
-                       + cshift(s%terms(:3, j), 2)*cshift(d(i, :, k - 1 - j), 1)
-        end do
-      end do
-      do i = 1, 4
-        d(i, :, k) = (s%factors(:3)*d(i, :, k))/k
-      end do
+    do i = 1, 4
+      mean(i) = s%terms(i, 0) + s%terms(i, 1)*MEANS(1) + s%terms(i, 2)*MEANS(2) &
+                + s%terms(i, 3)*MEANS(3) + s%terms(i, 4)*MEANS(4) + s%terms(i, 5)*MEANS(5) &
+                + s%terms(i, 6)*MEANS(6) + s%terms(i, 7)*MEANS(7) + s%terms(i, 8)*MEANS(8)
+      moment(i) = s%terms(i, 1)*MOMENTS(1) + s%terms(i, 2)*MOMENTS(2) + s%terms(i, 3)*MOMENTS(3) &
+                  + s%terms(i, 4)*MOMENTS(4) + s%terms(i, 5)*MOMENTS(5) + s%terms(i, 6)*MOMENTS(6) &
+                  + s%terms(i, 7)*MOMENTS(7) + s%terms(i, 8)*MOMENTS(8)
     end do
-    s%lanes = sum(d, dim=3)
+    c(1) = mean(2)*moment(3) - mean(3)*moment(2)
+    c(2) = mean(3)*moment(1) - mean(1)*moment(3)
+    c(3) = mean(1)*moment(2) - mean(2)*moment(1)
+    o(1) = s%factors(1)*(mean(3) + s%factors(3)*c(3))
+    o(2) = s%factors(1)*(mean(2) - s%factors(2)*c(2))
+    o(3) = s%factors(2)*(mean(3) - s%factors(3)*c(3))
+    o(4) = s%factors(2)*(mean(1) + s%factors(1)*c(1))
+    o(5) = s%factors(3)*(mean(2) + s%factors(2)*c(2))
+    o(6) = s%factors(3)*(mean(1) - s%factors(1)*c(1))
+    call multiply(o, s%lanes)
   end subroutine carry
+
+  ! unroll: multiply
+  pure subroutine multiply(o, lanes)
+    !! The exponential of a matrix without diagonal, times vectors side by side.
+    real(dp), intent(in) :: o(6)       !! the matrix, by rows
+    real(dp), intent(inout) :: lanes(4, 3)
+    real(dp) :: d(4, 3), rise(4, 3)
+    integer :: k
+
+    d = lanes
+    do k = ORDER_CARRIED, 1, -1
+      rise(:, 1) = o(1)*d(:, 2) + o(2)*d(:, 3)
+      rise(:, 2) = o(3)*d(:, 1) + o(4)*d(:, 3)
+      rise(:, 3) = o(5)*d(:, 1) + o(6)*d(:, 2)
+      d = lanes + rise/k
+    end do
+    lanes = d
+  end subroutine multiply
   ! end unroll
 
   pure subroutine following(h, s, order, allowed, decay, next)

@@ -23,14 +23,11 @@ MODULES = (
 )
 LEAST_ORDER, MOST_ORDER = 8, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
-ORDER_CARRIED = 8
-# The two factors of the products in equations 13-15.
-FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
+ORDER_CARRIED = 7
 # Where series_t has them, from its beginning.
 TORQUE = 4 * (MOST_ORDER + 1)
 RATES = TORQUE + 4 * MOST_ORDER
 CHANGE = RATES + 4
-LANES = CHANGE + 4
 
 
 def main(level: str, target: str, *sources: str) -> None:
@@ -74,50 +71,11 @@ def recurrence(order: int) -> Iterator[str]:
         yield f"t{k} = w{k}*a{n} + s{k}"
 
 
-def woven(order: int) -> Iterator[str]:
-    """Yield the recurrence with the differences carried in the time that it waits for itself."""
-    waiting = list(carried())
-    share = len(waiting) // (order - 1) + 1
-    for line in recurrence(order):
-        yield line
-        term = re.match(r"t(\d+) ", line)
-        if not term:
-            continue
-        k = int(term[1])
-        if k == 5:
-            yield "c = t4 + t5"
-        elif k > 5:
-            yield f"c = c + t{k}"
-        for _ in range(share):
-            if waiting and waiting[0][0] < k:
-                yield waiting.pop(0)[1]
-    yield from (line for _, line in waiting)
-    yield from (f"c = c + t{k}" for k in (3, 2, 1))
-
-
 def tail(order: int) -> Iterator[str]:
     """Yield the sum of the terms, small ones first as far as they need not be waited for."""
     yield "c = t4 + t5"
     yield from (f"c = c + t{k}" for k in range(6, order + 1))
     yield from (f"c = c + t{k}" for k in (3, 2, 1))
-
-
-def carried() -> Iterator[tuple[int, str]]:
-    """Yield what small differences become over the step, and which term each statement needs.
-
-    The linear part of the recurrence: x, y, z are the differences, side by side in four lanes; X, Y,
-    Z the terms, in all of them.
-    """
-    for k in range(1, ORDER_CARRIED + 1):
-        for axis, (name, (u, v)) in enumerate(zip("xyz", FACTORS, strict=True)):
-            more = ""
-            for j in range(k - 1, -1, -1):
-                for one, other in ((u, v), (v, u)):
-                    yield j, f"{name}{k} = {one.upper()}{j}*{other}{k - 1 - j}{more}"
-                    more = f" + {name}{k}"
-            yield 0, f"{name}{k} = {name}{k}*{'jkl'[axis]}{k}"
-    for name in "xyz":
-        yield from ((0, f"{name}0 = {name}0 + {name}{k}") for k in range(1, ORDER_CARRIED + 1))
 
 
 # ---- Fortran ------------------------------------------------------------------------------------
@@ -129,7 +87,7 @@ def fortran_source(text: str, level: str) -> str:
         text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{level}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
     expand = fortran_terms() if level == "plain" else fortran_door(level)
-    written = {"expand": expand, "carry": fortran_carry()}
+    written = {"expand": expand, "multiply": fortran_multiply()}
     blocks = re.split(r" *! unroll: (\w+)\n.*?! end unroll\n", text, flags=re.DOTALL)
     parts = [blocks[0]]
     for name, rest in zip(blocks[1::2], blocks[2::2], strict=True):
@@ -186,12 +144,11 @@ def fortran_terms() -> Iterator[str]:
 
 
 def end_of_terms(indent: str) -> Iterator[str]:
-    """Yield the largest terms' part in the sum, and the differences over the step."""
+    """Yield the largest terms' part in the sum."""
     for axis in (1, 2, 3):
         terms = f"((c_{axis} + t3_{axis}) + t2_{axis}) + t1_{axis}"
         yield f"{indent}s%change({axis}) = {terms}"
     yield f"{indent}s%change(4) = 0.0_dp"
-    yield f"{indent}call carry(s)"
 
 
 def fortran(line: str, axis: int) -> str:
@@ -207,22 +164,25 @@ def fortran(line: str, axis: int) -> str:
     return re.sub(r"\b([a-z])(\d*)\b", place, line)
 
 
-def fortran_carry() -> Iterator[str]:
-    """Yield the linear part of the recurrence, for vectors side by side."""
-    names = [f"{name}{k}" for k in range(ORDER_CARRIED + 1) for name in "xyz"]
-    yield "pure subroutine carry(s)"
-    yield "  type(series_t), intent(inout) :: s"
-    yield from (f"  real(dp) :: {name}" for name in names)
+def fortran_multiply() -> Iterator[str]:
+    """Yield the exponential of a matrix without diagonal, times vectors side by side."""
+    yield "pure subroutine multiply(o, lanes)"
+    yield "  real(dp), intent(in) :: o(6)"
+    yield "  real(dp), intent(inout) :: lanes(4, 3)"
+    yield "  real(dp) :: x, y, z, u, v, w, p, q, r"
     yield "  integer :: i"
     yield "  do i = 1, 4"
-    yield from (f"    {name}0 = s%lanes(i, {axis})" for axis, name in enumerate("xyz", 1))
-    for _, line in carried():
-        line = re.sub(r"([XYZ])(\d+)", lambda found: f"s%terms({'XYZ'.index(found[1]) + 1}, {found[2]})", line)
-        line = re.sub(r"([jkl])(\d+)", lambda found: f"(s%factors({'jkl'.index(found[1]) + 1})*(1.0_dp/{found[2]}.0_dp))", line)
-        yield f"    {line}"
-    yield from (f"    s%lanes(i, {axis}) = {name}0" for axis, name in enumerate("xyz", 1))
+    for axis, (name, copy) in enumerate(zip("xyz", "uvw", strict=True), 1):
+        yield f"    {name} = lanes(i, {axis})"
+        yield f"    {copy} = {name}"
+    for k in range(ORDER_CARRIED, 0, -1):
+        yield f"    p = x + (o(1)*v + o(2)*w)*(1.0_dp/{k}.0_dp)"
+        yield f"    q = y + (o(3)*u + o(4)*w)*(1.0_dp/{k}.0_dp)"
+        yield f"    r = z + (o(5)*u + o(6)*v)*(1.0_dp/{k}.0_dp)"
+        yield from ("    u = p", "    v = q", "    w = r")
+    yield from (f"    lanes(i, {axis}) = {name}" for axis, name in enumerate("uvw", 1))
     yield "  end do"
-    yield "end subroutine carry"
+    yield "end subroutine multiply"
 
 
 # ---- C ------------------------------------------------------------------------------------------
@@ -242,12 +202,8 @@ def c_source(level: str) -> Iterator[str]:
         yield "{"
         yield f"  const __m256d f = {load(RATES)}, t0 = {load(0)};"
         yield "  const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
-        for axis, name in enumerate("xyz"):
-            yield f"  __m256d {name}0 = {load(LANES + 4 * axis)};"
-            yield f"  const __m256d {'jkl'[axis]} = _mm256_broadcast_sd(s + {RATES + axis});"
-            yield f"  const __m256d {name.upper()}0 = _mm256_broadcast_sd(s + {axis});"
-        known = {"x0", "y0", "z0"}
-        for line in woven(order):
+        known: set[str] = set()
+        for line in recurrence(order):
             yield f"  {c(line, known)}"
             term = re.match(r"t(\d+) ", line)
             if not term:
@@ -256,11 +212,12 @@ def c_source(level: str) -> Iterator[str]:
             yield f"  _mm256_store_pd(s + {4 * k}, t{k});"
             if k < order:
                 yield f"  const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
-            if k < ORDER_CARRIED:
-                for axis, name in enumerate("XYZ"):
-                    yield f"  const __m256d {name}{k} = _mm256_broadcast_sd(s + {4 * k + axis});"
+            if k == 5:
+                yield f"  {c('c = t4 + t5', known)}"
+            elif k > 5:
+                yield f"  {c(f'c = c + t{k}', known)}"
+        yield from (f"  {c(f'c = c + t{k}', known)}" for k in (3, 2, 1))
         yield f"  _mm256_store_pd(s + {CHANGE}, c);"
-        yield from (f"  _mm256_store_pd(s + {LANES + 4 * axis}, {name}0);" for axis, name in enumerate("xyz"))
         yield "}\n"
     yield f"void taylor_terms_{level}(int order, double *s)"
     yield "{"
@@ -273,7 +230,6 @@ def c_source(level: str) -> Iterator[str]:
 def c(line: str, known: set[str]) -> str:
     """Return a statement for a register, declaring what it names first."""
     target, value = line.split(" = ")
-    value = re.sub(r"\b([jkl])(\d+)", r"_mm256_mul_pd(\1, _mm256_set1_pd(1.0 / \2))", value)
     value = re.sub(r"\bi(\d+)", r"_mm256_set1_pd(1.0 / \1)", value)
     value = re.sub(r"\bm(\d+)", lambda found: load(TORQUE + 4 * int(found[1]) - 4), value)
     first, _, second = value.partition(" + ")

@@ -180,6 +180,7 @@ contains
     real(dp) :: longest       ! turn of a wave
     logical :: at_end
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
+    integer(int64) :: part    ! 65536 over the order
     integer :: order
     integer :: i, tries
     integer(int64) :: next_look  ! steps
@@ -203,6 +204,7 @@ contains
                   max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0)
     call plan(problem, now%scale, tolerance, rest, order, share, h)
     finest = share <= LEAST_SHARE
+    part = 65536/order
     if (size(waves) > 0) longest = longest_turn(order, share)
     s%torque = 0.0_dp
     coefficients = [problem%coefficients, 0.0_dp]
@@ -228,14 +230,14 @@ contains
       call expand(order, s)
       last = size_of(s, order)
       if (steps == 0) then
-        call following(h, s, order, allowed, decay, next)
+        call following(h, s, order, part, allowed, decay, next)
         ! What a body at rest is about to reach.
         now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
         allowed = share*now%scale
         ! From rest a torque that grows with time makes every third term only.
         last = last + size_of(s, order - 2)
       end if
-      call following(h, s, order, allowed, decay, next)
+      call following(h, s, order, part, allowed, decay, next)
       if ((.not. last <= SLACK*allowed) .or. (steps == 0 .and. tries == 0)) then
         ! The first step is a guess, and a later one may be too long: the terms need only a factor.
         tries = tries + 1

@@ -4,7 +4,7 @@ module taylor_series
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use torque_terms, only: LEAST_ORDER, MOST_ORDER
+  use torque_terms, only: MOST_ORDER
   implicit none(type, external)
   private
 
@@ -18,11 +18,12 @@ module taylor_series
   end type series_t
 
   integer, parameter :: ORDER_CARRIED = 7 ! of the exponential
+  integer, parameter :: MOST_MOMENTS = 8 ! terms that count in them
   integer :: k_
   ! Of term k: its integral over the step, and that times the time from the middle.
-  real(dp), parameter :: MEANS(LEAST_ORDER) = [(1.0_dp/real(k_ + 1, dp), k_=1, LEAST_ORDER)]
-  real(dp), parameter :: MOMENTS(LEAST_ORDER) = &
-                         [(real(k_, dp)/real(2*(k_ + 1)*(k_ + 2), dp), k_=1, LEAST_ORDER)]
+  real(dp), parameter :: MEANS(MOST_MOMENTS) = [(1.0_dp/real(k_ + 1, dp), k_=1, MOST_MOMENTS)]
+  real(dp), parameter :: MOMENTS(MOST_MOMENTS) = &
+                         [(real(k_, dp)/real(2*(k_ + 1)*(k_ + 2), dp), k_=1, MOST_MOMENTS)]
 
   public :: carry, expand, fitting, following, inside, rescale, size_of
 
@@ -55,15 +56,17 @@ contains
     real(dp), dimension(4) :: mean, moment
     real(dp) :: c(3)                   ! their cross product
     real(dp) :: o(6)                   ! the matrix, by rows; its diagonal is 0
-    integer :: i
+    integer :: i, k
 
     do i = 1, 4
-      mean(i) = s%terms(i, 0) + s%terms(i, 1)*MEANS(1) + s%terms(i, 2)*MEANS(2) &
-                + s%terms(i, 3)*MEANS(3) + s%terms(i, 4)*MEANS(4) + s%terms(i, 5)*MEANS(5) &
-                + s%terms(i, 6)*MEANS(6) + s%terms(i, 7)*MEANS(7) + s%terms(i, 8)*MEANS(8)
-      moment(i) = s%terms(i, 1)*MOMENTS(1) + s%terms(i, 2)*MOMENTS(2) + s%terms(i, 3)*MOMENTS(3) &
-                  + s%terms(i, 4)*MOMENTS(4) + s%terms(i, 5)*MOMENTS(5) + s%terms(i, 6)*MOMENTS(6) &
-                  + s%terms(i, 7)*MOMENTS(7) + s%terms(i, 8)*MOMENTS(8)
+      mean(i) = s%terms(i, 0)
+      moment(i) = 0.0_dp
+    end do
+    do k = 1, MOST_MOMENTS
+      do i = 1, 4
+        mean(i) = mean(i) + s%terms(i, k)*MEANS(k)
+        moment(i) = moment(i) + s%terms(i, k)*MOMENTS(k)
+      end do
     end do
     c(1) = mean(2)*moment(3) - mean(3)*moment(2)
     c(2) = mean(3)*moment(1) - mean(1)*moment(3)
@@ -96,13 +99,14 @@ contains
   end subroutine multiply
   ! end unroll
 
-  pure subroutine following(h, s, order, allowed, decay, next)
+  pure subroutine following(h, s, order, part, allowed, decay, next)
     !! The step with which the order would just do, from the terms before the last two and the
     !! decay seen in the step before, so that the processor need not wait for the last terms.
     !! The bits of a positive number, read as an integer, are its logarithm: 6 % suffice here.
     real(dp), intent(in) :: h                !! s
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
+    integer(int64), intent(in) :: part       !! 65536 over the order: a division would be waited for
     real(dp), intent(in) :: allowed          !! rad/s
     integer(int64), intent(inout) :: decay   !! logarithm, over two orders
     real(dp), intent(out) :: next            !! s
@@ -111,7 +115,7 @@ contains
 
     before = transfer(size_of(s, order - 2), before)
     change = transfer(allowed, change) - before - decay
-    change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), change/order))
+    change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), shifta(change, 16)*part))
     next = transfer(transfer(h, change) + change, h)
     decay = transfer(size_of(s, order), before) - before
   end subroutine following

@@ -6,7 +6,7 @@ module torque_terms
   implicit none(type, external)
   private
 
-  integer, parameter, public :: LEAST_ORDER = 8, MOST_ORDER = 24 ! of the series
+  integer, parameter, public :: LEAST_ORDER = 12, MOST_ORDER = 24 ! of the series
   ! Vectors of weights: eight orders more than the series has, for sine and cosine of the turn.
   integer, parameter :: MOST_FOURS = (MOST_ORDER + 8)/4 - 1
   integer :: order_

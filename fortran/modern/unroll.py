@@ -21,7 +21,7 @@ MODULES = (
     "taylor_error",
     "taylor",
 )
-LEAST_ORDER, MOST_ORDER = 8, 24
+LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
 # Where series_t has them, from its beginning.

@@ -128,7 +128,7 @@ contains
     needed = 0.0_dp
     call waves_of(problem, waves)
     do
-      call march(problem, omega, asked, most - spent, &
+      call march(problem, omega, asked, tolerance, most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, int64), n_times, times, room%s, room%blocks, &
                  room%now, waves, rows, n_rows, status, steps, error, found(2), ahead, finest)
       if (status == GAVE_UP) then
@@ -138,19 +138,27 @@ contains
         steps = steps + int(spent, int64)
       end if
       spent = spent + real(steps, dp)
-      if (status /= COMPLETE .or. finest .or. error <= tolerance) exit
-      ! Once more, with less of what a step errs.
-      asked = asked*max(ROUNDING, tolerance/(SAFETY*error))
+      if (status /= COMPLETE .or. finest) exit
+      if (ROUNDING*found(2) > UNSURE*tolerance) then
+        ! Before that is said: long steps may make much of a motion near the separatrix.
+        asked = 0.0_dp
+      else if (error > tolerance) then
+        ! Once more, with less of what a step errs.
+        asked = asked*(tolerance/(SAFETY*error))
+      else
+        exit
+      end if
     end do
     found(1) = error + ROUNDING*found(2)
     if (status == COMPLETE .and. ROUNDING*found(2) > UNSURE*tolerance) status = SENSITIVE
   end subroutine solve
 
-  subroutine march(problem, omega, tolerance, most_steps, stride, n_times, times, s, blocks, now, &
-                   waves, rows, n_rows, status, steps, error, growth, ahead, finest)
+  subroutine march(problem, omega, asked, tolerance, most_steps, stride, n_times, times, s, &
+                   blocks, now, waves, rows, n_rows, status, steps, error, growth, ahead, finest)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
+    real(dp), intent(in) :: asked                       !! tolerance of this march
     real(dp), intent(in) :: tolerance                   !! of the error at `times`, relative
     real(dp), intent(in) :: most_steps
     integer(int64), intent(in) :: stride                !! steps between looks at the user
@@ -202,7 +210,7 @@ contains
     end if
     now = state_t([omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
                   max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0)
-    call plan(problem, now%scale, tolerance, rest, order, share, h)
+    call plan(problem, now%scale, asked, rest, order, share, h)
     finest = share <= LEAST_SHARE
     part = 65536/order
     if (size(waves) > 0) longest = longest_turn(order, share)
@@ -266,7 +274,8 @@ contains
       before = s%lanes(1, :)
       call carry(s)
       call leave_out(s, order, 1.0_dp/allowed, left)
-      call add_rows(s, order, h, at_end, before, left(:3), n_times, times, now, rows, n_rows, status)
+      call add_rows(s, order, h, at_end, before, left(:3), n_times, times, tolerance, now, rows, n_rows, &
+                    status)
       if (status /= COMPLETE) exit
       call count_step(s%lanes, blocks)
       call add_change(s%change, now)
@@ -277,7 +286,7 @@ contains
         exit
       end if
       if (at_end) then
-        call add_row(now%w(:3), now%w_low(:3), s%lanes(1, :), now, rows(:, n_times))
+        call add_row(now%w(:3), now%w_low(:3), s%lanes(1, :), tolerance, now, rows(:, n_times))
         n_rows = n_times
         exit
       end if
@@ -327,7 +336,8 @@ contains
     end if
   end subroutine fit_to_end
 
-  subroutine add_rows(s, order, h, at_end, before, left, n_times, times, now, rows, n_rows, status)
+  subroutine add_rows(s, order, h, at_end, before, left, n_times, times, tolerance, now, &
+                      rows, n_rows, status)
     !! Rows within the step, but for the last of all, from its terms; the error by Hermite's cubic.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
@@ -337,6 +347,7 @@ contains
     real(dp), intent(in) :: left(3)         !! what the step left out, rad/s
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)
+    real(dp), intent(in) :: tolerance
     type(state_t), intent(inout) :: now
     real(dp), intent(inout) :: rows(3, n_times)
     integer, intent(inout) :: n_rows, status
@@ -359,7 +370,7 @@ contains
       call add_row(now%w(:3), now%w_low(:3) + inside(s, order, part), &
                    (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
                    + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
-                   - part**(order + 1)*left, now, rows(:, n_rows + 1))
+                   - part**(order + 1)*left, tolerance, now, rows(:, n_rows + 1))
       if (.not. all(abs(rows(:, n_rows + 1)) <= huge(h))) then
         status = OVERFLOW
         return
@@ -384,17 +395,19 @@ contains
     rise(3) = factors(3)*(w(1)*error(2) + w(2)*error(1))
   end function rise
 
-  pure subroutine add_row(w, small, error, now, row)
-    !! A row, its error taken off where it is small enough to be known.
+  pure subroutine add_row(w, small, error, tolerance, now, row)
+    !! A row, its error taken off where it is small enough to be known: an estimate that is wrong
+    !! costs no more than the tolerance.
     real(dp), intent(in) :: w(3), small(3) !! whose sum is omega, rad/s
     real(dp), intent(in) :: error(3)       !! rad/s
+    real(dp), intent(in) :: tolerance
     type(state_t), intent(inout) :: now
     real(dp), intent(out) :: row(3)        !! rad/s
     real(dp) :: size
 
     size = max(abs(error(1)), abs(error(2)), abs(error(3)))
     if (.not. size <= now%worst) now%worst = size
-    if (size <= LINEAR*now%scale) then
+    if (size <= min(LINEAR, tolerance)*now%scale) then
       row = w + (small - error)
     else
       row = w + small

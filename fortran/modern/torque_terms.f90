@@ -7,12 +7,20 @@ module torque_terms
   private
 
   integer, parameter, public :: LEAST_ORDER = 12, MOST_ORDER = 24 ! of the series
-  ! Vectors of weights: eight orders more than the series has, for sine and cosine of the turn.
-  integer, parameter :: MOST_FOURS = (MOST_ORDER + 8)/4 - 1
+  ! Weights in fours: eight orders more than the series has, for sine and cosine of the turn.
+  integer, parameter :: MOST_FOURS = MOST_ORDER/4 + 2
   integer :: order_
-  real(dp), parameter :: FACTORIALS(4*MOST_FOURS + 4) = &
-                         [(1.0_dp/gamma(real(order_ + 1, dp)), order_=1, 4*MOST_FOURS + 4)]
-  real(dp), parameter :: SIGNS(4) = [1.0_dp, 1.0_dp, -1.0_dp, -1.0_dp]
+  real(dp), parameter :: FACTORIALS(4*MOST_FOURS + 1) = &
+                         [(gamma(real(order_ + 1, dp)), order_=1, 4*MOST_FOURS + 1)]
+  integer, parameter :: SIGNS(0:3) = [1, 1, -1, -1]
+  real(dp), parameter :: WEIGHTS(4, MOST_FOURS) = &
+                         reshape([(SIGNS(mod(order_ - 1, 4))/gamma(real(order_ + 1, dp)), &
+                                   order_=1, 4*MOST_FOURS)], [4, MOST_FOURS])
+  ! Lanes of powers are put together without a store, for which the next load would wait.
+  real(dp), parameter :: LANES(4, 0:3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, &
+                                                  0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, &
+                                                  0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
+                                                  0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [4, 4])
   integer, parameter, public :: AFRESH = 16   ! steps until sine and cosine are made anew
   real(dp), parameter :: SMALL_TURN = 1e-8_dp ! rad; its square no longer counts
   real(dp), parameter :: PHASE = 0.01_dp      ! of the share that a turn may err
@@ -25,6 +33,9 @@ module torque_terms
     real(dp) :: slope         !! its derivative by the angle
     real(dp) :: sine          !! of the turn in the step
     real(dp) :: versine       !! 1 - cosine
+    real(dp) :: even(4)       !! amplitude times value and step, rad/s
+    real(dp) :: odd(4)        !! amplitude times slope and step, rad/s
+    real(dp) :: parts(4, MOST_FOURS) !! of even and odd, in turn, in the terms
     logical :: is_sine
   end type wave_t
 
@@ -35,16 +46,18 @@ contains
   pure subroutine waves_of(problem, waves)
     !! Sines, then cosines.
     type(problem_t), intent(in) :: problem
-    type(wave_t), intent(out) :: waves(problem%n_sines + problem%n_cosines)
+    type(wave_t), intent(inout) :: waves(problem%n_sines + problem%n_cosines)
     integer :: n
 
     do n = 1, problem%n_sines
-      waves(n) = wave_t([problem%sines(:3, n), 0.0_dp], problem%sines(4, n), &
-                        0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, .true.)
+      waves(n)%amplitude = [problem%sines(:3, n), 0.0_dp]
+      waves(n)%frequency = problem%sines(4, n)
+      waves(n)%is_sine = .true.
     end do
-    do n = 1, problem%n_cosines
-      waves(problem%n_sines + n) = wave_t([problem%cosines(:3, n), 0.0_dp], problem%cosines(4, n), &
-                                          0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, .false.)
+    do n = problem%n_sines + 1, problem%n_sines + problem%n_cosines
+      waves(n)%amplitude = [problem%cosines(:3, n - problem%n_sines), 0.0_dp]
+      waves(n)%frequency = problem%cosines(4, n - problem%n_sines)
+      waves(n)%is_sine = .false.
     end do
   end subroutine waves_of
 
@@ -52,16 +65,16 @@ contains
     !! Turn of a wave up to which its weights give its sine and cosine, rad.
     integer, intent(in) :: order    !! of the series
     real(dp), intent(in) :: share   !! that a step may err
-    integer :: weights
+    integer :: n
 
-    weights = 4*(fours_of(order) + 1)
-    longest_turn = (PHASE*share*gamma(real(weights + 2, dp)))**(1.0_dp/real(weights, dp))
+    n = 4*fours_of(order)
+    longest_turn = (PHASE*share*FACTORIALS(n + 1))**(1.0_dp/real(n, dp))
   end function longest_turn
 
   pure integer function fours_of(order)
     integer, intent(in) :: order
 
-    fours_of = min(MOST_FOURS, (order + 7)/4)
+    fours_of = (order + 11)/4
   end function fours_of
 
   pure subroutine torque_terms_at(constant, rate, t, t_low, h, order, longest, fresh, waves, torque)
@@ -76,32 +89,51 @@ contains
     logical, intent(in) :: fresh       !! sine and cosine of t, not by the turns so far
     type(wave_t), intent(inout) :: waves(:)
     real(dp), intent(inout) :: torque(4, MOST_ORDER) !! from the third order 0 without waves
-    integer :: i, n
+    real(dp), dimension(4) :: p, q, r, u
+    integer :: i, j, n
 
-    do i = 1, 4
-      torque(i, 1) = h*(constant(i) + rate(i)*t + rate(i)*t_low)
-      torque(i, 2) = (0.5_dp*h)*(h*rate(i))
-    end do
-    if (size(waves) > 0) torque(:, 3:4*((order + 3)/4)) = 0.0_dp
     do n = 1, size(waves)
-      call add_wave(t, t_low, h, order, longest, fresh, waves(n), torque)
+      call weigh(t, t_low, h, order, longest, fresh, waves(n))
+    end do
+    ! What the rest of the torque adds begins two of the sums.
+    do i = 1, 4
+      p(i) = h*(constant(i) + rate(i)*t + rate(i)*t_low)
+      q(i) = (0.5_dp*h)*(h*rate(i))
+    end do
+    do j = 1, merge((order + 3)/4, 1, size(waves) > 0)
+      r = 0.0_dp
+      u = 0.0_dp
+      do n = 1, size(waves)
+        do i = 1, 4
+          p(i) = p(i) + waves(n)%parts(1, j)*waves(n)%even(i)
+          q(i) = q(i) + waves(n)%parts(2, j)*waves(n)%odd(i)
+          r(i) = r(i) + waves(n)%parts(3, j)*waves(n)%even(i)
+          u(i) = u(i) + waves(n)%parts(4, j)*waves(n)%odd(i)
+        end do
+      end do
+      do i = 1, 4
+        torque(i, 4*j - 3) = p(i)
+        torque(i, 4*j - 2) = q(i)
+        torque(i, 4*j - 1) = r(i)
+        torque(i, 4*j) = u(i)
+      end do
+      p = 0.0_dp
+      q = 0.0_dp
     end do
   end subroutine torque_terms_at
 
-  pure subroutine add_wave(t, t_low, h, order, longest, fresh, wave, torque)
+  pure subroutine weigh(t, t_low, h, order, longest, fresh, wave)
     !! The derivatives of a wave run value, slope, -value, -slope; term k has turn**(k - 1)/k! of
     !! them. Those weights know no phase: their sums are the sine and the versine of the turn.
     real(dp), intent(in) :: t, t_low, h, longest
     integer, intent(in) :: order
     logical, intent(in) :: fresh
     type(wave_t), intent(inout) :: wave
-    real(dp), intent(inout) :: torque(4, MOST_ORDER)
-    real(dp) :: weights(4, 0:MOST_FOURS)
-    real(dp) :: powers(4), totals(4), even(4), odd(4)
+    real(dp) :: powers(4), totals(4)
     real(dp) :: turn                   ! rad
-    real(dp) :: fourth                 ! power of the turn
+    real(dp) :: square, fourth         ! powers of the turn
     real(dp) :: sine, cosine
-    integer :: i, j, k
+    integer :: i, j
 
     if (fresh) then
       call sine_cosine(wave%frequency, t, t_low, sine, cosine)
@@ -109,15 +141,18 @@ contains
       wave%slope = merge(cosine, -sine, wave%is_sine)
     end if
     turn = wave%frequency*h
-    powers = [1.0_dp, turn, turn*turn, turn*turn*turn]
-    fourth = powers(3)*powers(3)
+    square = turn*turn
+    fourth = square*square
     ! Smaller numbers than that cost the processor time, and count for nothing.
     if (abs(turn) < SMALL_TURN) fourth = 0.0_dp
-    totals = 0.0_dp
-    do j = 0, fours_of(order)
+    do i = 1, 4
+      powers(i) = (LANES(i, 0) + turn*LANES(i, 1)) + square*(LANES(i, 2) + turn*LANES(i, 3))
+      totals(i) = 0.0_dp
+    end do
+    do j = 1, fours_of(order)
       do i = 1, 4
-        weights(i, j) = powers(i)*(SIGNS(i)*FACTORIALS(4*j + i))
-        totals(i) = totals(i) + weights(i, j)
+        wave%parts(i, j) = powers(i)*WEIGHTS(i, j)
+        totals(i) = totals(i) + powers(i)*WEIGHTS(i, j)
         powers(i) = powers(i)*fourth
       end do
     end do
@@ -130,18 +165,10 @@ contains
       wave%versine = 2.0_dp*sine*sine
     end if
     do i = 1, 4
-      even(i) = (h*wave%value)*wave%amplitude(i)
-      odd(i) = (h*wave%slope)*wave%amplitude(i)
+      wave%even(i) = (h*wave%value)*wave%amplitude(i)
+      wave%odd(i) = (h*wave%slope)*wave%amplitude(i)
     end do
-    do k = 0, (order - 1)/4
-      do i = 1, 4
-        torque(i, 4*k + 1) = torque(i, 4*k + 1) + weights(1, k)*even(i)
-        torque(i, 4*k + 2) = torque(i, 4*k + 2) + weights(2, k)*odd(i)
-        torque(i, 4*k + 3) = torque(i, 4*k + 3) + weights(3, k)*even(i)
-        torque(i, 4*k + 4) = torque(i, 4*k + 4) + weights(4, k)*odd(i)
-      end do
-    end do
-  end subroutine add_wave
+  end subroutine weigh
 
   pure subroutine turn_waves(waves)
     !! To the end of the step.

@@ -24,6 +24,14 @@ MODULES = (
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
+# The two factors of the products in equations 13-15, and where the plain code has each unknown.
+FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
+PLACES = {
+    "x": ("left(2", "left(3"),
+    "y": ("left(1", "right(3"),
+    "z": ("right(1", "right(2"),
+}
+WIDE, LAG = 10, 2  # from this order on; the newest terms that are left out
 # Where series_t has them, from its beginning.
 TORQUE = 4 * (MOST_ORDER + 1)
 RATES = TORQUE + 4 * MOST_ORDER
@@ -71,13 +79,6 @@ def recurrence(order: int) -> Iterator[str]:
         yield f"t{k} = w{k}*a{n} + s{k}"
 
 
-def tail(order: int) -> Iterator[str]:
-    """Yield the sum of the terms, small ones first as far as they need not be waited for."""
-    yield "c = t4 + t5"
-    yield from (f"c = c + t{k}" for k in range(6, order + 1))
-    yield from (f"c = c + t{k}" for k in (3, 2, 1))
-
-
 # ---- Fortran ------------------------------------------------------------------------------------
 
 
@@ -113,55 +114,96 @@ end subroutine expand""".splitlines()
 
 
 def fortran_terms() -> Iterator[str]:
-    """Yield the recurrence to each order, each unknown by itself."""
-    statements = list(recurrence(MOST_ORDER))
-    names = {name for line in statements for name in re.findall(r"\b[tqrvwusgh]\d*\b", line)}
+    """Yield the recurrence for a processor that has no register of four.
+
+    An unknown by itself at low orders, then the older products of all three side by side. Numbers
+    just stored one by one can't be loaded together without a wait: the newest two terms of each
+    factor stay out of those sums.
+    """
     yield "subroutine expand(order, s)"
     yield "  integer(c_int), intent(in), value :: order"
     yield "  type(series_t), intent(inout) :: s"
-    for name in sorted(names | {"t0", "c"}):
-        yield f"  real(dp) :: {name}_1, {name}_2, {name}_3"
-    yield from (f"  t0_{axis} = s%terms({axis}, 0)" for axis in (1, 2, 3))
-    for line in statements:
-        yield from (f"  {fortran(line, axis)}" for axis in range(3))
-        term = re.match(r"t(\d+) ", line)
-        if not term:
-            continue
-        k = int(term[1])
-        yield from (f"  s%terms({axis}, {k}) = t{k}_{axis}" for axis in (1, 2, 3))
-        yield f"  s%terms(4, {k}) = 0.0_dp"
-        if k == LEAST_ORDER:
-            yield from (f"  {fortran(each, axis)}" for each in list(tail(k))[:-3] for axis in range(3))
-        elif k > LEAST_ORDER:
-            yield from (f"  {fortran(f'c = c + t{k}', axis)}" for axis in range(3))
-        if k in ORDERS[:-1]:
-            yield f"  if (order == {k}) then"
-            yield from end_of_terms("    ")
+    yield f"  real(dp), dimension(4, 0:{MOST_ORDER}) :: left, right"
+    yield "  real(dp) :: sums(4), even, odd"
+    names = [f"{name}{k}" for k in range(MOST_ORDER + 1) for name in "xyz"]
+    names += [f"{name}{axis}" for name in ("p", "pp", "q", "qq", "tail") for axis in (1, 2, 3)]
+    yield from (f"  real(dp) :: {name}" for name in names)
+    yield "  integer :: i"
+    yield from (f"  {name}0 = s%terms({axis}, 0)" for axis, name in enumerate("xyz", 1))
+    yield "  left(4, :) = 0.0_dp"
+    yield "  right(4, :) = 0.0_dp"
+    for n in range(0, MOST_ORDER, 2):
+        if n < WIDE:
+            yield from (f"  {line}" for line in known(n))
+        yield from (f"  {line}" for k, total in ((n + 1, "p"), (n + 2, "q")) for line in term(k, total))
+        if n + 2 in ORDERS[:-1]:
+            yield f"  if (order == {n + 2}) then"
+            yield from (f"    {line}" for line in end_of_terms())
             yield "    return"
             yield "  end if"
-    yield from end_of_terms("  ")
+    yield from (f"  {line}" for line in end_of_terms())
     yield "end subroutine expand"
 
 
-def end_of_terms(indent: str) -> Iterator[str]:
+def known(n: int) -> Iterator[str]:
+    """Yield p1 ... p3 and q1 ... q3: of the Cauchy products n and n + 1, what is known by now.
+
+    From the middle outwards, so that the newest terms come last; two orders at once, so that a
+    term that is loaded serves twice; two sums for each, so that one need not wait for itself.
+    """
+    begun = set()
+    for j in range((n + 1) // 2, 0, -1):
+        for total, i in (("p", n - j), ("q", n + 1 - j)):
+            if i < j or i >= n:
+                continue
+            for low, high in ((j, i), (i, j)) if i > j else ((j, i),):
+                for axis, (u, v) in enumerate(FACTORS, 1):
+                    place = f"{total}{axis}" if low <= high else f"{total}{total}{axis}"
+                    start = f"{place} + " if place in begun else ""
+                    begun.add(place)
+                    yield f"{place} = {start}{u}{low}*{v}{high}"
+    for place in sorted(begun):
+        if len(place) == 3:
+            yield f"{place[1:]} = {place[1:]} + {place}"
+
+
+def term(k: int, total: str) -> Iterator[str]:
+    """Yield term k of the three unknowns from the sums so far and the newest products."""
+    n = k - 1
+    if n >= WIDE:
+        older = sorted(range(LAG, n - LAG + 1), key=lambda j: max(j, n - j))
+        yield "do i = 1, 4"
+        for m, j in enumerate(older):
+            place = ("even", "odd")[m % 2]
+            yield f"  {place} = {f'{place} + ' if m > 1 else ''}left(i, {j})*right(i, {n - j})"
+        yield "  sums(i) = even + odd"
+        yield "end do"
+        newest = [pair for j in range(LAG - 1, -1, -1) for pair in ((j, n - j), (n - j, j))]
+    else:
+        newest = [(1, n - 1), (n - 1, 1)] if total == "q" and n > 2 else []
+        newest += [(0, n), (n, 0)] if n else [(0, 0)]
+    for axis, (u, v) in enumerate(FACTORS, 1):
+        place = f"{total}{axis}"
+        start = f"sums({axis}) + " if n >= WIDE else f"{place} + " if n == 2 or n > 3 else ""
+        for low, high in newest:
+            yield f"{place} = {start}{u}{low}*{v}{high}"
+            start = f"{place} + "
+    for axis, name in enumerate("xyz", 1):
+        factor = f"(s%factors({axis})*(1.0_dp/{k}.0_dp))"
+        yield f"{name}{k} = {factor}*{total}{axis} + s%torque({axis}, {k})"
+        yield f"s%terms({axis}, {k}) = {name}{k}"
+        if LAG <= k <= MOST_ORDER - LAG:
+            yield from (f"{place}, {k}) = {name}{k}" for place in PLACES[name])
+        if k >= 4:
+            yield f"tail{axis} = {f'tail{axis} + ' if k > 4 else ''}{name}{k}"
+    yield f"s%terms(4, {k}) = 0.0_dp"
+
+
+def end_of_terms() -> Iterator[str]:
     """Yield the largest terms' part in the sum."""
-    for axis in (1, 2, 3):
-        terms = f"((c_{axis} + t3_{axis}) + t2_{axis}) + t1_{axis}"
-        yield f"{indent}s%change({axis}) = {terms}"
-    yield f"{indent}s%change(4) = 0.0_dp"
-
-
-def fortran(line: str, axis: int) -> str:
-    """Return a statement for one axis, 0 to 2."""
-
-    def place(found: re.Match[str]) -> str:
-        kind, k = found[1], found[2]
-        if kind in "ab":
-            return f"t{k}_{(axis + 'ab'.index(kind) + 1) % 3 + 1}"
-        known = {"f": f"s%factors({axis + 1})", "i": f"(1.0_dp/{k}.0_dp)"}
-        return known.get(kind, f"s%torque({axis + 1}, {k})" if kind == "m" else f"{kind}{k}_{axis + 1}")
-
-    return re.sub(r"\b([a-z])(\d*)\b", place, line)
+    for axis, name in enumerate("xyz", 1):
+        yield f"s%change({axis}) = ((tail{axis} + {name}3) + {name}2) + {name}1"
+    yield "s%change(4) = 0.0_dp"
 
 
 def fortran_multiply() -> Iterator[str]:

@@ -427,7 +427,9 @@ static PyMethodDef methods[] = {
 };
 
 static PyGetSetDef attributes[] = {
-  {"_ending", get_ending, NULL, "This thread's last call, None before one: status, steps, error, growth, omega0, t_end.", NULL},
+  {"_ending", get_ending, NULL,
+   "Status, steps, error, growth, omega0 and t_end of this thread's last call; None before one.",
+   NULL},
   {NULL, NULL, NULL, NULL, NULL},
 };
 

@@ -149,8 +149,6 @@ class Solver(BoundKernel):
 
     def _found(self) -> tuple[str, float | None, float | None]:
         """Return status, error and growth of this thread's last call."""
-        from dataclasses import replace
-
         ending = self._ending
         if ending is None:
             return "complete", None, None
@@ -163,6 +161,8 @@ class Solver(BoundKernel):
         if self.plan.closed_form and not steps:
             error, growth = closed_form_estimate(scene.euler_coefficients, omega0, t_end)
         elif self.plan.method in GAUSS:
+            from dataclasses import replace
+
             growth = motion_growth(replace(scene, omega=omega0), t_end)
         else:
             return status, error, growth

@@ -84,8 +84,8 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)         ! s
   real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|
-  !f2py real(8), optional, intent(inout) :: effort(4) = 1.0
-  real(8), intent(inout) :: effort(4) ! factor on the limits; out: due, error, growth (or below 0)
+  !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
+  real(8), intent(inout) :: effort(5) ! factor on the limits; out: due; error, growth, all steps
   real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up, 6 sensitive
@@ -94,7 +94,7 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                               cosines), &
                     omega0, tolerance, effort(1), n_times, times, rows, n_rows, status, steps, &
-                    effort(2), effort(3:4))
+                    effort(2), effort(3:5))
 end subroutine taylor_rows
 
 subroutine choose_instructions(highest, taken)

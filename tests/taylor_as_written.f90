@@ -13,7 +13,7 @@ subroutine taylor_as_written(coefficients, constant, rate, n_sines, sines, n_cos
   integer(c_int64_t), intent(out) :: steps
   type(problem_t), target :: given
   integer(c_int) :: n_rows
-  real(c_double) :: needed, accuracy(2)
+  real(c_double) :: needed, accuracy(3)
 
   given = problem_t(coefficients, constant, rate, n_sines, n_cosines, sines, cosines)
   call taylor_solve(c_loc(given), omega, tolerance, 1.0_c_double, 1, [t_end], found, n_rows, &

@@ -27,7 +27,7 @@ module levels
       real(c_double), intent(inout) :: rows(3, n_times)
       integer(c_int), intent(out) :: n_rows, status
       integer(c_int64_t), intent(out) :: steps
-      real(c_double), intent(out) :: needed, found(2)
+      real(c_double), intent(out) :: needed, found(3)
     end subroutine taylor_solve
 
     subroutine quick_solve(problem, omega, tolerance, effort, t_end, contest, result, status, &

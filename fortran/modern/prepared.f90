@@ -21,8 +21,6 @@ module prepared
   ! solution is an ordinary number.
   real(dp), parameter :: LARGE = 2.0_dp**300
   integer, parameter :: MOST_POWER = 1000
-  ! With few digits the series' own tolerance is cheap, and its estimate of growth is coarse.
-  real(dp), parameter :: AUTO_SHARE = 0.25_dp
 
   public :: solve_prepared
 
@@ -132,10 +130,9 @@ contains
     type(problem_t) :: problem
     real(dp) :: times(1)
     real(dp) :: reached(4)
-    real(dp) :: tolerance_left
     integer :: code, n_rows, quick_steps
     integer(int64) :: evaluations
-    real(dp) :: needed
+    real(dp) :: needed, estimates(3)
 
     code = int(packed(METHOD))
     times(1) = t_end
@@ -148,7 +145,8 @@ contains
       if (ended == REFUSED .and. code == CLOSED_FORM_OR_TAYLOR) then
         call unpack(packed, n_packed, problem)
         call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
-                          n_rows, ended, count, needed, found)
+                          n_rows, ended, count, needed, estimates)
+        found = estimates(:2)
       end if
     case (SPHERE)
       call unpack(packed, n_packed, problem)
@@ -156,9 +154,7 @@ contains
     case (TAYLOR, QUICK, QUICK_OR_TAYLOR)
       call unpack(packed, n_packed, problem)
       ended = REFUSED
-      tolerance_left = packed(TOLERANCE)
       if (code /= TAYLOR) then
-        tolerance_left = AUTO_SHARE*tolerance_left
         call quick_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), t_end, &
                          merge(1, 0, code == QUICK_OR_TAYLOR), omega, ended, quick_steps, &
                          found(1))
@@ -166,8 +162,9 @@ contains
         count = merge(-quick_steps, quick_steps, code == QUICK_OR_TAYLOR)
       end if
       if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
-        call taylor_solve(problem, omega0, tolerance_left, packed(EFFORT), 1, times, omega, &
-                          n_rows, ended, count, needed, found)
+        call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
+                          n_rows, ended, count, needed, estimates)
+        found = estimates(:2)
       end if
     case (IMPROVED_EULER:RK4)
       call unpack(packed, n_packed, problem)

@@ -7,9 +7,9 @@ module taylor
   use kinds, only: dp
   use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
-  use taylor_error, only: begin, blocks_t, count_step, growth_of, leave_out
+  use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
   use taylor_plan, only: LEAST_SHARE, plan
-  use taylor_series, only: carry, expand, fitting, following, inside, rescale, series_t, size_of
+  use taylor_series, only: carry, carry_fully, expand, fitting, following, inside, rescale, series_t, size_of
   use torque_terms, only: AFRESH, longest_turn, torque_terms_at, turn_waves, wave_t, waves_of
   implicit none(type, external)
   private
@@ -25,9 +25,14 @@ module taylor
   real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
   real(dp), parameter :: GROWING = 1.3_dp ! power of time with which steps do, not by chance
   real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
-  real(dp), parameter :: SAFETY = 4.0_dp  ! of a second march
+  real(dp), parameter :: SAFETY = 10.0_dp  ! of a second march
   real(dp), parameter :: SLACK = 16.0_dp  ! before a step does not pass
   real(dp), parameter :: LINEAR = 0.1_dp  ! error, relative, beyond which its linear motion says little
+  real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
+  real(dp), parameter :: TRUSTED = 0.7_dp ! error, in tolerances, up to which one march does
+  real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
+  real(dp), parameter :: BESIDE = 1e-15_dp ! tolerance with which steps are others than the finest
+  real(dp), parameter :: CHOOSING = 1e14_dp ! growth with which rounding is no small difference
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: UNSURE = 0.3_dp  ! rounding times growth, in tolerances
   integer, parameter :: FEW_WAVES = 16    ! that need no room of their own
@@ -70,7 +75,7 @@ contains
     integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted, 6
     integer(c_int64_t), intent(out) :: steps            !! of the last march
     real(c_double), intent(out) :: needed               !! effort, as far as known; where it gave up
-    real(c_double), intent(out) :: found(2)             !! error, relative; growth; -1 where unknown
+    real(c_double), intent(out) :: found(3) !! error, relative; growth; steps of all marches
     type(problem_t), pointer :: problem
     type(room_t), pointer :: room
     real(c_double), target :: place(storage_size(room)/64 + ALIGNED/8)
@@ -112,54 +117,81 @@ contains
     real(dp), intent(inout) :: rows(3, n_times)
     integer, intent(out) :: n_rows, status
     integer(int64), intent(out) :: steps
-    real(dp), intent(out) :: needed, found(2)
+    real(dp), intent(out) :: needed, found(3)
     real(dp) :: asked   ! tolerance of this march
     real(dp) :: cost    ! of a step, in steps without waves
     real(dp) :: most    ! steps left
     real(dp) :: spent   ! steps of the marches before
     real(dp) :: ahead   ! steps that this march would need
     real(dp) :: error   ! relative
+    real(dp) :: largest ! growth on the way
+    real(dp) :: before(3), change ! the end by the march before this one, and from it, rad/s
+    logical :: again, compared
+    real(dp) :: planned ! growth up to which errors may cancel in the one that is carried
     logical :: finest   ! no step could err less
 
     asked = tolerance
+    planned = PLANNED_GROWTH
     cost = 1.0_dp + A_WAVE*n_waves
     most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
     spent = 0.0_dp
     needed = 0.0_dp
+    before = omega
+    compared = .false.
     call waves_of(problem, waves)
     do
-      call march(problem, omega, asked, tolerance, most - spent, &
+      again = spent > 0.0_dp
+      call march(problem, omega, asked, tolerance, again, most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, int64), n_times, times, room%s, room%blocks, &
-                 room%now, waves, rows, n_rows, status, steps, error, found(2), ahead, finest)
+                 room%now, waves, rows, n_rows, status, steps, error, found(2), largest, ahead, &
+                 finest)
       if (status == GAVE_UP) then
         ! An error that is too large already will ask for another march, in shorter steps.
         if (error > tolerance) ahead = ANOTHER*ahead
         needed = (spent + ahead)*cost/MOST_STEPS
-        steps = steps + int(spent, int64)
       end if
       spent = spent + real(steps, dp)
-      if (status /= COMPLETE .or. finest) exit
-      if (ROUNDING*found(2) > UNSURE*tolerance) then
+      if (status == GAVE_UP) steps = int(spent, int64)
+      if (status /= COMPLETE) exit
+      change = maxval(abs(rows(:, n_times) - before))
+      before = rows(:, n_times)
+      if (again .and. largest > CHOOSING) then
+        ! Did rounding choose the way? Then the growth at its end is another motion's.
+        if (compared) then
+          if (change > tolerance*room%now%scale) found(2) = largest
+          exit
+        end if
+        compared = .true.
+        asked = BESIDE
+        cycle
+      end if
+      if (finest) exit
+      if (ROUNDING*found(2) > UNSURE*tolerance .and. found(2) > planned) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
         asked = 0.0_dp
-      else if (error > tolerance) then
+      else if (error > TRUSTED*tolerance .or. found(2) > planned) then
         ! Once more, with less of what a step errs.
-        asked = asked*(tolerance/(SAFETY*error))
+        asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*error), &
+                          PLANNED_GROWTH/found(2))
+        planned = max(planned, 2.0_dp*found(2))
       else
         exit
       end if
     end do
     found(1) = error + ROUNDING*found(2)
+    found(3) = spent
     if (status == COMPLETE .and. ROUNDING*found(2) > UNSURE*tolerance) status = SENSITIVE
   end subroutine solve
 
-  subroutine march(problem, omega, asked, tolerance, most_steps, stride, n_times, times, s, &
-                   blocks, now, waves, rows, n_rows, status, steps, error, growth, ahead, finest)
+  subroutine march(problem, omega, asked, tolerance, again, most_steps, stride, n_times, times, s, &
+                   blocks, now, waves, rows, n_rows, status, steps, error, growth, largest, ahead, &
+                   finest)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
     real(dp), intent(in) :: asked                       !! tolerance of this march
     real(dp), intent(in) :: tolerance                   !! of the error at `times`, relative
+    logical, intent(in) :: again                        !! for an error known too coarsely
     real(dp), intent(in) :: most_steps
     integer(int64), intent(in) :: stride                !! steps between looks at the user
     integer, intent(in) :: n_times
@@ -173,7 +205,8 @@ contains
     integer, intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted
     integer(int64), intent(out) :: steps
     real(dp), intent(out) :: error  !! largest of a row, relative, before it was taken off
-    real(dp), intent(out) :: growth !! of a small difference
+    real(dp), intent(out) :: growth !! of a small difference until the end
+    real(dp), intent(out) :: largest !! and until any time on the way
     real(dp), intent(out) :: ahead  !! steps to the end, as far as known; where it gave up
     logical, intent(out) :: finest  !! the share is the least there is
     real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
@@ -200,6 +233,7 @@ contains
     status = COMPLETE
     error = 0.0_dp
     growth = 1.0_dp
+    largest = 1.0_dp
     ahead = 0.0_dp
     finest = .true.
     rest = times(n_times)
@@ -218,7 +252,7 @@ contains
     coefficients = [problem%coefficients, 0.0_dp]
     constant = [problem%constant, 0.0_dp]
     rate = [problem%rate, 0.0_dp]
-    call begin(s%lanes, blocks)
+    call begin(again, s%lanes, blocks)
     next_look = 1
     half_way = max(1_int64, int(0.5_dp*most_steps, int64))
     t_half = 0.0_dp
@@ -272,15 +306,20 @@ contains
         h = next
       end if
       before = s%lanes(1, :)
-      call carry(s)
+      if (again) then
+        call carry_fully(s, order)
+      else
+        call carry(s)
+      end if
       call leave_out(s, order, 1.0_dp/allowed, left)
       call add_rows(s, order, h, at_end, before, left(:3), n_times, times, tolerance, now, rows, n_rows, &
                     status)
       if (status /= COMPLETE) exit
-      call count_step(s%lanes, blocks)
+      call count_step(again, s%lanes, blocks)
       call add_change(s%change, now)
       steps = steps + 1
-      tries = 1
+      ! Where products overflow a step may pass that leads nowhere.
+      if (.not. now%scale > LARGEST) tries = 1
       if (.not. all(abs(now%w) <= huge(h))) then
         status = OVERFLOW
         exit
@@ -317,7 +356,7 @@ contains
         if (steps < half_way) next_look = min(next_look, half_way)
       end if
     end do
-    growth = growth_of(s%lanes, blocks)
+    call growths_of(again, s%lanes, blocks, growth, largest)
     error = max(now%worst, maxval(abs(s%lanes(1, :))))
     if (now%scale > 0.0_dp) error = error/now%scale
   end subroutine march

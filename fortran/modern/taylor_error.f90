@@ -9,10 +9,12 @@ module taylor_error
   private
 
   integer, parameter :: STEPS_IN_BLOCK = 8
-  integer, parameter :: MOST_BLOCKS = 64  ! even
+  integer, parameter :: STEPS_IN_FINE_BLOCK = 2
+  integer, parameter :: MOST_BLOCKS = 256 ! even
   real(dp), parameter :: RIDGE = 1.001_dp   ! so that one pole, or none, does for the pair
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! lane
+  real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! growth
   real(dp), parameter :: LARGEST = 1e100_dp ! beyond it no growth says more
   real(dp), parameter :: UNIT(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
@@ -25,12 +27,13 @@ module taylor_error
     integer :: steps_a_block
   end type blocks_t
 
-  public :: begin, count_step, growth_of, leave_out
+  public :: begin, count_step, growths_of, leave_out
 
 contains
 
-  pure subroutine begin(lanes, blocks)
+  pure subroutine begin(precise, lanes, blocks)
     !! In the lanes: no error, and each axis where it is.
+    logical, intent(in) :: precise
     real(dp), intent(out) :: lanes(4, 3)
     type(blocks_t), intent(inout) :: blocks
 
@@ -38,7 +41,7 @@ contains
     lanes(2:, :) = UNIT
     blocks%steps = 0
     blocks%closed = 0
-    blocks%steps_a_block = STEPS_IN_BLOCK
+    blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
   pure subroutine leave_out(s, order, unit, left)
@@ -86,8 +89,10 @@ contains
     end do
   end subroutine leave_out
 
-  pure subroutine count_step(lanes, blocks)
-    !! One more step: where its block is full, the derivative is put aside and begun anew.
+  pure subroutine count_step(precise, lanes, blocks)
+    !! One more step: where its block is full, the derivative is put aside and begun anew; if need
+    !! be along axes that turn with it, so that no rounding of what has grown is taken for growth.
+    logical, intent(in) :: precise
     real(dp), intent(inout) :: lanes(4, 3)
     type(blocks_t), intent(inout) :: blocks
     integer :: n
@@ -97,7 +102,11 @@ contains
     blocks%steps = 0
     blocks%closed = blocks%closed + 1
     blocks%derivatives(:, :, blocks%closed) = lanes(2:, :)
-    lanes(2:, :) = UNIT
+    if (precise) then
+      call turn_axes(blocks%derivatives(:, :, blocks%closed), lanes)
+    else
+      lanes(2:, :) = UNIT
+    end if
     if (blocks%closed < MOST_BLOCKS) return
     do n = 1, MOST_BLOCKS/2
       blocks%derivatives(:, :, n) = composed(blocks%derivatives(:, :, 2*n), &
@@ -107,20 +116,51 @@ contains
     blocks%steps_a_block = 2*blocks%steps_a_block
   end subroutine count_step
 
-  pure real(dp) function growth_of(lanes, blocks)
-    !! Largest norm of the derivative of omega at the end by omega where a block began.
+  pure subroutine turn_axes(derivative, lanes)
+    !! By Gram and Schmidt: axes in the lanes, and along them where the old ones lead.
+    real(dp), intent(inout) :: derivative(3, 3)
+    real(dp), intent(inout) :: lanes(4, 3)
+    real(dp) :: length
+    integer :: i, j
+
+    derivative = 0.0_dp
+    do i = 1, 3
+      do j = 1, i - 1
+        derivative(i, j) = sum(lanes(i + 1, :)*lanes(j + 1, :))
+        lanes(i + 1, :) = lanes(i + 1, :) - derivative(i, j)*lanes(j + 1, :)
+      end do
+      length = sqrt(sum(lanes(i + 1, :)*lanes(i + 1, :)))
+      derivative(i, i) = length
+      if (length > 0.0_dp) lanes(i + 1, :) = lanes(i + 1, :)/length
+    end do
+  end subroutine turn_axes
+
+  pure subroutine growths_of(precise, lanes, blocks, growth, largest)
+    !! Largest norms of derivatives by omega where a block began: of omega at the end, and of omega
+    !! anywhere on the way.
+    logical, intent(in) :: precise
     real(dp), intent(in) :: lanes(4, 3)
     type(blocks_t), intent(in) :: blocks
+    real(dp), intent(out) :: growth, largest
     real(dp) :: derivative(3, 3)
-    integer :: n
+    integer :: m, n
 
     derivative = lanes(2:, :)
-    growth_of = norm(derivative)
+    growth = norm(derivative)
     do n = blocks%closed, 1, -1
       derivative = composed(derivative, blocks%derivatives(:, :, n))
-      growth_of = max(growth_of, norm(derivative))
+      growth = max(growth, norm(derivative))
     end do
-  end function growth_of
+    largest = growth
+    if (.not. precise .or. growth < WORTH_A_LOOK) return
+    do m = 1, blocks%closed
+      derivative = UNIT
+      do n = m, blocks%closed
+        derivative = composed(blocks%derivatives(:, :, n), derivative)
+        largest = max(largest, norm(derivative))
+      end do
+    end do
+  end subroutine growths_of
 
   pure real(dp) function norm(a)
     !! Of a matrix of determinant 1: about its largest singular value, and 1 of a rotation.

@@ -29,6 +29,7 @@ contains
     real(dp) :: gain                        ! speed that torques may add, rad/s
     real(dp) :: rate                        ! 1/s
     real(dp) :: turned                      ! by the waves, rad
+    real(dp) :: way                         ! about the body's, rad
     integer :: n
 
     turned = 0.0_dp
@@ -50,10 +51,11 @@ contains
     end do
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
-    ! An error turns into one of phase and grows with it; the weights are from the seven cases and
-    ! from random scenes.
+    ! An error turns into one of phase and grows with it, and the phase of all later ones with that;
+    ! the weights are from random scenes.
     ! Waves ask for more steps, and those may all err alike.
-    share = tolerance/(12.0_dp + coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain) + ALIKE*turned)
+    way = coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain)
+    share = tolerance/(8.0_dp + way + way*(way/14.0_dp) + ALIKE*turned)
     share = max(share, LEAST_SHARE)
     order = order_for(share)
   end subroutine plan

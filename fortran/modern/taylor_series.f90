@@ -25,7 +25,7 @@ module taylor_series
   real(dp), parameter :: MOMENTS(MOST_MOMENTS) = &
                          [(real(k_, dp)/real(2*(k_ + 1)*(k_ + 2), dp), k_=1, MOST_MOMENTS)]
 
-  public :: carry, expand, fitting, following, inside, rescale, size_of
+  public :: carry, carry_fully, expand, fitting, following, inside, rescale, size_of
 
 contains
 
@@ -79,6 +79,35 @@ contains
     o(6) = s%factors(3)*(mean(1) - s%factors(1)*c(1))
     call multiply(o, s%lanes)
   end subroutine carry
+
+  pure subroutine carry_fully(s, order)
+    !! The same as exactly as the series itself: by the linear part of the recurrence.
+    type(series_t), intent(inout) :: s
+    integer, intent(in) :: order
+    real(dp) :: d(4, 3, 0:MOST_ORDER)
+    real(dp) :: x(4), y(4), z(4)
+    integer :: i, j, k
+
+    d(:, :, 0) = s%lanes
+    do k = 1, order
+      x = 0.0_dp
+      y = 0.0_dp
+      z = 0.0_dp
+      do j = 0, k - 1
+        do i = 1, 4
+          x(i) = x(i) + s%terms(2, j)*d(i, 3, k - 1 - j) + s%terms(3, j)*d(i, 2, k - 1 - j)
+          y(i) = y(i) + s%terms(1, j)*d(i, 3, k - 1 - j) + s%terms(3, j)*d(i, 1, k - 1 - j)
+          z(i) = z(i) + s%terms(1, j)*d(i, 2, k - 1 - j) + s%terms(2, j)*d(i, 1, k - 1 - j)
+        end do
+      end do
+      d(:, 1, k) = (s%factors(1)/k)*x
+      d(:, 2, k) = (s%factors(2)/k)*y
+      d(:, 3, k) = (s%factors(3)/k)*z
+    end do
+    do k = 1, order
+      s%lanes = s%lanes + d(:, :, k)
+    end do
+  end subroutine carry_fully
 
   ! unroll: multiply
   pure subroutine multiply(o, lanes)

@@ -55,7 +55,7 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
             return growth
     factor = factor_near_one(scene, t_end)
     near_one = scaled(replace(scene, step_size=1.0, steps=1), factor)
-    work = np.array([_LITTLE_WORK, 0.0, -1.0, -1.0])
+    work = np.array([_LITTLE_WORK, 0.0, -1.0, -1.0, 0.0])
     _, n_rows, _, _ = extension().taylor_rows(
         *normalized(near_one), near_one.omega, [t_end / factor], _COARSE, effort=work
     )

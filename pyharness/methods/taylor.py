@@ -15,8 +15,12 @@ from pyharness.model.trajectory import Trajectory
 def taylor(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene by Taylor series, each counted as one evaluation."""
-    work = np.array([effort, 0.0, -1.0, -1.0])
+    """Solve a scene by Taylor series, each counted as one evaluation.
+
+    Steps are those of the last march, evaluations those of all: a second one is made where the
+    first erred too much.
+    """
+    work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     rows, n_rows, status, steps = extension().taylor_rows(
         *normalized(scene), scene.omega, times, tolerance, effort=work
     )
@@ -27,5 +31,5 @@ def taylor(
             + advice("take a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )
-    error, growth = map(known, work[2:])
-    return trajectory_of(times, rows, n_rows, status, steps, steps, error, growth)
+    error, growth = map(known, work[2:4])
+    return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth)

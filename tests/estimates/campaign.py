@@ -106,7 +106,8 @@ def _answer(of: Draw, name: str, method: str, ended: str, omega: Array, said: An
     """Read an answer; the attributes that not every kernel has are hooks."""
     error = of.truth.error(omega) if np.isfinite(omega).all() else float("inf")
     estimate, growth = (_number(getattr(said, each, None)) for each in ("error", "growth"))
-    runs = getattr(said, "runs", None)
+    evaluations = getattr(said, "evaluations", None)
+    runs = None if evaluations is None else 1 + (evaluations > said.steps)
     return Answer(of, name, method, ended, error, estimate, growth, said.steps, runs)
 
 

@@ -152,7 +152,7 @@ def _grown(status: int, error: float, growth: float) -> Callable[..., Any]:
     """Return a series that ends with a status, and says what it found."""
 
     def rows(*given: Any, effort: Any) -> Any:
-        effort[2:] = error, growth
+        effort[2:4] = error, growth
         return np.ones((3, len(given[6]))), len(given[6]), status, 7
 
     return rows

@@ -10,7 +10,8 @@ module taylor
   use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
   use taylor_plan, only: LEAST_SHARE, plan
   use taylor_series, only: carry, carry_fully, expand, fitting, following, inside, rescale, series_t, size_of
-  use torque_terms, only: AFRESH, longest_turn, torque_terms_at, turn_waves, wave_t, waves_of
+  use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t, &
+                          waves_of
   implicit none(type, external)
   private
 
@@ -30,9 +31,9 @@ module taylor
   real(dp), parameter :: LINEAR = 0.1_dp  ! error, relative, beyond which its linear motion says little
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
   real(dp), parameter :: TRUSTED = 0.7_dp ! error, in tolerances, up to which one march does
+  real(dp), parameter :: NO_DIGIT = 1e100_dp ! error beyond which none says more
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
-  real(dp), parameter :: BESIDE = 1e-15_dp ! tolerance with which steps are others than the finest
-  real(dp), parameter :: CHOOSING = 1e14_dp ! growth with which rounding is no small difference
+  real(dp), parameter :: CHOOSING = 1e15_dp ! growth with which rounding is no small difference
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: UNSURE = 0.3_dp  ! rounding times growth, in tolerances
   integer, parameter :: FEW_WAVES = 16    ! that need no room of their own
@@ -125,8 +126,7 @@ contains
     real(dp) :: ahead   ! steps that this march would need
     real(dp) :: error   ! relative
     real(dp) :: largest ! growth on the way
-    real(dp) :: before(3), change ! the end by the march before this one, and from it, rad/s
-    logical :: again, compared
+    logical :: again
     real(dp) :: planned ! growth up to which errors may cancel in the one that is carried
     logical :: finest   ! no step could err less
 
@@ -136,8 +136,6 @@ contains
     most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
     spent = 0.0_dp
     needed = 0.0_dp
-    before = omega
-    compared = .false.
     call waves_of(problem, waves)
     do
       again = spent > 0.0_dp
@@ -153,18 +151,8 @@ contains
       spent = spent + real(steps, dp)
       if (status == GAVE_UP) steps = int(spent, int64)
       if (status /= COMPLETE) exit
-      change = maxval(abs(rows(:, n_times) - before))
-      before = rows(:, n_times)
-      if (again .and. largest > CHOOSING) then
-        ! Did rounding choose the way? Then the growth at its end is another motion's.
-        if (compared) then
-          if (change > tolerance*room%now%scale) found(2) = largest
-          exit
-        end if
-        compared = .true.
-        asked = BESIDE
-        cycle
-      end if
+      ! Then rounding chose the way, and the growth at its end is another motion's.
+      if (largest > CHOOSING) found(2) = largest
       if (finest) exit
       if (ROUNDING*found(2) > UNSURE*tolerance .and. found(2) > planned) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
@@ -223,6 +211,7 @@ contains
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
     integer(int64) :: part    ! 65536 over the order
     integer :: order
+    integer :: lasting        ! steps that turn the waves
     integer :: i, tries
     integer(int64) :: next_look  ! steps
     integer(int64) :: half_way   ! of the steps allowed
@@ -247,6 +236,7 @@ contains
     call plan(problem, now%scale, asked, rest, order, share, h)
     finest = share <= LEAST_SHARE
     part = 65536/order
+    lasting = steps_by_turns(share)
     if (size(waves) > 0) longest = longest_turn(order, share)
     s%torque = 0.0_dp
     coefficients = [problem%coefficients, 0.0_dp]
@@ -302,7 +292,7 @@ contains
         at_end = abs(next) >= abs(rest)
         if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
         call rescale(s, order, next/h)
-        now%since = AFRESH
+        now%since = lasting
         h = next
       end if
       before = s%lanes(1, :)
@@ -329,7 +319,7 @@ contains
         n_rows = n_times
         exit
       end if
-      now%since = merge(0, now%since + 1, now%since + 1 >= AFRESH)
+      now%since = merge(0, now%since + 1, now%since + 1 >= lasting)
       if (now%since > 0) call turn_waves(waves)
       call add_time(now%t, now%t_low, h)
       rest = (times(n_times) - now%t) - now%t_low
@@ -357,8 +347,10 @@ contains
       end if
     end do
     call growths_of(again, s%lanes, blocks, growth, largest)
-    error = max(now%worst, maxval(abs(s%lanes(1, :))))
+    error = now%worst
+    if (.not. maxval(abs(s%lanes(1, :))) <= error) error = maxval(abs(s%lanes(1, :)))
     if (now%scale > 0.0_dp) error = error/now%scale
+    if (.not. error <= NO_DIGIT) error = NO_DIGIT
   end subroutine march
 
   pure subroutine fit_to_end(h, rest, at_end)

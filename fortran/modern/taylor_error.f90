@@ -174,6 +174,7 @@ contains
       end do
     end do
     norm = sqrt(max(1.0_dp, norm))
+    if (.not. norm <= LARGEST) norm = LARGEST
   end function norm
 
   pure function composed(a, b)
@@ -185,7 +186,7 @@ contains
     do j = 1, 3
       do i = 1, 3
         composed(i, j) = b(i, 1)*a(1, j) + b(i, 2)*a(2, j) + b(i, 3)*a(3, j)
-        composed(i, j) = max(-LARGEST, min(LARGEST, composed(i, j)))
+        if (.not. abs(composed(i, j)) <= LARGEST) composed(i, j) = LARGEST
       end do
     end do
   end function composed

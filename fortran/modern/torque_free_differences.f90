@@ -9,7 +9,7 @@ module torque_free_differences
   ! Half of the digits of a difference are then its own, where it does not grow; and one that grows
   ! is small to the end as long as any digit is left.
   real(dp), parameter :: SMALL = 2.0_dp**(-48)
-  integer, parameter :: INSTANTS = 16
+  integer, parameter :: INSTANTS = 64
   real(dp), parameter :: GOLDEN = 0.6180339887498949_dp ! so that no period hides between instants
 
   public :: torque_free_growth_of
@@ -17,7 +17,7 @@ module torque_free_differences
 contains
 
   function torque_free_growth_of(coefficients, omega0, t_end) result(growth)
-    !! The largest derivative of omega at `t_end` by omega at any of 16 instants before, 0 among
+    !! The largest derivative of omega at `t_end` by omega at any of 64 instants before, 0 among
     !! them: in the norm of the largest component, and at least 1; below 0 where there is no
     !! closed form.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C

@@ -21,7 +21,6 @@ module torque_terms
                                                   0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, &
                                                   0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                   0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [4, 4])
-  integer, parameter, public :: AFRESH = 16   ! steps until sine and cosine are made anew
   real(dp), parameter :: SMALL_TURN = 1e-8_dp ! rad; its square no longer counts
   real(dp), parameter :: PHASE = 0.01_dp      ! of the share that a turn may err
 
@@ -39,7 +38,11 @@ module torque_terms
     logical :: is_sine
   end type wave_t
 
-  public :: longest_turn, sine_cosine, torque_terms_at, turn_waves, waves_of
+  integer, parameter :: AFRESH = 16         ! steps until sine and cosine are made anew
+  ! Share of a step's error below which they are in each step: turns of equal steps err alike.
+  real(dp), parameter :: FINE = 1e-16_dp
+
+  public :: longest_turn, sine_cosine, steps_by_turns, torque_terms_at, turn_waves, waves_of
 
 contains
 
@@ -70,6 +73,13 @@ contains
     n = 4*fours_of(order)
     longest_turn = (PHASE*share*FACTORIALS(n + 1))**(1.0_dp/real(n, dp))
   end function longest_turn
+
+  pure integer function steps_by_turns(share)
+    !! Steps after which the sines and cosines of waves are made anew.
+    real(dp), intent(in) :: share   !! that a step may err
+
+    steps_by_turns = merge(1, AFRESH, share < FINE)
+  end function steps_by_turns
 
   pure integer function fours_of(order)
     integer, intent(in) :: order

@@ -87,7 +87,7 @@ contains
     integer(int64) :: bits  ! of accuracy
 
     bits = 1023 - ishft(transfer(share, bits), -52)
-    order_for = max(LEAST_ORDER, min(MOST_ORDER, 8 + 2*int((16*bits + 50)/100)))
+    order_for = max(LEAST_ORDER, min(MOST_ORDER, 8 + 2*int((16*bits + 100)/100)))
   end function order_for
 
 end module taylor_plan

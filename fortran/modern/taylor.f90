@@ -1,7 +1,7 @@
 module taylor
   !! Taylor series: the order fixed for a run, the step adapted, the error measured and taken off.
-  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t, c_intptr_t, &
-                                         c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -9,7 +9,8 @@ module taylor
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
   use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
   use taylor_plan, only: LEAST_SHARE, plan
-  use taylor_series, only: carry, carry_fully, expand, fitting, following, inside, rescale, series_t, size_of
+  use taylor_series, only: carry, carry_fully, expand, fitting, following, inside, rescale, &
+                           series_t, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t, &
                           waves_of
   implicit none(type, external)
@@ -26,16 +27,19 @@ module taylor
   real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
   real(dp), parameter :: GROWING = 1.3_dp ! power of time with which steps do, not by chance
   real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
-  real(dp), parameter :: SAFETY = 10.0_dp  ! of a second march
-  real(dp), parameter :: SLACK = 16.0_dp  ! before a step does not pass
-  real(dp), parameter :: LINEAR = 0.1_dp  ! error, relative, beyond which its linear motion says little
+  real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
-  real(dp), parameter :: TRUSTED = 0.7_dp ! error, in tolerances, up to which one march does
-  real(dp), parameter :: NO_DIGIT = 1e100_dp ! error beyond which none says more
+  ! Error, relative, beyond which its linear motion says little, and the one that says no more.
+  real(dp), parameter :: LINEAR = 0.1_dp
+  real(dp), parameter :: NO_DIGIT = 1e100_dp
+  ! One march does for errors so large, in tolerances, and for differences that grow so much: else
+  ! errors may cancel in the one that is carried. Another one may err less by a factor.
+  real(dp), parameter :: TRUSTED = 0.7_dp
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
+  real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: CHOOSING = 1e15_dp ! growth with which rounding is no small difference
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  real(dp), parameter :: UNSURE = 0.3_dp  ! rounding times growth, in tolerances
+  real(dp), parameter :: UNSURE = 0.3_dp ! rounding times growth, in tolerances
   integer, parameter :: FEW_WAVES = 16    ! that need no room of their own
   integer(c_intptr_t), parameter :: ALIGNED = 64 ! bytes: no column across two lines of the cache
 
@@ -49,6 +53,18 @@ module taylor
     real(dp) :: worst     ! largest error of a row so far, rad/s
     integer :: since      ! steps since the waves' sines were made; 0: to be made
   end type state_t
+
+  ! What a march came to.
+  type :: outcome_t
+    integer :: status
+    integer :: n_rows
+    integer(int64) :: steps
+    real(dp) :: error    ! largest of a row, relative, before it was taken off
+    real(dp) :: growth   ! of a small difference until the end
+    real(dp) :: largest  ! and until any time on the way
+    real(dp) :: ahead    ! steps to the end, as far as known; where it gave up
+    logical :: finest    ! no step could err less
+  end type outcome_t
 
   ! Columns of four begin where a register's load does: Fortran can't ask for it of a variable.
   type :: room_t
@@ -119,16 +135,13 @@ contains
     integer, intent(out) :: n_rows, status
     integer(int64), intent(out) :: steps
     real(dp), intent(out) :: needed, found(3)
+    type(outcome_t) :: outcome
     real(dp) :: asked   ! tolerance of this march
+    real(dp) :: planned ! growth that it allows for
     real(dp) :: cost    ! of a step, in steps without waves
     real(dp) :: most    ! steps left
     real(dp) :: spent   ! steps of the marches before
-    real(dp) :: ahead   ! steps that this march would need
-    real(dp) :: error   ! relative
-    real(dp) :: largest ! growth on the way
-    logical :: again
-    real(dp) :: planned ! growth up to which errors may cancel in the one that is carried
-    logical :: finest   ! no step could err less
+    real(dp) :: growth
 
     asked = tolerance
     planned = PLANNED_GROWTH
@@ -138,42 +151,40 @@ contains
     needed = 0.0_dp
     call waves_of(problem, waves)
     do
-      again = spent > 0.0_dp
-      call march(problem, omega, asked, tolerance, again, most - spent, &
+      call march(problem, omega, asked, tolerance, spent > 0.0_dp, most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, int64), n_times, times, room%s, room%blocks, &
-                 room%now, waves, rows, n_rows, status, steps, error, found(2), largest, ahead, &
-                 finest)
-      if (status == GAVE_UP) then
-        ! An error that is too large already will ask for another march, in shorter steps.
-        if (error > tolerance) ahead = ANOTHER*ahead
-        needed = (spent + ahead)*cost/MOST_STEPS
-      end if
-      spent = spent + real(steps, dp)
-      if (status == GAVE_UP) steps = int(spent, int64)
-      if (status /= COMPLETE) exit
-      ! Then rounding chose the way, and the growth at its end is another motion's.
-      if (largest > CHOOSING) found(2) = largest
-      if (finest) exit
-      if (ROUNDING*found(2) > UNSURE*tolerance .and. found(2) > planned) then
+                 room%now, waves, rows, outcome)
+      spent = spent + real(outcome%steps, dp)
+      ! Rounding chose the way where a difference grew so much; at its end is another motion.
+      growth = outcome%growth
+      if (outcome%largest > CHOOSING) growth = outcome%largest
+      if (outcome%status /= COMPLETE .or. outcome%finest) exit
+      if (ROUNDING*growth > UNSURE*tolerance .and. growth > planned) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
         asked = 0.0_dp
-      else if (error > TRUSTED*tolerance .or. found(2) > planned) then
-        ! Once more, with less of what a step errs.
-        asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*error), &
-                          PLANNED_GROWTH/found(2))
-        planned = max(planned, 2.0_dp*found(2))
+      else if (outcome%error > TRUSTED*tolerance .or. growth > planned) then
+        asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*outcome%error), &
+                          PLANNED_GROWTH/growth)
+        planned = max(planned, 2.0_dp*growth)
       else
         exit
       end if
     end do
-    found(1) = error + ROUNDING*found(2)
-    found(3) = spent
-    if (status == COMPLETE .and. ROUNDING*found(2) > UNSURE*tolerance) status = SENSITIVE
+    n_rows = outcome%n_rows
+    status = outcome%status
+    steps = outcome%steps
+    found = [outcome%error + ROUNDING*growth, growth, spent]
+    if (status == COMPLETE .and. ROUNDING*growth > UNSURE*tolerance) status = SENSITIVE
+    if (status == GAVE_UP) then
+      ! An error that is too large already will ask for another march, in shorter steps.
+      if (outcome%error > tolerance) outcome%ahead = ANOTHER*outcome%ahead
+      needed = (spent - real(steps, dp) + outcome%ahead)*cost/MOST_STEPS
+      steps = int(spent, int64)
+    end if
   end subroutine solve
 
   subroutine march(problem, omega, asked, tolerance, again, most_steps, stride, n_times, times, s, &
-                   blocks, now, waves, rows, n_rows, status, steps, error, growth, largest, ahead, &
-                   finest)
+                   blocks, now, waves, rows, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
@@ -189,14 +200,7 @@ contains
     type(state_t), intent(inout) :: now
     type(wave_t), intent(inout) :: waves(:)
     real(dp), intent(inout) :: rows(3, n_times)         !! omega for n_rows times, rad/s
-    integer, intent(out) :: n_rows
-    integer, intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted
-    integer(int64), intent(out) :: steps
-    real(dp), intent(out) :: error  !! largest of a row, relative, before it was taken off
-    real(dp), intent(out) :: growth !! of a small difference until the end
-    real(dp), intent(out) :: largest !! and until any time on the way
-    real(dp), intent(out) :: ahead  !! steps to the end, as far as known; where it gave up
-    logical, intent(out) :: finest  !! the share is the least there is
+    type(outcome_t), intent(out) :: found
     real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
     real(dp) :: left(4)       ! by the step, rad/s
     real(dp) :: before(3)     ! the error at its beginning, rad/s
@@ -217,24 +221,17 @@ contains
     integer(int64) :: half_way   ! of the steps allowed
     real(dp) :: t_half           ! the time then, s
 
-    n_rows = 0
-    steps = 0
-    status = COMPLETE
-    error = 0.0_dp
-    growth = 1.0_dp
-    largest = 1.0_dp
-    ahead = 0.0_dp
-    finest = .true.
+    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, .true.)
     rest = times(n_times)
     if (rest == 0.0_dp) then
       rows(:, 1) = omega
-      n_rows = 1
+      found%n_rows = 1
       return
     end if
     now = state_t([omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
                   max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0)
     call plan(problem, now%scale, asked, rest, order, share, h)
-    finest = share <= LEAST_SHARE
+    found%finest = share <= LEAST_SHARE
     part = 65536/order
     lasting = steps_by_turns(share)
     if (size(waves) > 0) longest = longest_turn(order, share)
@@ -261,7 +258,7 @@ contains
                            waves, s%torque)
       call expand(order, s)
       last = size_of(s, order)
-      if (steps == 0) then
+      if (found%steps == 0) then
         call following(h, s, order, part, allowed, decay, next)
         ! What a body at rest is about to reach.
         now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
@@ -270,18 +267,18 @@ contains
         last = last + size_of(s, order - 2)
       end if
       call following(h, s, order, part, allowed, decay, next)
-      if ((.not. last <= SLACK*allowed) .or. (steps == 0 .and. tries == 0)) then
+      if ((.not. last <= SLACK*allowed) .or. (found%steps == 0 .and. tries == 0)) then
         ! The first step is a guess, and a later one may be too long: the terms need only a factor.
         tries = tries + 1
         if (.not. last <= huge(h)) then
           if (tries > MOST_TRIES) then
-            status = OVERFLOW
+            found%status = OVERFLOW
             exit
           end if
           h = h*0.0625_dp
           if (size(waves) > MANY_WAVES) then
             if (interrupt_raised() /= 0) then
-              status = INTERRUPTED
+              found%status = INTERRUPTED
               exit
             end if
           end if
@@ -301,22 +298,21 @@ contains
       else
         call carry(s)
       end if
-      call leave_out(s, order, 1.0_dp/allowed, left)
-      call add_rows(s, order, h, at_end, before, left(:3), n_times, times, tolerance, now, rows, n_rows, &
-                    status)
-      if (status /= COMPLETE) exit
+      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+      call add_rows(s, order, h, at_end, before, left(:3), times, tolerance, now, rows, found)
+      if (found%status /= COMPLETE) exit
       call count_step(again, s%lanes, blocks)
       call add_change(s%change, now)
-      steps = steps + 1
+      found%steps = found%steps + 1
       ! Where products overflow a step may pass that leads nowhere.
       if (.not. now%scale > LARGEST) tries = 1
       if (.not. all(abs(now%w) <= huge(h))) then
-        status = OVERFLOW
+        found%status = OVERFLOW
         exit
       end if
       if (at_end) then
         call add_row(now%w(:3), now%w_low(:3), s%lanes(1, :), tolerance, now, rows(:, n_times))
-        n_rows = n_times
+        found%n_rows = n_times
         exit
       end if
       now%since = merge(0, now%since + 1, now%since + 1 >= lasting)
@@ -324,33 +320,33 @@ contains
       call add_time(now%t, now%t_low, h)
       rest = (times(n_times) - now%t) - now%t_low
       h = next
-      if (steps >= next_look) then
-        if (real(steps, dp) >= most_steps) then
+      if (found%steps >= next_look) then
+        if (real(found%steps, dp) >= most_steps) then
           ! As many steps a second as so far, or more as the motion grows faster.
-          ahead = 1.0_dp
-          if (steps > half_way .and. abs(now%t) > abs(t_half)) then
-            ahead = log(real(steps, dp)/real(half_way, dp))/log(now%t/t_half)
+          found%ahead = 1.0_dp
+          if (found%steps > half_way .and. abs(now%t) > abs(t_half)) then
+            found%ahead = log(real(found%steps, dp)/real(half_way, dp))/log(now%t/t_half)
           end if
-          ahead = merge(min(3.0_dp, ahead), 1.0_dp, ahead > GROWING)
-          ahead = real(steps, dp)*exp(ahead*log(1.0_dp + abs(rest/now%t)))
-          status = GAVE_UP
-        else if (steps == 1 .and. abs(rest) > (HOPELESS*most_steps)*abs(h)) then
-          ahead = abs(rest)/max(abs(h), tiny(h))
-          status = GAVE_UP
-        else if (steps > 1) then
-          if (interrupt_raised() /= 0) status = INTERRUPTED
+          found%ahead = merge(min(3.0_dp, found%ahead), 1.0_dp, found%ahead > GROWING)
+          found%ahead = real(found%steps, dp)*exp(found%ahead*log(1.0_dp + abs(rest/now%t)))
+          found%status = GAVE_UP
+        else if (found%steps == 1 .and. abs(rest) > (HOPELESS*most_steps)*abs(h)) then
+          found%ahead = abs(rest)/max(abs(h), tiny(h))
+          found%status = GAVE_UP
+        else if (found%steps > 1) then
+          if (interrupt_raised() /= 0) found%status = INTERRUPTED
         end if
-        if (status /= COMPLETE) exit
-        next_look = min(steps + stride, max(steps + 1, int(most_steps, int64)))
-        if (steps == half_way) t_half = now%t
-        if (steps < half_way) next_look = min(next_look, half_way)
+        if (found%status /= COMPLETE) exit
+        next_look = min(found%steps + stride, max(found%steps + 1, int(most_steps, int64)))
+        if (found%steps == half_way) t_half = now%t
+        if (found%steps < half_way) next_look = min(next_look, half_way)
       end if
     end do
-    call growths_of(again, s%lanes, blocks, growth, largest)
-    error = now%worst
-    if (.not. maxval(abs(s%lanes(1, :))) <= error) error = maxval(abs(s%lanes(1, :)))
-    if (now%scale > 0.0_dp) error = error/now%scale
-    if (.not. error <= NO_DIGIT) error = NO_DIGIT
+    call growths_of(again, s%lanes, blocks, found%growth, found%largest)
+    found%error = now%worst
+    if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
+    if (now%scale > 0.0_dp) found%error = found%error/now%scale
+    if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
   end subroutine march
 
   pure subroutine fit_to_end(h, rest, at_end)
@@ -367,8 +363,7 @@ contains
     end if
   end subroutine fit_to_end
 
-  subroutine add_rows(s, order, h, at_end, before, left, n_times, times, tolerance, now, &
-                      rows, n_rows, status)
+  subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, rows, found)
     !! Rows within the step, but for the last of all, from its terms; the error by Hermite's cubic.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
@@ -376,40 +371,39 @@ contains
     logical, intent(in) :: at_end
     real(dp), intent(in) :: before(3)       !! the error at the step's beginning, rad/s
     real(dp), intent(in) :: left(3)         !! what the step left out, rad/s
-    integer, intent(in) :: n_times
-    real(dp), intent(in) :: times(n_times)
+    real(dp), intent(in) :: times(:)        !! s
     real(dp), intent(in) :: tolerance
     type(state_t), intent(inout) :: now
-    real(dp), intent(inout) :: rows(3, n_times)
-    integer, intent(inout) :: n_rows, status
+    real(dp), intent(inout) :: rows(:, :)
+    type(outcome_t), intent(inout) :: found !! its rows and its status
     real(dp) :: rises(3, 2)  ! of the error at either end, times the step
     real(dp) :: carried(3)   ! the error at the end, but for what the step left out
     real(dp) :: part, to_go
     integer :: last
 
-    last = n_times
+    last = size(times)
     if (at_end) last = last - 1
-    if (n_rows >= last) return
-    if (abs(times(n_rows + 1) - now%t) > abs(h)) return
+    if (found%n_rows >= last) return
+    if (abs(times(found%n_rows + 1) - now%t) > abs(h)) return
     rises(:, 1) = rise(s%factors(:3), now%w(:3), before)
     carried = s%lanes(1, :) + left
     rises(:, 2) = rise(s%factors(:3), now%w(:3) + s%change(:3), carried)
-    do while (n_rows < last)
-      if (abs(times(n_rows + 1) - now%t) > abs(h)) exit
-      part = ((times(n_rows + 1) - now%t) - now%t_low)/h
+    do while (found%n_rows < last)
+      if (abs(times(found%n_rows + 1) - now%t) > abs(h)) exit
+      part = ((times(found%n_rows + 1) - now%t) - now%t_low)/h
       to_go = 1.0_dp - part
       call add_row(now%w(:3), now%w_low(:3) + inside(s, order, part), &
                    (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
                    + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
-                   - part**(order + 1)*left, tolerance, now, rows(:, n_rows + 1))
-      if (.not. all(abs(rows(:, n_rows + 1)) <= huge(h))) then
-        status = OVERFLOW
+                   - part**(order + 1)*left, tolerance, now, rows(:, found%n_rows + 1))
+      if (.not. all(abs(rows(:, found%n_rows + 1)) <= huge(h))) then
+        found%status = OVERFLOW
         return
       end if
-      n_rows = n_rows + 1
-      if (mod(n_rows, ROWS_BETWEEN_LOOKS) == 0) then
+      found%n_rows = found%n_rows + 1
+      if (mod(found%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
         if (interrupt_raised() /= 0) then
-          status = INTERRUPTED
+          found%status = INTERRUPTED
           return
         end if
       end if

@@ -135,7 +135,9 @@ def fortran_terms() -> Iterator[str]:
     for n in range(0, MOST_ORDER, 2):
         if n < WIDE:
             yield from (f"  {line}" for line in known(n))
-        yield from (f"  {line}" for k, total in ((n + 1, "p"), (n + 2, "q")) for line in term(k, total))
+        yield from (
+            f"  {line}" for k, total in ((n + 1, "p"), (n + 2, "q")) for line in term(k, total)
+        )
         if n + 2 in ORDERS[:-1]:
             yield f"  if (order == {n + 2}) then"
             yield from (f"    {line}" for line in end_of_terms())

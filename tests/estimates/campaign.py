@@ -105,16 +105,9 @@ def _prepared(method: str) -> Callable[[Draw], Answer]:
 def _answer(of: Draw, name: str, method: str, ended: str, omega: Array, said: Any) -> Answer:
     """Read an answer; the attributes that not every kernel has are hooks."""
     error = of.truth.error(omega) if np.isfinite(omega).all() else float("inf")
-    estimate, growth = (_number(getattr(said, each, None)) for each in ("error", "growth"))
-    evaluations = getattr(said, "evaluations", None)
+    evaluations = getattr(said, "evaluations", None)  # no solver has any
     runs = None if evaluations is None else 1 + (evaluations > said.steps)
-    return Answer(of, name, method, ended, error, estimate, growth, said.steps, runs)
-
-
-def _number(value: Any) -> float | None:
-    """Return a number, of one row or of the last; None where it is not known."""
-    last = None if value is None else float(np.asarray(value, dtype=float).ravel()[-1])
-    return None if last is None or np.isnan(last) else last
+    return Answer(of, name, method, ended, error, said.error, said.growth, said.steps, runs)
 
 
 ENTRANCES: dict[str, Callable[[Draw], Answer]] = {

@@ -9,7 +9,7 @@ module taylor
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
   use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
   use taylor_plan, only: LEAST_SHARE, plan
-  use taylor_series, only: carry, carry_fully, expand, fitting, following, inside, rescale, &
+  use taylor_series, only: carry, carry_precisely, expand, fitting, following, inside, rescale, &
                            series_t, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t, &
                           waves_of
@@ -142,16 +142,18 @@ contains
     real(dp) :: most    ! steps left
     real(dp) :: spent   ! steps of the marches before
     real(dp) :: growth
+    logical :: precise  ! this march, for a growth known too coarsely
 
     asked = tolerance
     planned = PLANNED_GROWTH
     cost = 1.0_dp + A_WAVE*n_waves
     most = min(FARTHEST_COUNT, effort*(MOST_STEPS/cost))
     spent = 0.0_dp
+    precise = .false.
     needed = 0.0_dp
     call waves_of(problem, waves)
     do
-      call march(problem, omega, asked, tolerance, spent > 0.0_dp, most - spent, &
+      call march(problem, omega, asked, tolerance, precise, most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, int64), n_times, times, room%s, room%blocks, &
                  room%now, waves, rows, outcome)
       spent = spent + real(outcome%steps, dp)
@@ -159,10 +161,11 @@ contains
       growth = outcome%growth
       if (outcome%largest > CHOOSING) growth = outcome%largest
       if (outcome%status /= COMPLETE .or. outcome%finest) exit
-      if (ROUNDING*growth > UNSURE*tolerance .and. growth > planned) then
+      precise = growth > planned
+      if (precise .and. ROUNDING*growth > UNSURE*tolerance) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
         asked = 0.0_dp
-      else if (outcome%error > TRUSTED*tolerance .or. growth > planned) then
+      else if (precise .or. outcome%error > TRUSTED*tolerance) then
         asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*outcome%error), &
                           PLANNED_GROWTH/growth)
         planned = max(planned, 2.0_dp*growth)
@@ -183,14 +186,14 @@ contains
     end if
   end subroutine solve
 
-  subroutine march(problem, omega, asked, tolerance, again, most_steps, stride, n_times, times, s, &
+subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, s, &
                    blocks, now, waves, rows, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
     real(dp), intent(in) :: asked                       !! tolerance of this march
     real(dp), intent(in) :: tolerance                   !! of the error at `times`, relative
-    logical, intent(in) :: again                        !! for an error known too coarsely
+    logical, intent(in) :: precise                      !! carry differences as exactly as can be
     real(dp), intent(in) :: most_steps
     integer(int64), intent(in) :: stride                !! steps between looks at the user
     integer, intent(in) :: n_times
@@ -239,7 +242,7 @@ contains
     coefficients = [problem%coefficients, 0.0_dp]
     constant = [problem%constant, 0.0_dp]
     rate = [problem%rate, 0.0_dp]
-    call begin(again, s%lanes, blocks)
+    call begin(precise, s%lanes, blocks)
     next_look = 1
     half_way = max(1_int64, int(0.5_dp*most_steps, int64))
     t_half = 0.0_dp
@@ -293,15 +296,15 @@ contains
         h = next
       end if
       before = s%lanes(1, :)
-      if (again) then
-        call carry_fully(s, order)
+      if (precise) then
+        call carry_precisely(s)
       else
         call carry(s)
       end if
       call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left)
       call add_rows(s, order, h, at_end, before, left(:3), times, tolerance, now, rows, found)
       if (found%status /= COMPLETE) exit
-      call count_step(again, s%lanes, blocks)
+      call count_step(precise, s%lanes, blocks)
       call add_change(s%change, now)
       found%steps = found%steps + 1
       ! Where products overflow a step may pass that leads nowhere.
@@ -342,7 +345,7 @@ contains
         if (found%steps < half_way) next_look = min(next_look, half_way)
       end if
     end do
-    call growths_of(again, s%lanes, blocks, found%growth, found%largest)
+    call growths_of(precise, s%lanes, blocks, found%growth, found%largest)
     found%error = now%worst
     if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
     if (now%scale > 0.0_dp) found%error = found%error/now%scale

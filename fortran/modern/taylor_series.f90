@@ -4,7 +4,7 @@ module taylor_series
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use torque_terms, only: MOST_ORDER
+  use torque_terms, only: LEAST_ORDER, MOST_ORDER
   implicit none(type, external)
   private
 
@@ -18,6 +18,7 @@ module taylor_series
   end type series_t
 
   integer, parameter :: ORDER_CARRIED = 7 ! of the exponential
+  integer, parameter :: ORDER_PRECISE = LEAST_ORDER
   integer, parameter :: MOST_MOMENTS = 8 ! terms that count in them
   integer :: k_
   ! Of term k: its integral over the step, and that times the time from the middle.
@@ -25,7 +26,7 @@ module taylor_series
   real(dp), parameter :: MOMENTS(MOST_MOMENTS) = &
                          [(real(k_, dp)/real(2*(k_ + 1)*(k_ + 2), dp), k_=1, MOST_MOMENTS)]
 
-  public :: carry, carry_fully, expand, fitting, following, inside, rescale, size_of
+  public :: carry, carry_precisely, expand, fitting, following, inside, rescale, size_of
 
 contains
 
@@ -80,16 +81,15 @@ contains
     call multiply(o, s%lanes)
   end subroutine carry
 
-  pure subroutine carry_fully(s, order)
-    !! The same as exactly as the series itself: by the linear part of the recurrence.
+  pure subroutine carry_precisely(s)
+    !! The same to higher order: by the linear part of the recurrence of the terms.
     type(series_t), intent(inout) :: s
-    integer, intent(in) :: order
-    real(dp) :: d(4, 3, 0:MOST_ORDER)
+    real(dp) :: d(4, 3, 0:ORDER_PRECISE)
     real(dp) :: x(4), y(4), z(4)
     integer :: i, j, k
 
     d(:, :, 0) = s%lanes
-    do k = 1, order
+    do k = 1, ORDER_PRECISE
       x = 0.0_dp
       y = 0.0_dp
       z = 0.0_dp
@@ -104,10 +104,10 @@ contains
       d(:, 2, k) = (s%factors(2)/k)*y
       d(:, 3, k) = (s%factors(3)/k)*z
     end do
-    do k = 1, order
+    do k = 1, ORDER_PRECISE
       s%lanes = s%lanes + d(:, :, k)
     end do
-  end subroutine carry_fully
+  end subroutine carry_precisely
 
   ! unroll: multiply
   pure subroutine multiply(o, lanes)

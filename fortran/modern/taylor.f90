@@ -160,7 +160,8 @@ contains
       ! Rounding chose the way where a difference grew so much; at its end is another motion.
       growth = outcome%growth
       if (outcome%largest > CHOOSING) growth = outcome%largest
-      if (outcome%status /= COMPLETE .or. outcome%finest) exit
+      if (outcome%status /= COMPLETE) exit
+      if (outcome%finest .and. (precise .or. growth <= planned)) exit
       precise = growth > planned
       if (precise .and. ROUNDING*growth > UNSURE*tolerance) then
         ! Before that is said: long steps may make much of a motion near the separatrix.

@@ -1,0 +1,78 @@
+"""The Taylor kernel from its source as it stands, or with a part of it replaced."""
+
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from pyharness import Scene
+from pyharness.methods.problem import normalized
+from pyharness.model import codes
+from pyharness.model.trajectory import Array
+
+COMPILER = os.environ.get("FC", "gfortran")
+_FORTRAN = Path(__file__).parent.parent / "fortran"
+_MODULES = (
+    "problem", "torque_terms", "taylor_plan", "taylor_series", "taylor_error", "taylor",
+)  # fmt: skip
+
+
+class Found(NamedTuple):
+    """What a run came to."""
+
+    omega: Array  # a row for each time
+    status: int
+    steps: int  # of the last march
+    error: float  # estimate, relative
+    growth: float
+
+
+Solve = Callable[[Scene, Sequence[float], float], Found]
+
+
+def compiler_here() -> bool:
+    """Whether there is a Fortran compiler."""
+    return shutil.which(COMPILER) is not None
+
+
+def as_written(folder: Path, changes: Mapping[str, tuple[str, str]] | None = None) -> Solve:
+    """Compile the loops as they are written, not written out; return what solves by them.
+
+    `changes` has by module a piece that stands in it once, and what is put in its place.
+    """
+    sources = ["kinds.f90", "interruption.f90", "../tests/never_interrupted.f90"]
+    sources += [f"modern/{name}.f90" for name in _MODULES]
+    sources += ["../tests/taylor_as_written.f90"]
+    for source in sources:
+        text = (_FORTRAN / source).read_text()
+        old, new = (changes or {}).get(Path(source).stem, ("", ""))
+        if old:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
+        (folder / Path(source).name).write_text(text)
+    maker = [sys.executable, str(_FORTRAN / "make_codes.py"), codes.__file__, "codes.f90"]
+    subprocess.run(maker, cwd=folder, check=True)
+    command = [COMPILER, "-shared", "-fPIC", "-O1", "-o", "loops.so", "codes.f90"]
+    subprocess.run([*command, *(Path(each).name for each in sources)], cwd=folder, check=True)
+    loops = ctypes.CDLL(str(folder / "loops.so")).taylor_as_written
+
+    def solved(scene: Scene, times: Sequence[float], tolerance: float) -> Found:
+        coefficients, constant, rate, sines, cosines = normalized(scene)
+        rows, found = np.zeros((len(times), 3)), np.zeros(3)
+        n_rows, status, steps = ctypes.c_int(), ctypes.c_int(), ctypes.c_int64()
+        loops(
+            coefficients.ctypes, constant.ctypes, rate.ctypes, sines.shape[1], sines.ctypes,
+            cosines.shape[1], cosines.ctypes, np.array(scene.omega).ctypes,
+            np.array([tolerance]).ctypes, len(times), np.array(times, dtype=float).ctypes,
+            rows.ctypes, ctypes.byref(n_rows), ctypes.byref(status), ctypes.byref(steps),
+            found.ctypes,
+        )  # fmt: skip
+        return Found(rows[: n_rows.value], status.value, steps.value, found[0], found[1])
+
+    return solved

@@ -187,7 +187,7 @@ contains
     end if
   end subroutine solve
 
-subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, s, &
+  subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, s, &
                    blocks, now, waves, rows, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem

@@ -28,6 +28,9 @@ module taylor
   real(dp), parameter :: GROWING = 1.3_dp ! power of time with which steps do, not by chance
   real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass
+  ! Radians about the body in a step: differences turn where omega does not.
+  real(dp), parameter :: A_STEP = 200.0_dp
+  real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
   ! Error, relative, beyond which its linear motion says little, and the one that says no more.
   real(dp), parameter :: LINEAR = 0.1_dp
@@ -163,6 +166,9 @@ contains
       if (outcome%status /= COMPLETE) exit
       if (outcome%finest .and. (precise .or. growth <= planned)) exit
       precise = growth > planned
+      ! Or the way is too long to measure it again.
+      if (precise .and. maxval(abs(problem%coefficients))*room%now%scale*abs(times(n_times)) &
+          > A_PRECISE_STEP*(most - spent)) exit
       if (precise .and. ROUNDING*growth > UNSURE*tolerance) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
         asked = 0.0_dp
@@ -187,8 +193,8 @@ contains
     end if
   end subroutine solve
 
-  subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, s, &
-                   blocks, now, waves, rows, found)
+  subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, &
+                   s, blocks, now, waves, rows, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
@@ -215,6 +221,7 @@ contains
     real(dp) :: allowed       ! the same in rad/s
     real(dp) :: last          ! size of the last two terms, rad/s
     real(dp) :: longest       ! turn of a wave
+    real(dp) :: farthest      ! step times scale: a spin has no terms that would tell
     logical :: at_end
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
     integer(int64) :: part    ! 65536 over the order
@@ -237,6 +244,7 @@ contains
     call plan(problem, now%scale, asked, rest, order, share, h)
     found%finest = share <= LEAST_SHARE
     part = 65536/order
+    farthest = merge(A_PRECISE_STEP, A_STEP, precise)/maxval(abs(problem%coefficients))
     lasting = steps_by_turns(share)
     if (size(waves) > 0) longest = longest_turn(order, share)
     s%torque = 0.0_dp
@@ -250,8 +258,9 @@ contains
     decay = 0
     tries = 0
     do
-      call fit_to_end(h, rest, at_end)
       now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
+      call shorten_to(farthest/now%scale, h)
+      call fit_to_end(h, rest, at_end)
       allowed = share*now%scale
       ! Four at once: what was stored one by one could not be loaded together without a wait.
       do i = 1, 4
@@ -289,6 +298,7 @@ contains
           cycle
         end if
         next = fitting(h, last, order, allowed)
+        call shorten_to(farthest/now%scale, next)
         if (abs(next) > abs(rest)) next = rest
         at_end = abs(next) >= abs(rest)
         if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
@@ -352,6 +362,13 @@ contains
     if (now%scale > 0.0_dp) found%error = found%error/now%scale
     if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
   end subroutine march
+
+  pure subroutine shorten_to(longest, h)
+    real(dp), intent(in) :: longest !! s
+    real(dp), intent(inout) :: h    !! s
+
+    if (abs(h) > longest) h = sign(longest, h)
+  end subroutine shorten_to
 
   pure subroutine fit_to_end(h, rest, at_end)
     !! Equal steps near the end: the last one would be short, and cost as much.

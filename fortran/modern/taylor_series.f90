@@ -18,6 +18,8 @@ module taylor_series
   end type series_t
 
   integer, parameter :: ORDER_CARRIED = 7 ! of the exponential
+  real(dp), parameter :: EXPONENT = 3.0_dp ! norm up to which it is taken at once
+  real(dp), parameter :: MOST_PARTS = 1e3_dp
   integer, parameter :: ORDER_PRECISE = LEAST_ORDER
   integer, parameter :: MOST_MOMENTS = 8 ! terms that count in them
   integer :: k_
@@ -57,7 +59,8 @@ contains
     real(dp), dimension(4) :: mean, moment
     real(dp) :: c(3)                   ! their cross product
     real(dp) :: o(6)                   ! the matrix, by rows; its diagonal is 0
-    integer :: i, k
+    real(dp) :: size
+    integer :: i, k, parts
 
     do i = 1, 4
       mean(i) = s%terms(i, 0)
@@ -78,7 +81,17 @@ contains
     o(4) = s%factors(2)*(mean(1) + s%factors(1)*c(1))
     o(5) = s%factors(3)*(mean(2) + s%factors(2)*c(2))
     o(6) = s%factors(3)*(mean(1) - s%factors(1)*c(1))
-    call multiply(o, s%lanes)
+    size = max(abs(o(1)) + abs(o(2)), abs(o(3)) + abs(o(4)), abs(o(5)) + abs(o(6)))
+    if (size <= EXPONENT) then
+      call multiply(o, s%lanes)
+    else
+      ! A spin about an axis, whose steps are long.
+      parts = ceiling(min(MOST_PARTS, size))
+      o = o*(1.0_dp/parts)
+      do k = 1, parts
+        call multiply(o, s%lanes)
+      end do
+    end if
   end subroutine carry
 
   pure subroutine carry_precisely(s)

@@ -23,7 +23,7 @@ from tests.mutations.trial import Verdict, attempt, false_killers
 
 # Two of each language, from rooms far apart, that one short test each catches.
 CI = (
-    "fortran/modern/taylor_series/tail-order",
+    "fortran/modern/taylor_series/rescaled-sum",
     "fortran/original/runge_kutta/second-stage-base",
     "pyharness/compare/agreement/tolerance-sense",
     "pyharness/model/scene_file/inertia-order",

@@ -4,7 +4,7 @@ module taylor_series
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use torque_terms, only: LEAST_ORDER, MOST_ORDER
+  use torque_terms, only: MOST_ORDER
   implicit none(type, external)
   private
 
@@ -20,7 +20,7 @@ module taylor_series
   integer, parameter :: ORDER_CARRIED = 7 ! of the exponential
   real(dp), parameter :: EXPONENT = 3.0_dp ! norm up to which it is taken at once
   real(dp), parameter :: MOST_PARTS = 1e3_dp
-  integer, parameter :: ORDER_PRECISE = LEAST_ORDER
+  integer, parameter :: ORDER_PRECISE = 10
   integer, parameter :: MOST_MOMENTS = 8 ! terms that count in them
   integer :: k_
   ! Of term k: its integral over the step, and that times the time from the middle.
@@ -94,6 +94,7 @@ contains
     end if
   end subroutine carry
 
+  ! unroll: carry_precisely
   pure subroutine carry_precisely(s)
     !! The same to higher order: by the linear part of the recurrence of the terms.
     type(series_t), intent(inout) :: s
@@ -121,6 +122,7 @@ contains
       s%lanes = s%lanes + d(:, :, k)
     end do
   end subroutine carry_precisely
+  ! end unroll
 
   ! unroll: multiply
   pure subroutine multiply(o, lanes)

@@ -24,6 +24,7 @@ MODULES = (
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
+ORDER_PRECISE = 10
 # The two factors of the products in equations 13-15, and where the plain code has each unknown.
 FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
 PLACES = {
@@ -88,7 +89,11 @@ def fortran_source(text: str, level: str) -> str:
         text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{level}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
     expand = fortran_terms() if level == "plain" else fortran_door(level)
-    written = {"expand": expand, "multiply": fortran_multiply()}
+    written = {
+        "expand": expand,
+        "multiply": fortran_multiply(),
+        "carry_precisely": fortran_precise(),
+    }
     blocks = re.split(r" *! unroll: (\w+)\n.*?! end unroll\n", text, flags=re.DOTALL)
     parts = [blocks[0]]
     for name, rest in zip(blocks[1::2], blocks[2::2], strict=True):
@@ -227,6 +232,32 @@ def fortran_multiply() -> Iterator[str]:
     yield from (f"    lanes(i, {axis}) = {name}" for axis, name in enumerate("uvw", 1))
     yield "  end do"
     yield "end subroutine multiply"
+
+
+def fortran_precise() -> Iterator[str]:
+    """Yield the linear part of the recurrence, for vectors side by side."""
+    names = [f"{name}{k}" for k in range(ORDER_PRECISE + 1) for name in "xyz"]
+    yield "pure subroutine carry_precisely(s)"
+    yield "  type(series_t), intent(inout) :: s"
+    yield from (f"  real(dp) :: {name}" for name in names)
+    yield "  integer :: i"
+    yield "  do i = 1, 4"
+    yield from (f"    {name}0 = s%lanes(i, {axis})" for axis, name in enumerate("xyz", 1))
+    for k in range(1, ORDER_PRECISE + 1):
+        for axis, (name, (u, v)) in enumerate(zip("xyz", FACTORS, strict=True), 1):
+            start = ""
+            for j in range(k - 1, -1, -1):
+                for one, other in ((u, v), (v, u)):
+                    place = f"s%terms({'xyz'.index(one) + 1}, {j})"
+                    yield f"    {name}{k} = {start}{place}*{other}{k - 1 - j}"
+                    start = f"{name}{k} + "
+            yield f"    {name}{k} = (s%factors({axis})*(1.0_dp/{k}.0_dp))*{name}{k}"
+    for axis, name in enumerate("xyz", 1):
+        yield f"    s%lanes(i, {axis}) = {name}0"
+        for k in range(1, ORDER_PRECISE + 1):
+            yield f"    s%lanes(i, {axis}) = s%lanes(i, {axis}) + {name}{k}"
+    yield "  end do"
+    yield "end subroutine carry_precisely"
 
 
 # ---- C ------------------------------------------------------------------------------------------

@@ -29,7 +29,7 @@ module taylor
   real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass
   ! Radians about the body in a step: differences turn where omega does not.
-  real(dp), parameter :: A_STEP = 200.0_dp
+  real(dp), parameter :: A_STEP = 10.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
   ! Error, relative, beyond which its linear motion says little, and the one that says no more.
@@ -173,7 +173,7 @@ contains
         ! Before that is said: long steps may make much of a motion near the separatrix.
         asked = 0.0_dp
       else if (precise .or. outcome%error > TRUSTED*tolerance) then
-        asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*outcome%error), &
+        asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*max(outcome%error, ROUNDING**2)), &
                           PLANNED_GROWTH/growth)
         planned = max(planned, 2.0_dp*growth)
       else
@@ -244,7 +244,8 @@ contains
     call plan(problem, now%scale, asked, rest, order, share, h)
     found%finest = share <= LEAST_SHARE
     part = 65536/order
-    farthest = merge(A_PRECISE_STEP, A_STEP, precise)/maxval(abs(problem%coefficients))
+    farthest = merge(A_PRECISE_STEP, A_STEP, precise) &
+               /max(maxval(abs(problem%coefficients)), tiny(h))
     lasting = steps_by_turns(share)
     if (size(waves) > 0) longest = longest_turn(order, share)
     s%torque = 0.0_dp
@@ -259,7 +260,7 @@ contains
     tries = 0
     do
       now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
-      call shorten_to(farthest/now%scale, h)
+      call shorten_to(farthest, now%scale, h)
       call fit_to_end(h, rest, at_end)
       allowed = share*now%scale
       ! Four at once: what was stored one by one could not be loaded together without a wait.
@@ -298,7 +299,7 @@ contains
           cycle
         end if
         next = fitting(h, last, order, allowed)
-        call shorten_to(farthest/now%scale, next)
+        call shorten_to(farthest, now%scale, next)
         if (abs(next) > abs(rest)) next = rest
         at_end = abs(next) >= abs(rest)
         if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
@@ -363,11 +364,12 @@ contains
     if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
   end subroutine march
 
-  pure subroutine shorten_to(longest, h)
-    real(dp), intent(in) :: longest !! s
-    real(dp), intent(inout) :: h    !! s
+  pure subroutine shorten_to(farthest, scale, h)
+    real(dp), intent(in) :: farthest !! step times scale
+    real(dp), intent(in) :: scale    !! largest |omega|, rad/s
+    real(dp), intent(inout) :: h     !! s
 
-    if (abs(h) > longest) h = sign(longest, h)
+    if (abs(h)*scale > farthest) h = sign(farthest/scale, h)
   end subroutine shorten_to
 
   pure subroutine fit_to_end(h, rest, at_end)

@@ -213,7 +213,7 @@ contains
     type(outcome_t), intent(out) :: found
     real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
     real(dp) :: left(4)       ! by the step, rad/s
-    real(dp) :: before(3)     ! the error at its beginning, rad/s
+    real(dp) :: error(3)      ! carried so far, rad/s
     real(dp) :: h             ! step, s
     real(dp) :: rest          ! time to go, s
     real(dp) :: next          ! the step after this one, s
@@ -245,7 +245,7 @@ contains
     found%finest = share <= LEAST_SHARE
     part = 65536/order
     farthest = merge(A_PRECISE_STEP, A_STEP, precise) &
-               /max(maxval(abs(problem%coefficients)), tiny(h))
+               /max(maxval(abs(problem%coefficients)), 2.0_dp*A_STEP*tiny(h))
     lasting = steps_by_turns(share)
     if (size(waves) > 0) longest = longest_turn(order, share)
     s%torque = 0.0_dp
@@ -307,14 +307,14 @@ contains
         now%since = lasting
         h = next
       end if
-      before = s%lanes(1, :)
+      error = s%lanes(1, :)
       if (precise) then
         call carry_precisely(s)
       else
         call carry(s)
       end if
       call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left)
-      call add_rows(s, order, h, at_end, before, left(:3), times, tolerance, now, rows, found)
+      call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, rows, found)
       if (found%status /= COMPLETE) exit
       call count_step(precise, s%lanes, blocks)
       call add_change(s%change, now)
@@ -326,7 +326,8 @@ contains
         exit
       end if
       if (at_end) then
-        call add_row(now%w(:3), now%w_low(:3), s%lanes(1, :), tolerance, now, rows(:, n_times))
+        error = s%lanes(1, :)
+        call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, n_times))
         found%n_rows = n_times
         exit
       end if

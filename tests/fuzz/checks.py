@@ -101,7 +101,7 @@ def _method(given: strategies.MethodInput, folder: Path) -> None:
 
 def _prepared(given: strategies.PreparedInput, folder: Path) -> None:
     try:
-        solver = prepare(given.scene, given.method, given.tolerance)
+        solver = prepare(given.scene, given.method, given.tolerance, given.effort)
     except InputError as error:
         _one_line(error)
         return

@@ -161,6 +161,7 @@ class PreparedInput:
     scene: Scene
     method: str
     tolerance: float
+    effort: float
     omega0: Triple
     t_end: float
 
@@ -173,7 +174,9 @@ def prepared_input(random: Random) -> PreparedInput:
     if random.random() < 0.05:
         odd = random.choice((float("nan"), float("inf"), -float("inf")))
         omega0, t_end = random.choice((((odd, 1.0, 2.0), t_end), (omega0, odd)))
-    return PreparedInput(found, random.choice(PREPARED), tolerance(random), omega0, t_end)
+    # Sines of huge phases take ten times as long, and a build with every check five times that.
+    effort = random.choice((1e-6, 1e-3, 0.1))
+    return PreparedInput(found, random.choice(PREPARED), tolerance(random), effort, omega0, t_end)
 
 
 @dataclass(frozen=True)

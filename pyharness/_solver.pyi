@@ -10,6 +10,7 @@ class BoundKernel:
         kernel: Callable[..., tuple[Array, int, int, Array]],
         packed: Array,
         check: Callable[[object, object, object], tuple[Triple, float]],
+        brief: Array | None = None,
     ) -> Self: ...
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array: ...
     @property

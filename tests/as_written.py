@@ -19,6 +19,7 @@ from pyharness.model.trajectory import Array
 COMPILER = os.environ.get("FC", "gfortran")
 _FORTRAN = Path(__file__).parent.parent / "fortran"
 _MODULES = (
+    "two_words",
     "problem", "torque_terms", "taylor_plan", "taylor_series", "taylor_error", "taylor",
 )  # fmt: skip
 

@@ -21,7 +21,7 @@ import numpy as np
 from pyharness.methods.plan import EITHER
 from pyharness.methods.prepared import _CODES
 from pyharness.model.codes import Places
-from pyharness.model.extension import GAVE_UP, OVERFLOW
+from pyharness.model.extension import GAVE_UP, OVERFLOW, SENSITIVE
 
 _ON_ARM = platform.machine().lower() in ("arm64", "aarch64")
 INVALID = 1
@@ -91,6 +91,9 @@ def _told(found: dict[str, Any], has_infinity: bool) -> int:
     if found.get("status") in (OVERFLOW, GAVE_UP) and has_infinity:
         # An infinity taken from another is invalid, and a step of one over infinity is zero; either
         # by itself is not told.
+        told |= _TRAPPED
+    if found.get("status") == SENSITIVE and has_infinity:
+        # Small differences, and the error carried with them, grew beyond every number.
         told |= _TRAPPED
     if np.isinf(found.get("stop_quotient", 0.0)):
         told |= DIVIDE

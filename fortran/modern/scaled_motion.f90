@@ -1,7 +1,7 @@
 module scaled_motion
   !! Unknowns scaled so that every product has the coefficient 1 or -1, and the integral of the
   !! torque in them; waves that are fast and weak are averaged, to second order.
-  use torque_terms, only: sine_cosine
+  use two_words, only: sine_cosine_of
   use kinds, only: dp
   use problem, only: problem_t
   use statuses, only: COMPLETE, REFUSED
@@ -235,7 +235,7 @@ contains
     real(dp) :: s                        ! of half the angle
     real(dp) :: c
 
-    call sine_cosine(frequency, 0.5_dp*t, 0.0_dp, s, c)
+    call sine_cosine_of(frequency, 0.5_dp*t, 0.0_dp, s, c)
     sine = 2.0_dp*s*c
     vers = 2.0_dp*s*s
   end subroutine wave_at

@@ -33,12 +33,15 @@ typedef struct {
   PyObject *callable;    /* the kernel as Python has it */
   kernel *address;       /* NULL where it is not f2py's: then it is called as Python would */
   PyArrayObject *packed; /* read-only */
+  PyArrayObject *brief;  /* the same, or NULL: for what takes less time than others' getting a turn */
   PyObject *check;       /* (omega0, t_end, out) -> (three floats, float), or its InputError */
   ending *endings;
   Py_ssize_t n_endings;
   Py_ssize_t room;
   Py_ssize_t latest; /* where the last call's ending is */
 } bound_kernel;
+
+enum { COMPLETE = 0 }; /* of the statuses */
 
 static PyObject *out_name; /* interned, as the compiler's names of keywords are */
 static npy_intp three[1] = {3};
@@ -291,6 +294,14 @@ static int call_object(bound_kernel *self, double omega[3], ending *now)
   return is_right;
 }
 
+static inline void enter(const bound_kernel *self, PyArrayObject *packed, ending *now,
+                         double omega[3])
+{
+  const int n_packed = (int)PyArray_DIM(packed, 0);
+  self->address(PyArray_DATA(packed), &n_packed, now->start, &now->time, omega, &now->status,
+                &now->steps, now->found);
+}
+
 static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, PyObject *names)
 {
   bound_kernel *self = (bound_kernel *)object;
@@ -313,14 +324,16 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   }
 
   if (self->address != NULL) {
-    const double *packed = PyArray_DATA(self->packed);
-    const int n_packed = (int)PyArray_DIM(self->packed, 0);
-    PyThreadState *thread = PyEval_SaveThread();
-    self->address(packed, &n_packed, now.start, &now.time, omega, &now.status, &now.steps,
-                  now.found);
-    PyEval_RestoreThread(thread);
-    /* Ctrl-C, which a kernel asks about now and then, ends it with this set. */
-    if (PyErr_Occurred()) return NULL;
+    PyThreadState *thread = PyThreadState_Get();
+    now.status = COMPLETE + 1;
+    if (self->brief != NULL) enter(self, self->brief, &now, omega);
+    if (now.status != COMPLETE) {
+      PyEval_SaveThread();
+      enter(self, self->packed, &now, omega);
+      PyEval_RestoreThread(thread);
+      /* Ctrl-C, which a kernel asks about now and then, ends it with this set. */
+      if (PyErr_Occurred()) return NULL;
+    }
     now.thread = PyThreadState_GetID(thread);
   } else {
     if (!call_object(self, omega, &now)) return NULL;
@@ -345,11 +358,27 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
 
 /* ---- The type ----------------------------------------------------------------------------- */
 
+/* A packed array of a solver's own; NULL with an error set where it is none. */
+static PyArrayObject *own_packed(PyObject *packed)
+{
+  PyArrayObject *own = (PyArrayObject *)PyArray_FROM_OTF(packed, NPY_DOUBLE,
+                                                         NPY_ARRAY_CARRAY | NPY_ARRAY_ENSURECOPY);
+  if (own == NULL) return NULL;
+  if (PyArray_NDIM(own) != 1 || PyArray_DIM(own, 0) > INT_MAX) {
+    PyErr_SetString(PyExc_ValueError, "packed: allowed: one dimension");
+    Py_CLEAR(own);
+  } else {
+    PyArray_CLEARFLAGS(own, NPY_ARRAY_WRITEABLE);
+  }
+  return own;
+}
+
 static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-  static char *known[] = {"kernel", "packed", "check", NULL};
-  PyObject *callable, *packed, *check;
-  if (!PyArg_ParseTupleAndKeywords(args, names, "OOO", known, &callable, &packed, &check)) {
+  static char *known[] = {"kernel", "packed", "check", "brief", NULL};
+  PyObject *callable, *packed, *check, *brief = Py_None;
+  if (!PyArg_ParseTupleAndKeywords(args, names, "OOO|O", known, &callable, &packed, &check,
+                                   &brief)) {
     return NULL;
   }
   bound_kernel *self = (bound_kernel *)type->tp_alloc(type, 0);
@@ -367,14 +396,12 @@ static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
   } else {
     goto failed;
   }
-  self->packed = (PyArrayObject *)PyArray_FROM_OTF(packed, NPY_DOUBLE,
-                                                   NPY_ARRAY_CARRAY | NPY_ARRAY_ENSURECOPY);
+  self->packed = own_packed(packed);
   if (self->packed == NULL) goto failed;
-  if (PyArray_NDIM(self->packed) != 1 || PyArray_DIM(self->packed, 0) > INT_MAX) {
-    PyErr_SetString(PyExc_ValueError, "packed: allowed: one dimension");
-    goto failed;
+  if (brief != Py_None) {
+    self->brief = own_packed(brief);
+    if (self->brief == NULL) goto failed;
   }
-  PyArray_CLEARFLAGS(self->packed, NPY_ARRAY_WRITEABLE);
   return (PyObject *)self;
 failed:
   Py_DECREF(self);
@@ -399,6 +426,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
   bound_kernel *self = (bound_kernel *)object;
   Py_VISIT(self->callable);
   Py_VISIT(self->packed);
+  Py_VISIT(self->brief);
   Py_VISIT(self->check);
   return 0;
 }
@@ -409,6 +437,7 @@ static void dealloc(PyObject *object)
   PyObject_GC_UnTrack(object);
   Py_XDECREF(self->callable);
   Py_XDECREF(self->packed);
+  Py_XDECREF(self->brief);
   Py_XDECREF(self->check);
   PyMem_Free(self->endings);
   Py_TYPE(object)->tp_free(object);

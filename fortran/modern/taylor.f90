@@ -13,6 +13,7 @@ module taylor
                            series_t, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t, &
                           waves_of
+  use two_words, only: two_sum
   implicit none(type, external)
   private
 
@@ -29,8 +30,9 @@ module taylor
   real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
   real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass
   ! Radians about the body in a step: differences turn where omega does not.
-  real(dp), parameter :: A_STEP = 10.0_dp
+  real(dp), parameter :: A_STEP = 60.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
+  real(dp), parameter :: LEAST_COUPLING = 1e-300_dp ! so that the step is a number
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
   ! Error, relative, beyond which its linear motion says little, and the one that says no more.
   real(dp), parameter :: LINEAR = 0.1_dp
@@ -167,7 +169,7 @@ contains
       if (outcome%finest .and. (precise .or. growth <= planned)) exit
       precise = growth > planned
       ! Or the way is too long to measure it again.
-      if (precise .and. maxval(abs(problem%coefficients))*room%now%scale*abs(times(n_times)) &
+      if (precise .and. coupling_of(problem%coefficients)*room%now%scale*abs(times(n_times)) &
           > A_PRECISE_STEP*(most - spent)) exit
       if (precise .and. ROUNDING*growth > UNSURE*tolerance) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
@@ -244,8 +246,7 @@ contains
     call plan(problem, now%scale, asked, rest, order, share, h)
     found%finest = share <= LEAST_SHARE
     part = 65536/order
-    farthest = merge(A_PRECISE_STEP, A_STEP, precise) &
-               /max(maxval(abs(problem%coefficients)), 2.0_dp*A_STEP*tiny(h))
+    farthest = merge(A_PRECISE_STEP, A_STEP, precise)/coupling_of(problem%coefficients)
     lasting = steps_by_turns(share)
     if (size(waves) > 0) longest = longest_turn(order, share)
     s%torque = 0.0_dp
@@ -333,7 +334,7 @@ contains
       end if
       now%since = merge(0, now%since + 1, now%since + 1 >= lasting)
       if (now%since > 0) call turn_waves(waves)
-      call add_time(now%t, now%t_low, h)
+      call two_sum((now%t), h + now%t_low, now%t, now%t_low)
       rest = (times(n_times) - now%t) - now%t_low
       h = next
       if (found%steps >= next_look) then
@@ -364,6 +365,15 @@ contains
     if (now%scale > 0.0_dp) found%error = found%error/now%scale
     if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
   end subroutine march
+
+  pure real(dp) function coupling_of(coefficients)
+    !! The largest rate of small differences over the largest omega, and not 0.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp) :: sizes(3)
+
+    sizes = sqrt(abs(coefficients))
+    coupling_of = max(sizes(1)*sizes(2), sizes(2)*sizes(3), sizes(3)*sizes(1), LEAST_COUPLING)
+  end function coupling_of
 
   pure subroutine shorten_to(farthest, scale, h)
     real(dp), intent(in) :: farthest !! step times scale
@@ -467,30 +477,11 @@ contains
     !! Omega at the end of the step, with what its rounding leaves out.
     real(dp), intent(in) :: change(4)
     type(state_t), intent(inout) :: now
-    real(dp) :: step, total, back
     integer :: i
 
     do i = 1, 4
-      step = change(i) + now%w_low(i)
-      total = now%w(i) + step
-      back = total - now%w(i)
-      now%w_low(i) = (now%w(i) - (total - back)) + (step - back)
-      now%w(i) = total
+      call two_sum((now%w(i)), change(i) + now%w_low(i), now%w(i), now%w_low(i))
     end do
   end subroutine add_change
-
-  pure subroutine add_time(t, t_low, h)
-    !! t + t_low + h, with what the rounding of t left out in t_low.
-    real(dp), intent(inout) :: t     !! s
-    real(dp), intent(inout) :: t_low !! s
-    real(dp), intent(in) :: h        !! s
-    real(dp) :: step, total, back
-
-    step = h + t_low
-    total = t + step
-    back = total - t
-    t_low = (t - (total - back)) + (step - back)
-    t = total
-  end subroutine add_time
 
 end module taylor

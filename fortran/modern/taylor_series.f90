@@ -59,7 +59,7 @@ contains
     real(dp), dimension(4) :: mean, moment
     real(dp) :: c(3)                   ! their cross product
     real(dp) :: o(6)                   ! the matrix, by rows; its diagonal is 0
-    real(dp) :: size
+    real(dp) :: size                   ! square of its norm
     integer :: i, k, parts
 
     do i = 1, 4
@@ -81,12 +81,13 @@ contains
     o(4) = s%factors(2)*(mean(1) + s%factors(1)*c(1))
     o(5) = s%factors(3)*(mean(2) + s%factors(2)*c(2))
     o(6) = s%factors(3)*(mean(1) - s%factors(1)*c(1))
-    size = max(abs(o(1)) + abs(o(2)), abs(o(3)) + abs(o(4)), abs(o(5)) + abs(o(6)))
-    if (size <= EXPONENT) then
+    ! In units in which the matrix of a body is symmetric but for signs.
+    size = abs(o(1)*o(3)) + abs(o(2)*o(5)) + abs(o(4)*o(6))
+    if (size <= EXPONENT*EXPONENT) then
       call multiply(o, s%lanes)
     else
       ! A spin about an axis, whose steps are long.
-      parts = ceiling(min(MOST_PARTS, size))
+      parts = ceiling(min(MOST_PARTS, sqrt(size)))
       o = o*(1.0_dp/parts)
       do k = 1, parts
         call multiply(o, s%lanes)

@@ -2,7 +2,7 @@ module torque_law
   !! Torque over moment: constant + rate t + sines + cosines.
   use kinds, only: dp
   use problem, only: problem_t
-  use two_words, only: sine_cosine, two_product
+  use two_words, only: sine_cosine_of
   implicit none(type, external)
   private
 
@@ -25,20 +25,18 @@ contains
   end subroutine torque_at
 
   pure subroutine add_waves(n, waves, are_sines, time, time_low, m)
-    !! Add sines or cosines with what the rounding of the angle leaves out: after 1e5 radians that
-    !! is worth 1e-11.
+    !! Add sines or cosines.
     integer, intent(in) :: n
     real(dp), intent(in) :: waves(4, n) !! amplitude (3), 1/s2; frequency, rad/s
     logical, intent(in) :: are_sines
     real(dp), intent(in) :: time        !! s
     real(dp), intent(in) :: time_low    !! s
     real(dp), intent(inout) :: m(3)     !! 1/s2
-    real(dp) :: angle, angle_low, sine, cosine
+    real(dp) :: sine, cosine
     integer :: k
 
     do k = 1, n
-      call two_product(waves(4, k), time, angle, angle_low)
-      call sine_cosine(angle, angle_low + waves(4, k)*time_low, sine, cosine)
+      call sine_cosine_of(waves(4, k), time, time_low, sine, cosine)
       m = m + waves(1:3, k)*merge(sine, cosine, are_sines)
     end do
   end subroutine add_waves

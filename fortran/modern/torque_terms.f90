@@ -1,8 +1,8 @@
 module torque_terms
   !! Torque over moment, constant + rate t + sines + cosines, in the Taylor terms of omega.
-  use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: problem_t
+  use two_words, only: sine_cosine_of
   implicit none(type, external)
   private
 
@@ -42,7 +42,7 @@ module torque_terms
   ! Share of a step's error below which they are in each step: turns of equal steps err alike.
   real(dp), parameter :: FINE = 1e-16_dp
 
-  public :: longest_turn, sine_cosine, steps_by_turns, torque_terms_at, turn_waves, waves_of
+  public :: longest_turn, steps_by_turns, torque_terms_at, turn_waves, waves_of
 
 contains
 
@@ -146,7 +146,7 @@ contains
     integer :: i, j
 
     if (fresh) then
-      call sine_cosine(wave%frequency, t, t_low, sine, cosine)
+      call sine_cosine_of(wave%frequency, t, t_low, sine, cosine)
       wave%value = merge(sine, cosine, wave%is_sine)
       wave%slope = merge(cosine, -sine, wave%is_sine)
     end if
@@ -192,43 +192,5 @@ contains
       waves(n)%slope = waves(n)%slope - (value*waves(n)%sine + waves(n)%slope*waves(n)%versine)
     end do
   end subroutine turn_waves
-
-  pure subroutine sine_cosine(frequency, t, t_low, sine, cosine)
-    !! Sine and cosine of frequency (t + t_low), the second part as a small turn, and with it what
-    !! the rounding of the product left out: after 1e5 radians that is worth 1e-11.
-    !! As in two_words.f90, which is compiled once and can't be called from every instruction set.
-    real(dp), intent(in) :: frequency  !! rad/s
-    real(dp), intent(in) :: t          !! s
-    real(dp), intent(in) :: t_low      !! s
-    real(dp), intent(out) :: sine, cosine
-    real(dp) :: angle                  ! rad
-    real(dp) :: turn                   ! rad
-    real(dp) :: unturned
-    real(dp) :: f                      ! the frequency's upper half
-    real(dp) :: s                      ! the time's
-
-    f = upper_half(frequency)
-    s = upper_half(t)
-    angle = frequency*t
-    ! Dekker's order: exact, however large the angle.
-    turn = frequency*t_low + ((((f*s - angle) + f*(t - s)) + (frequency - f)*s) &
-                              + (frequency - f)*(t - s))
-    unturned = sin(angle)
-    cosine = cos(angle)
-    if (abs(turn) <= SMALL_TURN) then
-      sine = unturned + turn*cosine
-      cosine = cosine - turn*unturned
-    else
-      sine = unturned*cos(turn) + cosine*sin(turn)
-      cosine = cosine*cos(turn) - unturned*sin(turn)
-    end if
-  end subroutine sine_cosine
-
-  pure real(dp) function upper_half(x)
-    !! x in 26 bits, so that products of two such numbers are exact.
-    real(dp), intent(in) :: x
-
-    upper_half = transfer(iand(transfer(x, 0_int64), not(ishft(1_int64, 27) - 1_int64)), x)
-  end function upper_half
 
 end module torque_terms

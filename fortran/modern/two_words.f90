@@ -8,7 +8,7 @@ module two_words
   integer(i8), parameter :: UPPER_BITS = -134217728_i8 ! all but the last 27 bits
   real(dp), parameter :: SMALL_PHASE = 1e6_dp ! up to it one term corrects sine and cosine
 
-  public :: scaled, sine_cosine, square_root, two_product, two_sum
+  public :: scaled, sine_cosine, sine_cosine_of, square_root, two_product, two_sum
 
 contains
 
@@ -28,6 +28,18 @@ contains
       cosine = c*cos(angle_low) - s*sin(angle_low)
     end if
   end subroutine sine_cosine
+
+  pure subroutine sine_cosine_of(frequency, t, t_low, sine, cosine)
+    !! Sine and cosine of frequency (t + t_low), with what the rounding of the product leaves out:
+    !! after 1e5 radians that is worth 1e-11.
+    real(dp), intent(in) :: frequency      !! rad/s
+    real(dp), intent(in) :: t, t_low       !! s
+    real(dp), intent(out) :: sine, cosine
+    real(dp) :: angle, angle_low           ! rad
+
+    call scaled(t, t_low, frequency, angle, angle_low)
+    call sine_cosine(angle, angle_low, sine, cosine)
+  end subroutine sine_cosine_of
 
   pure subroutine square_root(x, x_low, root, root_low)
     !! Square root of x + x_low to twice the working digits.

@@ -2,8 +2,8 @@
 
 In one file: within it the compiler may put a procedure where it is called.
 
-One recurrence is printed twice: as Fortran, a statement for each axis, and as C, a statement for a
-register of all three. No Fortran compiler makes the turns of a register's lanes that this needs.
+The recurrence is C with a register for all three axes where there is one: no Fortran compiler makes
+the turns of its lanes that this needs. A processor without gets Fortran, axis by axis.
 """
 
 import re
@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 MODULES = (
+    "two_words",
     "torque_terms",
     "scaled_motion",
     "scaled_march",

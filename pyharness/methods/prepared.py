@@ -50,6 +50,8 @@ _CODES = {
 }
 PREPARED = ("auto", *(name for name in _CODES if name not in ("sphere", EITHER)))
 
+_FEW_WAVES = 16  # that take less time than releasing the GIL does
+
 
 class Solver(BoundKernel):
     """A scene prepared for one method.
@@ -63,7 +65,8 @@ class Solver(BoundKernel):
     Where the kernel could not finish the result is NaN and `status` says why; so it is from a
     start, or to a time, that is not finite. `error`, `growth` and `digits` say how good it is.
 
-    Threads may share a solver and call it at once: the kernel releases the GIL. Solvers can be
+    Threads may share a solver and call it at once: the kernel releases the GIL, but where it takes
+    less time than that, as a closed form does. Solvers can be
     copied and pickled; a copy has made no call yet.
 
     Attributes
@@ -81,7 +84,12 @@ class Solver(BoundKernel):
         """Pack what does not change; `prepare` is the way to make one."""
         kernel = extension().solve_packed
         packed = _pack(chosen.scene, _code(chosen), tolerance, effort)
-        solver = super().__new__(cls, kernel, packed, _check)
+        brief = None
+        if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
+            # Where there is a fallback, it is no part of that.
+            brief = packed.copy()
+            brief[Places.METHOD] = _CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
+        solver = super().__new__(cls, kernel, packed, _check, brief)
         solver.plan = chosen
         solver._given = tolerance, asked, effort
         return solver

@@ -20,6 +20,7 @@ MODULES = (
     "taylor_plan",
     "taylor_series",
     "taylor_error",
+    "taylor_march",
     "taylor",
 )
 LEAST_ORDER, MOST_ORDER = 12, 24

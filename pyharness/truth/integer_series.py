@@ -155,16 +155,20 @@ class _Wave:
     on_cosine: Series
 
 
+def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
+    """Return what torques are divided by (kg m2, or 1 where it is done), and A, B, C, unrounded."""
+    moments = [Fraction(x) for x in scene.moments or (1, 1, 1)]
+    if scene.coefficients is not None:
+        return moments, [Fraction(x) for x in scene.coefficients]
+    return moments, [(moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)]
+
+
 class _Equations:
     """Equations 13-15 in units of the time asked for and of omega, as recurrences of terms."""
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
         law = scene.torque
-        moments = [Fraction(x) for x in scene.moments or (1, 1, 1)]
-        if scene.coefficients is not None:
-            products = [Fraction(x) for x in scene.coefficients]
-        else:
-            products = [(moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)]
+        moments, products = exact_body(scene)
         push = [span / (moment * unit) for moment in moments]
         self._products = [_fixed(x * span * unit) for x in products]
         self._constant = [_fixed(Fraction(x) * p) for x, p in zip(law.constant, push, strict=True)]

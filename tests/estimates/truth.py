@@ -20,6 +20,7 @@ import numpy as np
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
+from pyharness.truth.integer_series import exact_body
 
 MOST_STEPS = 40_000
 DIGITS_LOST = 1e-29  # of the pairs, over their many steps, before the motion multiplies it
@@ -58,11 +59,7 @@ def truth_of(scene: Scene, time: float, most_steps: int = MOST_STEPS) -> Truth:
     InputError where omega leaves every bound before, or more steps would be needed.
     """
     law = scene.torque
-    moments = [Fraction(x) for x in scene.moments or (1, 1, 1)]
-    if scene.coefficients is not None:
-        products = [Fraction(x) for x in scene.coefficients]
-    else:
-        products = [(moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)]
+    moments, products = exact_body(scene)
 
     def over_moments(vector: Sequence[float]) -> list[float]:
         return _pairs([Fraction(x) / moment for x, moment in zip(vector, moments, strict=True)])

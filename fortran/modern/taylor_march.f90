@@ -1,0 +1,360 @@
+module taylor_march
+  !! Taylor series, once from 0 to the last time: the order fixed, the step adapted, the error
+  !! measured and taken off.
+  use, intrinsic :: iso_fortran_env, only: int64
+  use interruption, only: interrupt_raised
+  use kinds, only: dp
+  use problem, only: problem_t
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
+  use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
+  use taylor_plan, only: LEAST_SHARE, plan
+  use taylor_series, only: carry, carry_precisely, expand, fitting, following, inside, rescale, &
+                           series_t, size_of
+  use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t
+  use two_words, only: two_sum
+  implicit none(type, external)
+  private
+
+  integer, parameter :: ROWS_BETWEEN_LOOKS = 2**19 ! at the user
+  integer, parameter :: MANY_WAVES = 1000 ! so that a step is worth a look
+  integer, parameter :: MOST_TRIES = 60
+  real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
+  real(dp), parameter :: GROWING = 1.3_dp ! power of time with which steps do, not by chance
+  real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass
+  ! Radians about the body in a step: differences turn where omega does not.
+  real(dp), parameter :: A_STEP = 60.0_dp
+  real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
+  real(dp), parameter :: LEAST_COUPLING = 1e-300_dp ! so that the step is a number
+  real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
+  ! Error, relative, beyond which its linear motion says little, and the one that says no more.
+  real(dp), parameter :: LINEAR = 0.1_dp
+  real(dp), parameter :: NO_DIGIT = 1e100_dp
+
+  ! Where a run stands.
+  type :: state_t
+    real(dp) :: w(4)      ! omega, rad/s, and 0
+    real(dp) :: w_low(4)  ! what its rounding left out
+    real(dp) :: t         ! s
+    real(dp) :: t_low     ! what its rounding left out
+    real(dp) :: scale     ! largest |omega| so far, rad/s
+    real(dp) :: worst     ! largest error of a row so far, rad/s
+    integer :: since      ! steps since the waves' sines were made; 0: to be made
+  end type state_t
+
+  ! What a march came to.
+  type, public :: outcome_t
+    integer :: status
+    integer :: n_rows
+    integer(int64) :: steps
+    real(dp) :: error    ! largest of a row, relative, before it was taken off
+    real(dp) :: growth   ! of a small difference until the end
+    real(dp) :: largest  ! and until any time on the way
+    real(dp) :: ahead    ! steps to the end, as far as known; where it gave up
+    real(dp) :: precise_steps ! to the end, at the least, of a march that is precise
+    logical :: finest    ! no step could err less
+  end type outcome_t
+
+  ! Columns of four begin where a register's load does: Fortran can't ask for it of a variable.
+  type, public :: room_t
+    type(series_t) :: s
+    type(blocks_t) :: blocks
+    type(state_t) :: now
+  end type room_t
+
+  public :: march
+
+contains
+
+  subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, &
+                   s, blocks, now, waves, rows, found)
+    !! Once from 0 to the last of the times.
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
+    real(dp), intent(in) :: asked                       !! tolerance of this march
+    real(dp), intent(in) :: tolerance                   !! of the error at `times`, relative
+    logical, intent(in) :: precise                      !! carry differences as exactly as can be
+    real(dp), intent(in) :: most_steps
+    integer(int64), intent(in) :: stride                !! steps between looks at the user
+    integer, intent(in) :: n_times
+    real(dp), intent(in) :: times(n_times)              !! s
+    type(series_t), intent(inout) :: s
+    type(blocks_t), intent(inout) :: blocks
+    type(state_t), intent(inout) :: now
+    type(wave_t), intent(inout) :: waves(:)
+    real(dp), intent(inout) :: rows(3, n_times)         !! omega for n_rows times, rad/s
+    type(outcome_t), intent(out) :: found
+    real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
+    real(dp) :: left(4)       ! by the step, rad/s
+    real(dp) :: error(3)      ! carried so far, rad/s
+    real(dp) :: h             ! step, s
+    real(dp) :: rest          ! time to go, s
+    real(dp) :: next          ! the step after this one, s
+    real(dp) :: share         ! part of the scale that the last terms may have
+    real(dp) :: allowed       ! the same in rad/s
+    real(dp) :: last          ! size of the last two terms, rad/s
+    real(dp) :: longest       ! turn of a wave
+    real(dp) :: coupling
+    real(dp) :: farthest      ! step times scale: a spin has no terms that would tell
+    logical :: at_end
+    integer(int64) :: decay   ! logarithm, of the last terms over two orders
+    integer(int64) :: part    ! 65536 over the order
+    integer :: order
+    integer :: lasting        ! steps that turn the waves
+    integer :: i, tries
+    integer(int64) :: next_look  ! steps
+    integer(int64) :: half_way   ! of the steps allowed
+    real(dp) :: t_half           ! the time then, s
+
+    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true.)
+    rest = times(n_times)
+    if (rest == 0.0_dp) then
+      rows(:, 1) = omega
+      found%n_rows = 1
+      return
+    end if
+    now = state_t([omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
+                  max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0)
+    call plan(problem, now%scale, asked, rest, order, share, h)
+    found%finest = share <= LEAST_SHARE
+    part = 65536/order
+    coupling = coupling_of(problem%coefficients)
+    farthest = merge(A_PRECISE_STEP, A_STEP, precise)/coupling
+    lasting = steps_by_turns(share)
+    if (size(waves) > 0) longest = longest_turn(order, share)
+    s%torque = 0.0_dp
+    coefficients = [problem%coefficients, 0.0_dp]
+    constant = [problem%constant, 0.0_dp]
+    rate = [problem%rate, 0.0_dp]
+    call begin(precise, s%lanes, blocks)
+    next_look = 1
+    half_way = max(1_int64, int(0.5_dp*most_steps, int64))
+    t_half = 0.0_dp
+    decay = 0
+    tries = 0
+    do
+      now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
+      call shorten_to(farthest, now%scale, h)
+      call fit_to_end(h, rest, at_end)
+      allowed = share*now%scale
+      ! Four at once: what was stored one by one could not be loaded together without a wait.
+      do i = 1, 4
+        s%terms(i, 0) = now%w(i)
+        s%factors(i) = h*coefficients(i)
+      end do
+      call torque_terms_at(constant, rate, now%t, now%t_low, h, order, longest, now%since == 0, &
+                           waves, s%torque)
+      call expand(order, s)
+      last = size_of(s, order)
+      if (found%steps == 0) then
+        call following(h, s, order, part, allowed, decay, next)
+        ! What a body at rest is about to reach.
+        now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
+        allowed = share*now%scale
+        ! From rest a torque that grows with time makes every third term only.
+        last = last + size_of(s, order - 2)
+      end if
+      call following(h, s, order, part, allowed, decay, next)
+      if ((.not. last <= SLACK*allowed) .or. (found%steps == 0 .and. tries == 0)) then
+        ! The first step is a guess, and a later one may be too long: the terms need only a factor.
+        tries = tries + 1
+        if (.not. last <= huge(h)) then
+          if (tries > MOST_TRIES) then
+            found%status = OVERFLOW
+            exit
+          end if
+          h = h*0.0625_dp
+          if (size(waves) > MANY_WAVES) then
+            if (interrupt_raised() /= 0) then
+              found%status = INTERRUPTED
+              exit
+            end if
+          end if
+          cycle
+        end if
+        next = fitting(h, last, order, allowed)
+        call shorten_to(farthest, now%scale, next)
+        if (abs(next) > abs(rest)) next = rest
+        at_end = abs(next) >= abs(rest)
+        if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
+        call rescale(s, order, next/h)
+        now%since = lasting
+        h = next
+      end if
+      error = s%lanes(1, :)
+      if (precise) then
+        call carry_precisely(s)
+      else
+        call carry(s)
+      end if
+      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+      call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, rows, found)
+      if (found%status /= COMPLETE) exit
+      call count_step(precise, s%lanes, blocks)
+      call add_change(s%change, now)
+      found%steps = found%steps + 1
+      ! Where products overflow a step may pass that leads nowhere.
+      if (.not. now%scale > LARGEST) tries = 1
+      if (.not. all(abs(now%w) <= huge(h))) then
+        found%status = OVERFLOW
+        exit
+      end if
+      if (at_end) then
+        error = s%lanes(1, :)
+        call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, n_times))
+        found%n_rows = n_times
+        exit
+      end if
+      now%since = merge(0, now%since + 1, now%since + 1 >= lasting)
+      if (now%since > 0) call turn_waves(waves)
+      call two_sum((now%t), h + now%t_low, now%t, now%t_low)
+      rest = (times(n_times) - now%t) - now%t_low
+      h = next
+      if (found%steps >= next_look) then
+        if (real(found%steps, dp) >= most_steps) then
+          ! As many steps a second as so far, or more as the motion grows faster.
+          found%ahead = 1.0_dp
+          if (found%steps > half_way .and. abs(now%t) > abs(t_half)) then
+            found%ahead = log(real(found%steps, dp)/real(half_way, dp))/log(now%t/t_half)
+          end if
+          found%ahead = merge(min(3.0_dp, found%ahead), 1.0_dp, found%ahead > GROWING)
+          found%ahead = real(found%steps, dp)*exp(found%ahead*log(1.0_dp + abs(rest/now%t)))
+          found%status = GAVE_UP
+        else if (found%steps == 1 .and. abs(rest) > (HOPELESS*most_steps)*abs(h)) then
+          found%ahead = abs(rest)/max(abs(h), tiny(h))
+          found%status = GAVE_UP
+        else if (found%steps > 1) then
+          if (interrupt_raised() /= 0) found%status = INTERRUPTED
+        end if
+        if (found%status /= COMPLETE) exit
+        next_look = min(found%steps + stride, max(found%steps + 1, int(most_steps, int64)))
+        if (found%steps == half_way) t_half = now%t
+        if (found%steps < half_way) next_look = min(next_look, half_way)
+      end if
+    end do
+    call growths_of(precise, s%lanes, blocks, found%growth, found%largest)
+    found%precise_steps = coupling*now%scale*abs(times(n_times))/A_PRECISE_STEP
+    found%error = now%worst
+    if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
+    if (now%scale > 0.0_dp) found%error = found%error/now%scale
+    if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
+  end subroutine march
+
+  pure real(dp) function coupling_of(coefficients)
+    !! The largest rate of small differences over the largest omega, and not 0.
+    real(dp), intent(in) :: coefficients(3)
+    real(dp) :: sizes(3)
+
+    sizes = sqrt(abs(coefficients))
+    coupling_of = max(sizes(1)*sizes(2), sizes(2)*sizes(3), sizes(3)*sizes(1), LEAST_COUPLING)
+  end function coupling_of
+
+  pure subroutine shorten_to(farthest, scale, h)
+    real(dp), intent(in) :: farthest !! step times scale
+    real(dp), intent(in) :: scale    !! largest |omega|, rad/s
+    real(dp), intent(inout) :: h     !! s
+
+    if (abs(h)*scale > farthest) h = sign(farthest/scale, h)
+  end subroutine shorten_to
+
+  pure subroutine fit_to_end(h, rest, at_end)
+    !! Equal steps near the end: the last one would be short, and cost as much.
+    real(dp), intent(inout) :: h   !! s
+    real(dp), intent(in) :: rest   !! s
+    logical, intent(out) :: at_end
+
+    at_end = abs(h) >= abs(rest)
+    if (at_end) then
+      h = rest
+    else if (abs(rest) < 4.0_dp*abs(h)) then
+      h = rest/ceiling(rest/h)
+    end if
+  end subroutine fit_to_end
+
+  subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, rows, found)
+    !! Rows within the step, but for the last of all, from its terms; the error by Hermite's cubic.
+    type(series_t), intent(in) :: s
+    integer, intent(in) :: order
+    real(dp), intent(in) :: h               !! s
+    logical, intent(in) :: at_end
+    real(dp), intent(in) :: before(3)       !! the error at the step's beginning, rad/s
+    real(dp), intent(in) :: left(3)         !! what the step left out, rad/s
+    real(dp), intent(in) :: times(:)        !! s
+    real(dp), intent(in) :: tolerance
+    type(state_t), intent(inout) :: now
+    real(dp), intent(inout) :: rows(:, :)
+    type(outcome_t), intent(inout) :: found !! its rows and its status
+    real(dp) :: rises(3, 2)  ! of the error at either end, times the step
+    real(dp) :: carried(3)   ! the error at the end, but for what the step left out
+    real(dp) :: part, to_go
+    integer :: last
+
+    last = size(times)
+    if (at_end) last = last - 1
+    if (found%n_rows >= last) return
+    if (abs(times(found%n_rows + 1) - now%t) > abs(h)) return
+    rises(:, 1) = rise(s%factors(:3), now%w(:3), before)
+    carried = s%lanes(1, :) + left
+    rises(:, 2) = rise(s%factors(:3), now%w(:3) + s%change(:3), carried)
+    do while (found%n_rows < last)
+      if (abs(times(found%n_rows + 1) - now%t) > abs(h)) exit
+      part = ((times(found%n_rows + 1) - now%t) - now%t_low)/h
+      to_go = 1.0_dp - part
+      call add_row(now%w(:3), now%w_low(:3) + inside(s, order, part), &
+                   (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
+                   + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
+                   - part**(order + 1)*left, tolerance, now, rows(:, found%n_rows + 1))
+      if (.not. all(abs(rows(:, found%n_rows + 1)) <= huge(h))) then
+        found%status = OVERFLOW
+        return
+      end if
+      found%n_rows = found%n_rows + 1
+      if (mod(found%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
+        if (interrupt_raised() /= 0) then
+          found%status = INTERRUPTED
+          return
+        end if
+      end if
+    end do
+  end subroutine add_rows
+
+  pure function rise(factors, w, error)
+    !! Of a small difference, times the step, rad/s.
+    real(dp), intent(in) :: factors(3), w(3), error(3)
+    real(dp) :: rise(3)
+
+    rise(1) = factors(1)*(w(2)*error(3) + w(3)*error(2))
+    rise(2) = factors(2)*(w(1)*error(3) + w(3)*error(1))
+    rise(3) = factors(3)*(w(1)*error(2) + w(2)*error(1))
+  end function rise
+
+  pure subroutine add_row(w, small, error, tolerance, now, row)
+    !! A row, its error taken off where it is small enough to be known: an estimate that is wrong
+    !! costs no more than the tolerance.
+    real(dp), intent(in) :: w(3), small(3) !! whose sum is omega, rad/s
+    real(dp), intent(in) :: error(3)       !! rad/s
+    real(dp), intent(in) :: tolerance
+    type(state_t), intent(inout) :: now
+    real(dp), intent(out) :: row(3)        !! rad/s
+    real(dp) :: size
+
+    size = max(abs(error(1)), abs(error(2)), abs(error(3)))
+    if (.not. size <= now%worst) now%worst = size
+    if (size <= min(LINEAR, tolerance)*now%scale) then
+      row = w + (small - error)
+    else
+      row = w + small
+    end if
+  end subroutine add_row
+
+  pure subroutine add_change(change, now)
+    !! Omega at the end of the step, with what its rounding leaves out.
+    real(dp), intent(in) :: change(4)
+    type(state_t), intent(inout) :: now
+    integer :: i
+
+    do i = 1, 4
+      call two_sum((now%w(i)), change(i) + now%w_low(i), now%w(i), now%w_low(i))
+    end do
+  end subroutine add_change
+
+end module taylor_march

@@ -24,7 +24,6 @@ module taylor_march
   ! Radians about the body in a step: differences turn where omega does not.
   real(dp), parameter :: A_STEP = 60.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
-  real(dp), parameter :: LEAST_COUPLING = 1e-300_dp ! so that the step is a number
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
   ! Error, relative, beyond which its linear motion says little, and the one that says no more.
   real(dp), parameter :: LINEAR = 0.1_dp
@@ -94,7 +93,7 @@ contains
     real(dp) :: last          ! size of the last two terms, rad/s
     real(dp) :: longest       ! turn of a wave
     real(dp) :: coupling
-    real(dp) :: farthest      ! step times scale: a spin has no terms that would tell
+    real(dp) :: farthest      ! in a step, rad: a spin has no terms that would tell
     logical :: at_end
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
     integer(int64) :: part    ! 65536 over the order
@@ -118,7 +117,7 @@ contains
     found%finest = share <= LEAST_SHARE
     part = 65536/order
     coupling = coupling_of(problem%coefficients)
-    farthest = merge(A_PRECISE_STEP, A_STEP, precise)/coupling
+    farthest = merge(A_PRECISE_STEP, A_STEP, precise)
     lasting = steps_by_turns(share)
     if (size(waves) > 0) longest = longest_turn(order, share)
     s%torque = 0.0_dp
@@ -133,7 +132,7 @@ contains
     tries = 0
     do
       now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
-      call shorten_to(farthest, now%scale, h)
+      call shorten_to(farthest, coupling*now%scale, h)
       call fit_to_end(h, rest, at_end)
       allowed = share*now%scale
       ! Four at once: what was stored one by one could not be loaded together without a wait.
@@ -172,7 +171,7 @@ contains
           cycle
         end if
         next = fitting(h, last, order, allowed)
-        call shorten_to(farthest, now%scale, next)
+        call shorten_to(farthest, coupling*now%scale, next)
         if (abs(next) > abs(rest)) next = rest
         at_end = abs(next) >= abs(rest)
         if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
@@ -240,20 +239,20 @@ contains
   end subroutine march
 
   pure real(dp) function coupling_of(coefficients)
-    !! The largest rate of small differences over the largest omega, and not 0.
+    !! The largest rate of small differences over the largest omega.
     real(dp), intent(in) :: coefficients(3)
     real(dp) :: sizes(3)
 
     sizes = sqrt(abs(coefficients))
-    coupling_of = max(sizes(1)*sizes(2), sizes(2)*sizes(3), sizes(3)*sizes(1), LEAST_COUPLING)
+    coupling_of = max(sizes(1)*sizes(2), sizes(2)*sizes(3), sizes(3)*sizes(1))
   end function coupling_of
 
-  pure subroutine shorten_to(farthest, scale, h)
-    real(dp), intent(in) :: farthest !! step times scale
-    real(dp), intent(in) :: scale    !! largest |omega|, rad/s
+  pure subroutine shorten_to(farthest, rate, h)
+    real(dp), intent(in) :: farthest !! rad
+    real(dp), intent(in) :: rate     !! rad/s
     real(dp), intent(inout) :: h     !! s
 
-    if (abs(h)*scale > farthest) h = sign(farthest/scale, h)
+    if (rate*abs(h) > farthest) h = sign(farthest/rate, h)
   end subroutine shorten_to
 
   pure subroutine fit_to_end(h, rest, at_end)

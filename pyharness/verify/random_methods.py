@@ -27,10 +27,8 @@ from pyharness.verify.selection import Selection
 # than they do. Those of Python and decimals, which cost more than the truth, in fewer.
 _EVERY, _EVERY_SLOW = 4, 60
 ROUNDING = 2e-15  # relative, for each factor of growth
-# Up to such a growth of small differences a tolerance is kept as it stands; up to the second one by
-# all but the series, which finds out how they grow while it is on its way.
-_CALM, _LIVELY = 10.0, 1e3
-_SERIES = ("auto", "taylor")
+_CALM = 10.0  # growth of small differences where the series has no reason to refuse
+_LIVELY = 1e3  # growth of small differences up to which a tolerance is kept as it stands
 # Random scenes that may run away, or be too fast for any truth and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 _FINE = 1e-9
@@ -54,9 +52,9 @@ class Truth:
             return 0.0 if difference == 0.0 else math.inf
         return difference / self.largest
 
-    def limit(self, method: str, tolerance: float) -> float:
+    def limit(self, tolerance: float) -> float:
         """Return the largest error that a method may have."""
-        bent = self.growth >= (_CALM if method in _SERIES else _LIVELY)
+        bent = self.growth >= _LIVELY
         return tolerance * (self.growth if bent else 1.0) + ROUNDING * self.growth
 
 
@@ -142,7 +140,7 @@ def _held(id: str, again: str, drawn: Draw, truth: Truth, answer: Answer) -> Sam
     """Return the check that an answer is as near to the truth as it has to be."""
     error, limit, passed = None, None, False
     if answer.omega is not None:
-        error, limit = truth.error(answer.omega), truth.limit(answer.method, answer.tolerance)
+        error, limit = truth.error(answer.omega), truth.limit(answer.tolerance)
         passed = error <= limit
     elif answer.why.startswith(REFUSED):
         passed = _may_refuse(answer, drawn, truth)

@@ -146,6 +146,7 @@ def test_blow_up_ends_the_rows(level: int) -> None:
     ("name", "time", "counts"),
     [
         ("case 5", 3.0, (13, 18, 21, 23, 28)),
+        ("case 6", 3.0, (51, 60, 74, 89, 109)),
         ("case 7", 3.0, (67, 75, 92, 93, 113)),
         ("case 3", 100.0, (302, 395, 433, 518, 631)),
         ("sine and cosine of two speeds", 20.0, (41, 50, 63, 67, 81)),

@@ -1,7 +1,7 @@
 module taylor
   !! Taylor series: marches from 0 to the last time, until one errs little enough or none can.
-  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t
-  use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int
+  use, intrinsic :: iso_c_binding, only: c_int64_t, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: problem_t
@@ -32,8 +32,8 @@ module taylor
 
 contains
 
-  subroutine taylor_solve(problem_at, omega, tolerance, effort, n_times, times, rows, n_rows, &
-                          status, steps, needed, found) &
+  subroutine taylor_solve(problem_at, omega, tolerance, effort, n_times, times, rows, &
+                          attitudes_at, n_rows, status, steps, needed, found) &
     bind(c, name="taylor_solve_level")
     !! Solution at `times`, which lead away from 0 on one side.
     type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
@@ -43,6 +43,7 @@ contains
     integer(c_int), intent(in), value :: n_times
     real(c_double), intent(in) :: times(n_times)        !! s
     real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
+    type(c_ptr), intent(in), value :: attitudes_at      !! (4, 0:n_times), the first given; or null
     integer(c_int), intent(out) :: n_rows
     integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted, 6
     integer(c_int64_t), intent(out) :: steps            !! of the last march
@@ -50,6 +51,8 @@ contains
     real(c_double), intent(out) :: found(3) !! error, relative; growth; steps of all marches
     type(problem_t), pointer :: problem
     type(room_t), pointer :: room
+    real(c_double), pointer :: attitudes(:, :)
+    real(c_double), target :: none(4, 1)
     real(c_double), target :: place(storage_size(room)/64 + ALIGNED/8)
     type(wave_t) :: few(FEW_WAVES)
     type(wave_t), allocatable :: many(:)
@@ -59,10 +62,12 @@ contains
     call c_f_pointer(problem_at, problem)
     address = transfer(c_loc(place), address)
     call c_f_pointer(c_loc(place(1 + modulo(-address, ALIGNED)/8)), room)
+    attitudes => none
+    if (c_associated(attitudes_at)) call c_f_pointer(attitudes_at, attitudes, [4, n_times + 1])
     n_waves = problem%n_sines + problem%n_cosines
     if (n_waves <= FEW_WAVES) then
       call solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, few, rows, &
-                 n_rows, status, steps, needed, found)
+                 attitudes, n_rows, status, steps, needed, found)
     else
       allocate (many(n_waves), stat=failed)
       status = GAVE_UP
@@ -71,13 +76,13 @@ contains
       needed = 0.0_dp
       if (failed == 0) then
         call solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, many, rows, &
-                   n_rows, status, steps, needed, found)
+                   attitudes, n_rows, status, steps, needed, found)
       end if
     end if
   end subroutine taylor_solve
 
   subroutine solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, waves, rows, &
-                   n_rows, status, steps, needed, found)
+                   attitudes, n_rows, status, steps, needed, found)
     !! The same with room.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3), tolerance, effort
@@ -87,6 +92,7 @@ contains
     type(room_t), intent(inout) :: room
     type(wave_t), intent(inout) :: waves(n_waves)
     real(dp), intent(inout) :: rows(3, n_times)
+    real(dp), intent(inout) :: attitudes(:, 0:)
     integer, intent(out) :: n_rows, status
     integer(int64), intent(out) :: steps
     real(dp), intent(out) :: needed, found(3)
@@ -110,7 +116,7 @@ contains
     do
       call march(problem, omega, asked, tolerance, precise, most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, int64), n_times, times, room%s, room%blocks, &
-                 room%now, waves, rows, outcome)
+                 room%now, room%attitude, waves, rows, attitudes, outcome)
       spent = spent + real(outcome%steps, dp)
       ! Rounding chose the way where a difference grew so much; at its end is another motion.
       growth = outcome%growth

@@ -44,13 +44,14 @@ contains
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
-  pure subroutine leave_out(s, order, unit, left)
+  pure subroutine leave_out(s, order, unit, left, poles)
     !! Sum of the terms that a step leaves out, as if one pair of poles made its last four:
     !! v(k + 1) = a v(k) - b v(k - 1), by least squares; the error has it from here on.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! over which terms are near 1, s/rad
     real(dp), intent(out) :: left(4)   !! rad/s
+    real(dp), intent(out) :: poles(2)  !! the sum by the last two terms
     real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
     real(dp) :: x, u, v, w
     real(dp) :: a, b, determinant
@@ -79,6 +80,7 @@ contains
     determinant = max((determinant - a) + b, abs(a - b), abs(b), LEAST)
     a = (a - b)/determinant
     b = b/determinant
+    poles = [a, b]
     do i = 1, 4
       left(i) = a*s%terms(i, order) - b*s%terms(i, order - 1)
     end do

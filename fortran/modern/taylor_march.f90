@@ -6,6 +6,8 @@ module taylor_march
   use kinds, only: dp
   use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
+  use taylor_attitude, only: add_attitude_row, attitude_t, begin_attitude, expand_both, &
+                             rescale_turns, turn_error, turn_on, turned
   use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
   use taylor_plan, only: LEAST_SHARE, plan
   use taylor_series, only: carry, carry_precisely, expand, fitting, following, inside, rescale, &
@@ -58,6 +60,7 @@ module taylor_march
     type(series_t) :: s
     type(blocks_t) :: blocks
     type(state_t) :: now
+    type(attitude_t) :: attitude
   end type room_t
 
   public :: march
@@ -65,7 +68,7 @@ module taylor_march
 contains
 
   subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, &
-                   s, blocks, now, waves, rows, found)
+                   s, blocks, now, attitude, waves, rows, attitudes, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
@@ -79,11 +82,14 @@ contains
     type(series_t), intent(inout) :: s
     type(blocks_t), intent(inout) :: blocks
     type(state_t), intent(inout) :: now
+    type(attitude_t), intent(inout) :: attitude
     type(wave_t), intent(inout) :: waves(:)
     real(dp), intent(inout) :: rows(3, n_times)         !! omega for n_rows times, rad/s
+    real(dp), intent(inout) :: attitudes(:, 0:)         !! at time 0 and then; or none
     type(outcome_t), intent(out) :: found
     real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
     real(dp) :: left(4)       ! by the step, rad/s
+    real(dp) :: poles(2)      ! by the last two terms
     real(dp) :: error(3)      ! carried so far, rad/s
     real(dp) :: h             ! step, s
     real(dp) :: rest          ! time to go, s
@@ -94,7 +100,7 @@ contains
     real(dp) :: longest       ! turn of a wave
     real(dp) :: coupling
     real(dp) :: farthest      ! in a step, rad: a spin has no terms that would tell
-    logical :: at_end
+    logical :: at_end, with_attitude
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
     integer(int64) :: part    ! 65536 over the order
     integer :: order
@@ -105,15 +111,17 @@ contains
     real(dp) :: t_half           ! the time then, s
 
     found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true.)
+    with_attitude = size(attitudes, 2) > 1
     rest = times(n_times)
     if (rest == 0.0_dp) then
       rows(:, 1) = omega
+      if (with_attitude) attitudes(:, 1) = attitudes(:, 0)
       found%n_rows = 1
       return
     end if
     now = state_t([omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
                   max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0)
-    call plan(problem, now%scale, asked, rest, order, share, h)
+    call plan(problem, now%scale, asked, rest, with_attitude, order, share, h)
     found%finest = share <= LEAST_SHARE
     part = 65536/order
     coupling = coupling_of(problem%coefficients)
@@ -125,6 +133,8 @@ contains
     constant = [problem%constant, 0.0_dp]
     rate = [problem%rate, 0.0_dp]
     call begin(precise, s%lanes, blocks)
+    s%weight = 0.0_dp
+    if (with_attitude) call begin_attitude(attitudes(:, 0), attitude)
     next_look = 1
     half_way = max(1_int64, int(0.5_dp*most_steps, int64))
     t_half = 0.0_dp
@@ -142,7 +152,14 @@ contains
       end do
       call torque_terms_at(constant, rate, now%t, now%t_low, h, order, longest, now%since == 0, &
                            waves, s%torque)
-      call expand(order, s)
+      if (with_attitude) then
+        s%turns(:, 0) = attitude%q
+        s%half = 0.5_dp*h
+        s%weight = now%scale
+        call expand_both(order, s)
+      else
+        call expand(order, s)
+      end if
       last = size_of(s, order)
       if (found%steps == 0) then
         call following(h, s, order, part, allowed, decay, next)
@@ -176,6 +193,7 @@ contains
         at_end = abs(next) >= abs(rest)
         if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
         call rescale(s, order, next/h)
+        if (with_attitude) call rescale_turns(s, order, next/h)
         now%since = lasting
         h = next
       end if
@@ -185,11 +203,16 @@ contains
       else
         call carry(s)
       end if
-      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left)
-      call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, rows, found)
+      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left, poles)
+      if (with_attitude) then
+        call turn_error(s, order, poles, error, s%lanes(1, :) + left(:3), attitude)
+      end if
+      call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
+                    attitudes, found)
       if (found%status /= COMPLETE) exit
       call count_step(precise, s%lanes, blocks)
       call add_change(s%change, now)
+      if (with_attitude) call turn_on(s, attitude)
       found%steps = found%steps + 1
       ! Where products overflow a step may pass that leads nowhere.
       if (.not. now%scale > LARGEST) tries = 1
@@ -200,6 +223,9 @@ contains
       if (at_end) then
         error = s%lanes(1, :)
         call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, n_times))
+        if (with_attitude) then
+          call add_attitude_row(attitude%q_low, 1.0_dp, tolerance, attitude, attitudes(:, n_times))
+        end if
         found%n_rows = n_times
         exit
       end if
@@ -235,6 +261,11 @@ contains
     found%error = now%worst
     if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
     if (now%scale > 0.0_dp) found%error = found%error/now%scale
+    if (with_attitude) then
+      ! An error of omega turns it all the way.
+      found%growth = found%growth*(1.0_dp + 0.5_dp*now%scale*abs(times(n_times)))
+      if (.not. attitude%worst <= found%error) found%error = attitude%worst
+    end if
     if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT
   end subroutine march
 
@@ -269,7 +300,8 @@ contains
     end if
   end subroutine fit_to_end
 
-  subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, rows, found)
+  subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, attitude, rows, &
+                      attitudes, found)
     !! Rows within the step, but for the last of all, from its terms; the error by Hermite's cubic.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
@@ -280,7 +312,9 @@ contains
     real(dp), intent(in) :: times(:)        !! s
     real(dp), intent(in) :: tolerance
     type(state_t), intent(inout) :: now
+    type(attitude_t), intent(inout) :: attitude
     real(dp), intent(inout) :: rows(:, :)
+    real(dp), intent(inout) :: attitudes(:, 0:)
     type(outcome_t), intent(inout) :: found !! its rows and its status
     real(dp) :: rises(3, 2)  ! of the error at either end, times the step
     real(dp) :: carried(3)   ! the error at the end, but for what the step left out
@@ -305,6 +339,10 @@ contains
       if (.not. all(abs(rows(:, found%n_rows + 1)) <= huge(h))) then
         found%status = OVERFLOW
         return
+      end if
+      if (size(attitudes, 2) > 1) then
+        call add_attitude_row(attitude%q_low + turned(s, order, part), part, tolerance, attitude, &
+                              attitudes(:, found%n_rows + 1))
       end if
       found%n_rows = found%n_rows + 1
       if (mod(found%n_rows, ROWS_BETWEEN_LOOKS) == 0) then

@@ -15,12 +15,13 @@ module taylor_plan
 
 contains
 
-  pure subroutine plan(problem, scale, tolerance, time, order, share, h)
+  pure subroutine plan(problem, scale, tolerance, time, with_attitude, order, share, h)
     !! Order from the tolerance, the first step from the rates of the problem.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: time            !! to go, s
+    logical, intent(in) :: with_attitude    !! which turns though omega may not
     integer, intent(out) :: order
     real(dp), intent(out) :: share          !! part of the scale that the last terms may have
     real(dp), intent(out) :: h              !! s
@@ -54,6 +55,7 @@ contains
     ! An error turns into one of phase and grows with it, and the phase of all later ones with that;
     ! the weights are from random scenes.
     ! Waves ask for more steps, and those may all err alike.
+    if (with_attitude) coupling = max(coupling, 1.0_dp)
     way = coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain)
     share = tolerance/(8.0_dp + way + way*(way/14.0_dp) + ALIKE*turned)
     share = max(share, LEAST_SHARE)

@@ -15,6 +15,10 @@ module taylor_series
     real(c_double) :: factors(4)             !! step times A, B, C, s
     real(c_double) :: change(4)              !! sum of the terms from 1, rad/s
     real(c_double) :: lanes(4, 3)            !! small differences, a vector in each lane, rad/s
+    real(c_double) :: turns(4, 0:MOST_ORDER) !! the same of an attitude
+    real(c_double) :: half(4)                !! of the step, s
+    real(c_double) :: turn(4)                !! sum of its terms from 1
+    real(c_double) :: weight                 !! of its terms among those of omega, rad/s; 0: none
   end type series_t
 
   integer, parameter :: ORDER_CARRIED = 7 ! of the exponential
@@ -173,6 +177,9 @@ contains
     size_of = (abs(s%terms(1, k)) + abs(s%terms(1, k - 1))) &
               + (abs(s%terms(2, k)) + abs(s%terms(2, k - 1))) &
               + (abs(s%terms(3, k)) + abs(s%terms(3, k - 1)))
+    if (s%weight > 0.0_dp) then
+      size_of = max(size_of, s%weight*(sum(abs(s%turns(:, k))) + sum(abs(s%turns(:, k - 1)))))
+    end if
   end function size_of
 
   pure real(dp) function fitting(h, last, order, allowed)

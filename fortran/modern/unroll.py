@@ -19,6 +19,7 @@ MODULES = (
     "scaled_runge_kutta",
     "taylor_plan",
     "taylor_series",
+    "taylor_attitude",
     "taylor_error",
     "taylor_march",
     "taylor",
@@ -39,6 +40,11 @@ WIDE, LAG = 10, 2  # from this order on; the newest terms that are left out
 TORQUE = 4 * (MOST_ORDER + 1)
 RATES = TORQUE + 4 * MOST_ORDER
 CHANGE = RATES + 4
+TURNS = CHANGE + 4 + 12
+HALF = TURNS + 4 * (MOST_ORDER + 1)
+TURN = HALF + 4
+# Of the parts of q (0, x, y, z), axis by axis.
+SIGNS = ("-1.0, 1.0, 1.0, -1.0", "-1.0, -1.0, 1.0, 1.0", "-1.0, 1.0, -1.0, 1.0")
 
 
 def main(level: str, target: str, *sources: str) -> None:
@@ -90,26 +96,31 @@ def fortran_source(text: str, level: str) -> str:
     for module in MODULES:
         text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{level}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
-    expand = fortran_terms() if level == "plain" else fortran_door(level)
-    written = {
-        "expand": expand,
+    written: dict[str, Iterator[str]] = {
+        "expand": fortran_door("expand", "taylor_terms", level),
+        "expand_both": fortran_door("expand_both", "attitude_terms", level),
         "multiply": fortran_multiply(),
         "carry_precisely": fortran_precise(),
     }
-    blocks = re.split(r" *! unroll: (\w+)\n.*?! end unroll\n", text, flags=re.DOTALL)
+    if level == "plain":
+        written["expand"] = fortran_terms()
+        del written["expand_both"]
+    blocks = re.split(r" *! unroll: (\w+)\n(.*?) *! end unroll\n", text, flags=re.DOTALL)
     parts = [blocks[0]]
-    for name, rest in zip(blocks[1::2], blocks[2::2], strict=True):
-        parts += [f"  {line}\n" for line in written[name]] + [rest]
+    for name, as_written, rest in zip(blocks[1::3], blocks[2::3], blocks[3::3], strict=True):
+        lines = written.get(name)
+        parts += [as_written] if lines is None else [f"  {line}\n" for line in lines]
+        parts.append(rest)
     return "".join(parts)
 
 
-def fortran_door(level: str) -> Iterator[str]:
+def fortran_door(name: str, entry: str, level: str) -> Iterator[str]:
     """Yield the call of the C that does it for this instruction set."""
-    yield from f"""subroutine expand(order, s)
+    yield from f"""subroutine {name}(order, s)
   integer(c_int), intent(in), value :: order
   type(series_t), intent(inout) :: s
   interface
-    subroutine terms(order, s) bind(c, name="taylor_terms_{level}")
+    subroutine terms(order, s) bind(c, name="{entry}_{level}")
       import :: c_int, series_t
       implicit none(type, external)
       integer(c_int), intent(in), value :: order
@@ -117,7 +128,7 @@ def fortran_door(level: str) -> Iterator[str]:
     end subroutine terms
   end interface
   call terms(order, s)
-end subroutine expand""".splitlines()
+end subroutine {name}""".splitlines()
 
 
 def fortran_terms() -> Iterator[str]:
@@ -273,35 +284,128 @@ def c_source(level: str) -> Iterator[str]:
 /* Lanes x y z and an idle one: turned by one axis, and by two. */
 #define TURNED_ONCE(v) _mm256_permute4x64_pd(v, _MM_SHUFFLE(3, 0, 2, 1))
 #define TURNED_TWICE(v) _mm256_permute4x64_pd(v, _MM_SHUFFLE(3, 1, 0, 2))
+/* A quaternion's parts where its product with the unit of an axis has them, but for signs. */
+#define PARTS1(q) _mm256_permute_pd(q, 5)
+#define PARTS2(q) _mm256_permute4x64_pd(q, _MM_SHUFFLE(1, 0, 3, 2))
+#define PARTS3(q) _mm256_permute4x64_pd(q, _MM_SHUFFLE(0, 1, 2, 3))
+#define AXIS(v, n) _mm256_permute4x64_pd(v, 0x55 * (n - 1))
+#define BOTH(low, high) _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1)
+#define FOLDED(v) _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd(v, 1))
 """.splitlines()
     for order in ORDERS:
-        yield f"static void terms_{order}(double *restrict s)"
+        for name in ("terms", "both"):
+            yield f"static void {name}_{order}(double *restrict s)"
+            yield "{"
+            yield from (f"  {line}" for line in c_terms(order, name == "both", level == "avx512"))
+            yield "}\n"
+    for name, entry in (("terms", "taylor_terms"), ("both", "attitude_terms")):
+        yield f"void {entry}_{level}(int order, double *s)"
         yield "{"
-        yield f"  const __m256d f = {load(RATES)}, t0 = {load(0)};"
-        yield "  const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
-        known: set[str] = set()
-        for line in recurrence(order):
-            yield f"  {c(line, known)}"
-            term = re.match(r"t(\d+) ", line)
-            if not term:
-                continue
-            k = int(term[1])
-            yield f"  _mm256_store_pd(s + {4 * k}, t{k});"
+        yield "  switch (order) {"
+        yield from (f"  case {order}: {name}_{order}(s); break;" for order in ORDERS)
+        yield "  }"
+        yield "}"
+
+
+def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
+    """Yield the statements for omega, and among them those for the attitude, which need not wait."""
+    yield f"const __m256d f = {load(RATES)}, t0 = {load(0)};"
+    yield "const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
+    if with_attitude:
+        yield f"const __m256d half = {load(HALF)};"
+        for axis, signs in enumerate(SIGNS, 1):
+            yield f"const __m256d h{axis} = _mm256_mul_pd(half, _mm256_setr_pd({signs}));"
+        yield f"const __m256d k0 = {load(TURNS)};"
+        yield from ready_for_products(0, wide)
+    known: set[str] = set()
+    for line in recurrence(order):
+        yield c(line, known)
+        term = re.match(r"t(\d+) ", line)
+        if not term:
+            continue
+        k = int(term[1])
+        yield f"_mm256_store_pd(s + {4 * k}, t{k});"
+        if k < order:
+            yield f"const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
+        if k == 5:
+            yield c("c = t4 + t5", known)
+        elif k > 5:
+            yield c(f"c = c + t{k}", known)
+        if with_attitude:
+            yield from attitude_term(k, wide)
             if k < order:
-                yield f"  const __m256d a{k} = TURNED_ONCE(t{k}), b{k} = TURNED_TWICE(t{k});"
+                yield from ready_for_products(k, wide)
             if k == 5:
-                yield f"  {c('c = t4 + t5', known)}"
+                yield c("d = k4 + k5", known)
             elif k > 5:
-                yield f"  {c(f'c = c + t{k}', known)}"
-        yield from (f"  {c(f'c = c + t{k}', known)}" for k in (3, 2, 1))
-        yield f"  _mm256_store_pd(s + {CHANGE}, c);"
-        yield "}\n"
-    yield f"void taylor_terms_{level}(int order, double *s)"
-    yield "{"
-    yield "  switch (order) {"
-    yield from (f"  case {order}: terms_{order}(s); break;" for order in ORDERS)
-    yield "  }"
-    yield "}"
+                yield c(f"d = d + k{k}", known)
+    yield from (c(f"c = c + t{k}", known) for k in (3, 2, 1))
+    yield f"_mm256_store_pd(s + {CHANGE}, c);"
+    if with_attitude:
+        yield from (c(f"d = d + k{k}", known) for k in (3, 2, 1))
+        yield f"_mm256_store_pd(s + {TURN}, d);"
+
+
+def ready_for_products(k: int, wide: bool) -> Iterator[str]:
+    """Yield the factors of term k of omega, and those of term k of the attitude.
+
+    A wide register has two terms, of the attitude k - 1 and k, of omega k and k - 1.
+    """
+    for axis in (1, 2, 3):
+        yield f"const __m256d o{axis}_{k} = _mm256_mul_pd(AXIS(t{k}, {axis}), h{axis});"
+        yield f"const __m256d p{axis}_{k} = PARTS{axis}(k{k});"
+    if wide:
+        for axis in (1, 2, 3):
+            if k > 1:
+                yield f"const __m512d oo{axis}_{k} = BOTH(o{axis}_{k}, o{axis}_{k - 1});"
+            if k % 2:
+                yield f"const __m512d pp{axis}_{k} = BOTH(p{axis}_{k - 1}, p{axis}_{k});"
+
+
+def attitude_term(k: int, wide: bool) -> Iterator[str]:
+    """Yield term k of the attitude: a kth of its products with omega, the newest term's last."""
+    older = range(k - 1)
+    if wide:
+        pairs = [i for i in older if i % 2 and i < k - 1]
+        for n, i in enumerate(pairs):
+            for axis in (1, 2, 3):
+                given = f"pp{axis}_{i}, oo{axis}_{k - i}"
+                if n:
+                    yield f"e{axis}_{k} = _mm512_fmadd_pd({given}, e{axis}_{k});"
+                else:
+                    yield f"__m512d e{axis}_{k} = _mm512_mul_pd({given});"
+        if pairs:
+            sums = f"_mm512_add_pd(e1_{k}, _mm512_add_pd(e2_{k}, e3_{k}))"
+            yield f"__m256d e{k} = FOLDED({sums});"
+        rest = [i for i in older if not i % 2 and i + 1 not in older]
+    else:
+        pairs, rest = [], list(older)
+    for n, i in enumerate(rest):
+        for axis in (1, 2, 3):
+            given = f"p{axis}_{i}, o{axis}_{k - 1 - i}"
+            if wide and pairs:
+                yield f"e{k} = _mm256_fmadd_pd({given}, e{k});"
+            elif wide:
+                start = f"__m256d e{k} = _mm256_mul_pd({given});"
+                yield start if axis == 1 else f"e{k} = _mm256_fmadd_pd({given}, e{k});"
+            elif n:
+                yield f"e{axis}_{k} = _mm256_fmadd_pd({given}, e{axis}_{k});"
+            else:
+                yield f"__m256d e{axis}_{k} = _mm256_mul_pd({given});"
+    if not wide and rest:
+        yield f"__m256d e{k} = _mm256_add_pd(e1_{k}, _mm256_add_pd(e2_{k}, e3_{k}));"
+    part = f"_mm256_set1_pd(1.0 / {k})"
+    for axis in (1, 2, 3):
+        yield f"const __m256d n{axis}_{k} = _mm256_mul_pd(o{axis}_0, {part});"
+    newest = f"_mm256_mul_pd(p3_{k - 1}, n3_{k})"
+    yield f"const __m256d y{k} = _mm256_fmadd_pd(p2_{k - 1}, n2_{k}, {newest});"
+    first = f"p1_{k - 1}, n1_{k}"
+    if k > 1:
+        yield f"const __m256d z{k} = _mm256_fmadd_pd({first}, _mm256_mul_pd(e{k}, {part}));"
+    else:
+        yield f"const __m256d z{k} = _mm256_mul_pd({first});"
+    yield f"const __m256d k{k} = _mm256_add_pd(y{k}, z{k});"
+    yield f"_mm256_store_pd(s + {TURNS + 4 * k}, k{k});"
 
 
 def c(line: str, known: set[str]) -> str:

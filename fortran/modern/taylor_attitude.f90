@@ -1,0 +1,168 @@
+module taylor_attitude
+  !! Attitude beside omega: q' = q (0, omega)/2, q scalar first, from body to space. Its terms by a
+  !! recurrence like that of omega, its error as a small turn in space, taken off the rows.
+  use, intrinsic :: iso_c_binding, only: c_int
+  use kinds, only: dp
+  use taylor_series, only: expand, series_t
+  use two_words, only: two_sum
+  implicit none(type, external)
+  private
+
+  ! Where an attitude stands.
+  type, public :: attitude_t
+    real(dp) :: q(4)
+    real(dp) :: q_low(4)  !! what its rounding left out
+    real(dp) :: error(3)  !! half the turn, about axes of space, by which it errs
+    real(dp) :: before(3) !! the same where the step began
+    real(dp) :: worst     !! largest error of a row so far, rad
+  end type attitude_t
+
+  public :: add_attitude_row, begin_attitude, expand_both, rescale_turns, turn_error, turn_on, &
+            turned
+
+contains
+
+  ! unroll: expand_both
+  subroutine expand_both(order, s)
+    !! The terms of omega as by `expand`, those of the attitude, and their sum.
+    integer(c_int), intent(in), value :: order
+    type(series_t), intent(inout) :: s !! turns(:, 0) and half are given too
+    integer :: j, k
+
+    call expand(order, s)
+    do k = 1, order
+      s%turns(:, k) = 0.0_dp
+      do j = 0, k - 1
+        s%turns(:, k) = s%turns(:, k) + by_vector(s%turns(:, j), s%terms(:3, k - 1 - j))
+      end do
+      s%turns(:, k) = s%turns(:, k)*(s%half/real(k, dp))
+    end do
+    s%turn = sum(s%turns(:, order:1:-1), dim=2)
+  end subroutine expand_both
+  ! end unroll
+
+  pure subroutine begin_attitude(q, now)
+    real(dp), intent(in) :: q(4)
+    type(attitude_t), intent(out) :: now
+
+    now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+  end subroutine begin_attitude
+
+  pure subroutine rescale_turns(s, order, ratio)
+    !! The terms of a step that is `ratio` times as long.
+    type(series_t), intent(inout) :: s
+    integer, intent(in) :: order
+    real(dp), intent(in) :: ratio
+    real(dp) :: power
+    integer :: k
+
+    power = 1.0_dp
+    do k = 1, order
+      power = power*ratio
+      s%turns(:, k) = s%turns(:, k)*power
+    end do
+    s%half = s%half*ratio
+    s%turn = sum(s%turns(:, order:1:-1), dim=2)
+  end subroutine rescale_turns
+
+  pure subroutine turn_error(s, order, poles, before, carried, now)
+    !! The error at the end of the step: what that of omega turns, by the trapezoidal rule, and what
+    !! the step leaves out of the attitude itself.
+    type(series_t), intent(in) :: s
+    integer, intent(in) :: order
+    real(dp), intent(in) :: poles(2)   !! of the remainder
+    real(dp), intent(in) :: before(3)  !! error of omega where the step begins, rad/s
+    real(dp), intent(in) :: carried(3) !! and where it ends, but for what it leaves out, rad/s
+    type(attitude_t), intent(inout) :: now
+    real(dp) :: left(4), q(4)
+
+    now%before = now%error
+    q = now%q + s%turn
+    left = poles(1)*s%turns(:, order) - poles(2)*s%turns(:, order - 1)
+    now%error = now%error + (0.5_dp*s%half(1))*(in_space(now%q, before) + in_space(q, carried)) &
+                - left_turn(left, q)
+  end subroutine turn_error
+
+  pure subroutine turn_on(s, now)
+    !! To the end of the step.
+    type(series_t), intent(in) :: s
+    type(attitude_t), intent(inout) :: now
+    integer :: i
+
+    do i = 1, 4
+      call two_sum((now%q(i)), s%turn(i) + now%q_low(i), now%q(i), now%q_low(i))
+    end do
+  end subroutine turn_on
+
+  pure function turned(s, order, part) result(change)
+    !! Change of the attitude at a part of the step.
+    type(series_t), intent(in) :: s
+    integer, intent(in) :: order
+    real(dp), intent(in) :: part
+    real(dp) :: change(4)
+    integer :: k
+
+    change = 0.0_dp
+    do k = order, 1, -1
+      change = (change + s%turns(:, k))*part
+    end do
+  end function turned
+
+  pure subroutine add_attitude_row(small, part, tolerance, now, row)
+    !! A row, its error taken off where it is small enough to be known; of length 1.
+    real(dp), intent(in) :: small(4) !! what is added to the attitude
+    real(dp), intent(in) :: part     !! of the way from the error before to that at the end
+    real(dp), intent(in) :: tolerance
+    type(attitude_t), intent(inout) :: now
+    real(dp), intent(out) :: row(4)
+    real(dp) :: error(3), size
+
+    error = now%before + part*(now%error - now%before)
+    size = 2.0_dp*sqrt(dot_product(error, error))
+    if (.not. size <= now%worst) now%worst = size
+    row = now%q + small
+    if (size <= tolerance) row = now%q + (small - from_left(error, row))
+    row = row/sqrt(dot_product(row, row))
+  end subroutine add_attitude_row
+
+  pure function by_vector(q, v) result(r)
+    !! q (0, v)
+    real(dp), intent(in) :: q(4), v(3)
+    real(dp) :: r(4)
+
+    r(1) = -(q(2)*v(1) + q(3)*v(2) + q(4)*v(3))
+    r(2) = q(1)*v(1) + q(3)*v(3) - q(4)*v(2)
+    r(3) = q(1)*v(2) + q(4)*v(1) - q(2)*v(3)
+    r(4) = q(1)*v(3) + q(2)*v(2) - q(3)*v(1)
+  end function by_vector
+
+  pure function from_left(v, q) result(r)
+    !! (0, v) q
+    real(dp), intent(in) :: v(3), q(4)
+    real(dp) :: r(4)
+
+    r(1) = -(v(1)*q(2) + v(2)*q(3) + v(3)*q(4))
+    r(2) = v(1)*q(1) + v(2)*q(4) - v(3)*q(3)
+    r(3) = v(2)*q(1) + v(3)*q(2) - v(1)*q(4)
+    r(4) = v(3)*q(1) + v(1)*q(3) - v(2)*q(2)
+  end function from_left
+
+  pure function left_turn(p, q) result(v)
+    !! The vector of p times the conjugate of q.
+    real(dp), intent(in) :: p(4), q(4)
+    real(dp) :: v(3)
+
+    v(1) = p(2)*q(1) - p(1)*q(2) + p(4)*q(3) - p(3)*q(4)
+    v(2) = p(3)*q(1) - p(1)*q(3) + p(2)*q(4) - p(4)*q(2)
+    v(3) = p(4)*q(1) - p(1)*q(4) + p(3)*q(2) - p(2)*q(3)
+  end function left_turn
+
+  pure function in_space(q, v) result(u)
+    !! A vector of the body about the axes of space: q (0, v) times the conjugate of q.
+    real(dp), intent(in) :: q(4), v(3)
+    real(dp) :: u(3)
+
+    u = left_turn(by_vector(q, v), q)
+  end function in_space
+
+end module taylor_attitude

@@ -4,6 +4,7 @@ module taylor_attitude
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
   use taylor_series, only: expand, series_t
+  use torque_terms, only: MOST_ORDER
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -26,20 +27,40 @@ contains
   subroutine expand_both(order, s)
     !! The terms of omega as by `expand`, those of the attitude, and their sum.
     integer(c_int), intent(in), value :: order
-    type(series_t), intent(inout) :: s !! turns(:, 0) and half are given too
-    integer :: j, k
+    type(series_t), intent(inout) :: s   !! turns(:, 0) and half are given too
+    real(dp) :: parts(4, 3, 0:MOST_ORDER) ! of each term, times the units of the axes
+    real(dp) :: sums(4)
+    integer :: i, j, k
 
     call expand(order, s)
+    s%turn = 0.0_dp
     do k = 1, order
-      s%turns(:, k) = 0.0_dp
+      call times_units(s%turns(:, k - 1), s%half(1), parts(:, :, k - 1))
+      sums = 0.0_dp
       do j = 0, k - 1
-        s%turns(:, k) = s%turns(:, k) + by_vector(s%turns(:, j), s%terms(:3, k - 1 - j))
+        do i = 1, 4
+          sums(i) = sums(i) + ((parts(i, 1, j)*s%terms(1, k - 1 - j) &
+                                + parts(i, 2, j)*s%terms(2, k - 1 - j)) &
+                               + parts(i, 3, j)*s%terms(3, k - 1 - j))
+        end do
       end do
-      s%turns(:, k) = s%turns(:, k)*(s%half/real(k, dp))
+      s%turns(:, k) = sums*(1.0_dp/real(k, dp))
     end do
-    s%turn = sum(s%turns(:, order:1:-1), dim=2)
+    do k = order, 1, -1
+      s%turn = s%turn + s%turns(:, k)
+    end do
   end subroutine expand_both
   ! end unroll
+
+  pure subroutine times_units(q, factor, parts)
+    !! q times the unit of each axis, times a factor.
+    real(dp), intent(in) :: q(4), factor
+    real(dp), intent(out) :: parts(4, 3)
+
+    parts(:, 1) = factor*[-q(2), q(1), q(4), -q(3)]
+    parts(:, 2) = factor*[-q(3), -q(4), q(1), q(2)]
+    parts(:, 3) = factor*[-q(4), q(3), -q(2), q(1)]
+  end subroutine times_units
 
   pure subroutine begin_attitude(q, now)
     real(dp), intent(in) :: q(4)
@@ -128,12 +149,10 @@ contains
   pure function by_vector(q, v) result(r)
     !! q (0, v)
     real(dp), intent(in) :: q(4), v(3)
-    real(dp) :: r(4)
+    real(dp) :: r(4), parts(4, 3)
 
-    r(1) = -(q(2)*v(1) + q(3)*v(2) + q(4)*v(3))
-    r(2) = q(1)*v(1) + q(3)*v(3) - q(4)*v(2)
-    r(3) = q(1)*v(2) + q(4)*v(1) - q(2)*v(3)
-    r(4) = q(1)*v(3) + q(2)*v(2) - q(3)*v(1)
+    call times_units(q, 1.0_dp, parts)
+    r = (parts(:, 1)*v(1) + parts(:, 2)*v(2)) + parts(:, 3)*v(3)
   end function by_vector
 
   pure function from_left(v, q) result(r)

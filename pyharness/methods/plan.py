@@ -33,6 +33,7 @@ class Plan:
     closed_form: str | None  # sphere, symmetric or elliptic, where one solves the scene
     fallback: str | None  # the method that takes over where the one chosen finds that it can't
     velocity: bool  # is asked for
+    attitude: bool  # the same
     rows: bool  # are asked for
 
     @cached_property
@@ -72,7 +73,7 @@ def plan(
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
     form = form if method == "closed-form" else None
-    return Plan(scene, method, form, fallback, velocity, rows)
+    return Plan(scene, method, form, fallback, velocity, scene.attitude is not None, rows)
 
 
 def _decisions(chosen: Plan) -> Iterator[Decision]:
@@ -102,7 +103,9 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
         yield Decision(name, acts, f"{len(waves)} in the law" if acts else "none act")
     varies = "the law varies" if law.varies else "constant: read once"
     yield Decision("torque of time", law.varies, varies)
-    yield Decision("velocity", chosen.velocity, "asked for" if chosen.velocity else "not asked for")
+    for part in ("velocity", "attitude"):
+        wanted = getattr(chosen, part)
+        yield Decision(part, wanted, "asked for" if wanted else "not asked for")
     wanted, why = chosen.rows, "rows asked for" if chosen.rows else "only the end"
     if wanted and closed:
         wanted, why = False, "closed form"
@@ -115,9 +118,10 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
 def closed_form(scene: Scene) -> str | None:
     """Name the closed form that solves a scene, None where there is none."""
     a, b, c = scene.euler_coefficients
-    if a == b == c == 0.0:
+    if a == b == c == 0.0 and (scene.attitude is None or scene.torque.is_zero):
         return "sphere"
-    if not scene.torque.is_zero:
+    # A body that is given by coefficients has no angular momentum to turn about.
+    if not scene.torque.is_zero or (scene.attitude is not None and scene.moments is None):
         return None
     if 0.0 in (a, b, c):
         # Two coefficients of opposite sign turn; of one sign, or one alone, they run away.

@@ -50,6 +50,7 @@ def trajectory_of(
     evaluations: int,
     error: float | None = None,
     growth: float | None = None,
+    attitudes: Array | None = None,
 ) -> Trajectory:
     """Return the rows of a kernel, which come in columns, as a trajectory.
 
@@ -57,6 +58,8 @@ def trajectory_of(
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     found = rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
+    if attitudes is not None:
+        found = replace(found, attitude=attitudes.T[:n_rows])
     return replace(found, error=error, growth=growth) if found.has_all_rows else found
 
 

@@ -31,6 +31,7 @@ class Method:
     order: int = 0
     evaluations: int = 0
     any_scale: bool = False  # brings the scene near 1 itself, or forms no products in binary64
+    attitude: bool = False  # carries it beside omega, where the scene has one
     scipy: str = ""  # the name that SciPy has for it; empty where it is ours
 
     @property
@@ -95,6 +96,7 @@ REGISTRY = {
             "pyharness.methods.plan",
             1e-15,
             _from("solve", "by_plan"),
+            attitude=True,
         ),
         _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),
         _scipy("RK45", "Runge-Kutta 5(4)", "Dormand and Prince 1980"),
@@ -106,6 +108,7 @@ REGISTRY = {
             "ours; Jorba and Zou 2005, Experimental Mathematics 14",
             1e-15,
             _from("taylor", "taylor"),
+            attitude=True,
         ),
         Method(
             "reference",

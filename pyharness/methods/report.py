@@ -9,7 +9,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import ending, estimates, heading
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Array, Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,25 +23,50 @@ _TIMES = (
 )
 _OMEGA = tuple(Column(f"U{i}", _NUMBER, unit="rad/s", name=f"omega{i}") for i in (1, 2, 3))
 _VELOCITY = tuple(Column(f"V{i}", _NUMBER, unit="m/s", name=f"velocity{i}") for i in (1, 2, 3))
+_ATTITUDE = {
+    "quaternion": tuple(Column(f"q{i}", _NUMBER, name=f"q{i}") for i in range(4)),
+    "3-1-3": tuple(Column(name, _NUMBER, unit="deg") for name in ("phi", "theta", "psi")),
+    "3-2-1": tuple(Column(name, _NUMBER, unit="deg") for name in ("yaw", "pitch", "roll")),
+    "matrix": tuple(
+        Column(f"R{i}{j}", _NUMBER, name=f"R{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)
+    ),
+}
 _END: dict[str, Any] = {
     "color": "black", "marker": "x", "linestyle": "none", "clip_on": False, "zorder": 5,
 }  # fmt: skip
 
 
 def trajectory_report(
-    scene: Scene, method: str, listing: Listing | None, title: str, trajectory: Trajectory
+    scene: Scene,
+    method: str,
+    listing: Listing | None,
+    title: str,
+    trajectory: Trajectory,
+    form: str = "quaternion",
 ) -> Report:
-    """Report one trajectory; `listing` is None for a method that is no program."""
+    """Report one trajectory; `listing` is None for a method that is no program.
+
+    An attitude is shown in a form of `model.attitude.FORMS`.
+    """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
     velocity = trajectory.velocity
     if velocity is not None:
         columns += _VELOCITY
         parts.append(velocity)
+    attitude = trajectory.attitude
+    if attitude is not None:
+        columns += _ATTITUDE[form]
+        parts.append(_shown(attitude, form))
     rows = np.column_stack(parts)
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
-    counted = Table([Column("step", digits(".0f")), *columns], np.column_stack([steps, rows]))
+    # Nine numbers of a matrix leave no room for others in a terminal.
+    kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
+    counted = Table(
+        [Column("step", digits(".0f")), *(columns[k] for k in kept)],
+        np.column_stack([steps, rows[:, kept]]),
+    )
 
     def record() -> dict[str, Any]:
         from pyharness.model import records
@@ -55,6 +80,7 @@ def trajectory_report(
                 "recorded_time": trajectory.recorded_time.tolist(),
                 "omega": trajectory.omega.tolist(),
                 "velocity": None if velocity is None else velocity.tolist(),
+                "attitude": None if attitude is None else attitude.tolist(),
                 **records.estimate_record(trajectory),
             },
             **records.ending_record(trajectory),
@@ -68,6 +94,14 @@ def trajectory_report(
         data=numbers,
         pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
     )
+
+
+def _shown(attitude: Array, form: str) -> Array:
+    from pyharness.model.attitude import SEQUENCES, angles, matrices
+
+    if form in SEQUENCES:
+        return angles(attitude, form)
+    return matrices(attitude).reshape(-1, 9) if form == "matrix" else attitude
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:

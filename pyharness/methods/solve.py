@@ -11,6 +11,7 @@ import numpy as np
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import METHODS, SCIPY_METHODS, Method
 from pyharness.methods.scipy_ivp import finest_tolerance
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.same_motion import factor_near_one, is_ordinary, scaled, unscaled
@@ -28,6 +29,7 @@ def solve(
     method: str = "auto",
     tolerance: Number = 1e-12,
     effort: float = 1.0,
+    attitude: bool = False,
 ) -> Trajectory:
     """Solve a scene.
 
@@ -45,6 +47,9 @@ def solve(
         them.
     effort : float
         Factor on the work after which the method gives up: 1 is some ten seconds.
+    attitude : bool
+        Whether the attitude is wanted too, from that of the scene, or from the axes of space where
+        it has none. The tolerance then holds for its angle (rad) as well.
 
     Returns
     -------
@@ -55,8 +60,9 @@ def solve(
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene, times out of order, a tolerance
-        that the method can't meet, or one that takes more work than `effort` allows.
+        For an unknown method, one that can't take the scene or carry its attitude, times out of
+        order, a tolerance that the method can't meet, or one that takes more work than `effort`
+        allows.
 
     Examples
     --------
@@ -79,6 +85,13 @@ def solve(
         raise InputError(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
+    if attitude and not chosen.attitude:
+        able = ", ".join(each.name for each in METHODS.values() if each.attitude)
+        raise InputError(f"method {method} carries no attitude; allowed: {able}")
+    # Who does not ask for it pays nothing.
+    start = (scene.attitude or IDENTITY) if attitude else None
+    if start is not scene.attitude:
+        scene = replace(scene, attitude=start)
     effort = checked_effort(effort)
     values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]
@@ -88,6 +101,7 @@ def solve(
     if below:
         marches[0] = _reversed(marches[0])
     found = marches[0] if len(marches) == 1 else _joined(*marches)
+    found = replace(found, moments=scene.moments)
     return _reversed(found) if turned else found
 
 
@@ -143,15 +157,18 @@ def _march(
 
 
 def _reversed(found: Trajectory) -> Trajectory:
-    rows: dict[str, Any] = {name: getattr(found, name)[::-1] for name in _ROWS}
-    return replace(found, **rows)
+    return replace(found, **{name: getattr(found, name)[::-1] for name in _rows(found)})
+
+
+def _rows(found: Trajectory) -> tuple[str, ...]:
+    return _ROWS if found.attitude is None else (*_ROWS, "attitude")
 
 
 def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
     """Return the rows of two marches from 0; what overflows is missing at the ends."""
     both = before, after
     rows: dict[str, Any] = {
-        name: np.concatenate([getattr(x, name) for x in both]) for name in _ROWS
+        name: np.concatenate([getattr(x, name) for x in both]) for name in _rows(after)
     }
     return replace(
         after,

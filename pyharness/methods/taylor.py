@@ -17,13 +17,23 @@ def taylor(
 ) -> Trajectory:
     """Solve a scene by Taylor series, each counted as one evaluation.
 
-    Steps are those of the last march, evaluations those of all: a second one is made where the
+    With the attitude, where the scene has one. Steps are those of the last march, evaluations those of all: a second one is made where the
     first erred too much.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
-    rows, n_rows, status, steps = extension().taylor_rows(
-        *normalized(scene), scene.omega, times, tolerance, effort=work
-    )
+    attitudes = None
+    if scene.attitude is None:
+        rows, n_rows, status, steps = extension().taylor_rows(
+            *normalized(scene), scene.omega, times, tolerance, effort=work
+        )
+    else:
+        # What it starts from, and then a column for each time.
+        joint = np.empty((4, len(times) + 1), order="F")
+        joint[:, 0] = scene.attitude
+        rows, n_rows, status, steps = extension().attitude_rows(
+            *normalized(scene), scene.omega, times, tolerance, attitudes=joint, effort=work
+        )
+        attitudes = joint[:, 1:]
     if status == GAVE_UP:
         count = "1 step" if steps == 1 else f"{steps} steps"
         raise TimedError(
@@ -32,4 +42,4 @@ def taylor(
             times[n_rows],
         )
     error, growth = map(known, work[2:4])
-    return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth)
+    return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)

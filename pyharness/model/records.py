@@ -16,7 +16,10 @@ def scene_record(scene: Scene) -> dict[str, Any]:
         "name": scene.name,
         "case": scene.case,
         "body": {body: list(scene.moments or scene.coefficients or ())},
-        "initial": {"omega": list(scene.omega)},
+        "initial": {
+            "omega": list(scene.omega),
+            **({} if scene.attitude is None else {"attitude": list(scene.attitude)}),
+        },
         "torque": {
             "constant": list(scene.torque.constant),
             "rate": list(scene.torque.rate),

@@ -94,7 +94,10 @@ def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> T
     finite = np.isfinite(omega).all(axis=1)
     count = len(omega) if finite.all() else int(np.argmin(finite))
     time = np.array(times[:count], dtype=float)
-    found = replace(trajectory, time=time, recorded_time=time, omega=omega[:count])
+    attitude = trajectory.attitude if trajectory.attitude is None else trajectory.attitude[:count]
+    found = replace(
+        trajectory, time=time, recorded_time=time, omega=omega[:count], attitude=attitude
+    )
     if count == len(trajectory.omega):
         return found
     return replace(found, ended="overflow", error=None, growth=None)

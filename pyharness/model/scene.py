@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, SupportsIndex
 
+from pyharness.model.attitude import Quaternion, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
 from pyharness.model.values import (
@@ -101,8 +102,10 @@ class Scene:
     """One problem: what moves, under what, from where, in which steps.
 
     Exactly one of `moments` (kg m2) and `coefficients` (A, B, C of equations 13-15) is given. Three
-    numbers may be a list, a tuple or an array; the fields are plain tuples of floats. Of a name a
-    line of 60 characters is kept, with what steers a terminal escaped.
+    numbers may be a list, a tuple or an array; the fields are plain tuples of floats. `attitude`,
+    which a scene need not have, is a quaternion at time 0, scalar first, from body to space; it is
+    divided by its length. Of a name a line of 60 characters is kept, with what steers a terminal
+    escaped.
 
     Raises
     ------
@@ -120,6 +123,9 @@ class Scene:
     masses: Triple = field(default_factory=lambda: _deck("masses"))
     forces: Triple = field(default_factory=lambda: _deck("forces"))
     case: int | None = None
+    attitude: Quaternion | None = None
+    # Of the attitude as it was given, before it was divided by it.
+    attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
     if TYPE_CHECKING:
 
@@ -135,6 +141,7 @@ class Scene:
             masses: Numbers = ...,
             forces: Numbers = ...,
             case: SupportsIndex | None = None,
+            attitude: Numbers | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -149,6 +156,10 @@ class Scene:
         if self.coefficients is not None:
             self._set("coefficients", three("[body] coefficients", self.coefficients))
         self._set("omega", three("[initial] omega", self.omega))
+        if self.attitude is not None:
+            unit, length = unit_quaternion("[initial] attitude", self.attitude)
+            self._set("attitude", unit)
+            self._set("attitude_length", length)
         if not isinstance(self.torque, TorqueLaw):
             raise InputError(f"[torque] is {kind_of(self.torque)}; it must be a TorqueLaw")
         self._set("step_size", number("[run] step_size", self.step_size))

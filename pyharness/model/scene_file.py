@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, SupportsIndex
 
+from pyharness.model.attitude import of_angles
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.facts import facts
 from pyharness.model.pipes import read_some
@@ -15,7 +16,7 @@ from pyharness.model.values import whole
 _LARGEST_FILE = 1_000_000
 _TABLES = {
     "body": ("moments", "coefficients"),
-    "initial": ("omega",),
+    "initial": ("omega", "attitude", "angles_deg", "sequence"),
     "torque": ("constant", "rate", "sines", "cosines"),
     "run": ("step_size", "steps"),
 }
@@ -97,6 +98,8 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
     lines += [f"{body} = {list(scene.moments or scene.coefficients or ())}"]
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
+    if scene.attitude is not None:
+        lines.append(f"attitude = {list(scene.attitude)}")
     lines += ["[torque]", f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
     for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
         each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
@@ -121,10 +124,22 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
     return Scene(
         name=data.get("name", default_name),
         omega=initial["omega"],
+        attitude=_attitude(initial),
         torque=_torque(tables["torque"]),
         **body,
         **run,
     )
+
+
+def _attitude(initial: dict[str, Any]) -> Any:
+    given = [key for key in ("attitude", "angles_deg", "sequence") if key in initial]
+    if given in ([], ["attitude"]):
+        return initial.get("attitude")
+    if given != ["angles_deg", "sequence"]:
+        raise InputError(
+            f"[initial]: {' and '.join(given)}; allowed: attitude, or angles_deg with a sequence"
+        )
+    return of_angles("[initial] angles_deg", initial["angles_deg"], initial["sequence"])
 
 
 def _torque(table: dict[str, Any]) -> TorqueLaw:

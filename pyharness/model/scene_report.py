@@ -23,6 +23,8 @@ def heading(scene: Scene) -> list[str]:
     ]
     if scene.is_impossible:
         lines.append("no rigid body has these moments: the largest exceeds the sum of the others")
+    if scene.attitude is not None:
+        lines.append(f"attitude(0) = {_tuple(scene.attitude)}")
     return lines
 
 

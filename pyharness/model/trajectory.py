@@ -2,9 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pyharness.model.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -12,6 +18,7 @@ Array = NDArray[np.float64]
 ROUNDING = 2.0**-53
 # Endings with every row that was asked for.
 WITH_ALL_ROWS = ("complete", "sensitive")
+FRAMES = ("body", "space")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 
 
@@ -63,6 +70,11 @@ class Trajectory:
     growth : float or None
         Largest norm of the derivative of omega at the end by omega at any time before; None where
         it is unknown.
+    attitude : ndarray, shape (n, 4), or None
+        Quaternions from body to space, scalar first, their signs continuous; None where they were
+        not asked for.
+    moments : tuple of three floats, or None
+        Of the body, kg m2; None where it has only coefficients.
     """
 
     time: Array
@@ -76,6 +88,46 @@ class Trajectory:
     ier: NDArray[np.int32] | None = None
     error: float | None = None
     growth: float | None = None
+    attitude: Array | None = None
+    moments: tuple[float, float, float] | None = None
+
+    def rotation(self) -> "Rotation":
+        """Return the attitudes as rotations of SciPy, which turn vectors from body to space.
+
+        InputError where the attitude was not asked for.
+        """
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
+
+    def angular_momentum(self, frame: str = "body") -> Array:
+        """Return the angular momentum about the axes of `body` or `space`, shape (n, 3), kg m2/s.
+
+        InputError for a body without moments, an unknown frame, or one in space whose attitude was
+        not asked for.
+        """
+        if frame not in FRAMES:
+            raise unknown("frame", str(frame), FRAMES)
+        momentum = self.omega * self._moments()
+        return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
+
+    def energy(self) -> Array:
+        """Return the kinetic energy of the rotation, shape (n,), J.
+
+        InputError for a body without moments.
+        """
+        energy: Array = 0.5 * (self.omega * self.omega * self._moments()).sum(axis=1)
+        return energy
+
+    def _attitudes(self) -> Array:
+        if self.attitude is None:
+            raise InputError("the trajectory has no attitude; ask for it: attitude=True")
+        return self.attitude
+
+    def _moments(self) -> Array:
+        if self.moments is None:
+            raise InputError("the body is given by coefficients; it takes moments to say that")
+        return np.array(self.moments)
 
     @property
     def digits(self) -> float | None:
@@ -86,6 +138,13 @@ class Trajectory:
     def has_all_rows(self) -> bool:
         """Whether every row that was asked for is there, though it may be sensitive."""
         return self.ended in WITH_ALL_ROWS
+
+
+def turned_to_space(attitude: Array, vectors: Array) -> Array:
+    """Return vectors of the body, shape (n, 3), about the axes of space."""
+    scalar, vector = attitude[:, :1], attitude[:, 1:]
+    twice = 2.0 * np.cross(vector, vectors)
+    return vectors + scalar * twice + np.cross(vector, twice)
 
 
 def digits_left(error: float | None) -> float | None:

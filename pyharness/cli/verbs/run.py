@@ -5,6 +5,7 @@ import sys
 
 from pyharness.cli import options as shared
 from pyharness.methods.report import trajectory_report
+from pyharness.model.attitude import FORMS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
@@ -21,6 +22,7 @@ OPTIONS = {
     "--method M": "a method in place of a program",
     **shared.LISTING,
     "--times T1,T2,...": "where results are wanted, s (methods)",
+    "--attitude FORM": f"the attitude too, as {', '.join(FORMS)}",
     "--tolerance E": "error at these times over the largest |omega| (methods)",
     **shared.STRICT,
     **shared.EFFORT,
@@ -55,7 +57,8 @@ def run(options: argparse.Namespace) -> int:
 
         return records(trajectory)
 
-    report = trajectory_report(scene, name, listing, title, trajectory)
+    form = options.attitude or FORMS[0]
+    report = trajectory_report(scene, name, listing, title, trajectory, form)
     shared.show(report, options, {"printer": page, "tape5": tape})
     return 1 if options.strict and trajectory.ended == "sensitive" else 0
 
@@ -112,12 +115,14 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     shared.refuse(options, "--method", (*listing_options, "no_stop"))
     name = options.method
     shared.check_known("method", name, tuple(METHODS))
+    shared.check_known("attitude", options.attitude, FORMS)
     default = max(1e-9, METHODS[name].finest)
     tolerance = shared.positive(options.tolerance, "--tolerance", default)
     times = scene.times()
     if options.times is not None:
         times = shared.numbers(options.times, "--times")
     shared.check_outputs(options)
-    trajectory = solve(scene, times, name, tolerance, shared.chosen_effort(options))
+    effort, attitude = shared.chosen_effort(options), options.attitude is not None
+    trajectory = solve(scene, times, name, tolerance, effort, attitude)
     title = f"method {name}: {METHODS[name].title}, tolerance {tolerance:g}"
     return name, title, trajectory

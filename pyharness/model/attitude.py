@@ -1,0 +1,114 @@
+"""Attitudes: unit quaternions, scalar first, Hamilton's product, from body to space.
+
+v in space is q v times the conjugate of q, and q' = q (0, omega)/2. Angles and matrices are for the
+eye alone; nothing is integrated in them.
+"""
+
+import math
+
+import numpy as np
+
+from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.trajectory import Array
+from pyharness.model.values import finite, several, three
+
+Quaternion = tuple[float, float, float, float]
+
+IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+SEQUENCES = ("3-1-3", "3-2-1")
+FORMS = ("quaternion", *SEQUENCES, "matrix")
+NEAR_ONE = 1e-12  # a length that is off by less was meant to be 1
+_ROUNDED = 2.0**-51  # such a length can't be mended
+
+
+def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
+    """Return four numbers over their length, and that; InputError where they are no attitude."""
+    allowed = "allowed: four finite numbers, scalar first, not all 0"
+    given = [finite(where, each) for each in several(where, values, allowed)]
+    if len(given) != 4:
+        raise InputError(f"{where}: {len(given)} numbers; {allowed}")
+    largest = max(map(abs, given))
+    if largest == 0.0:
+        raise InputError(f"{where}: all four are 0; {allowed}")
+    # Scaled first, so that no square leaves the range of numbers.
+    length = math.hypot(*(x / largest for x in given))
+    whole = length * largest
+    if abs(whole - 1.0) > _ROUNDED:
+        given = [value / largest / length for value in given]
+    w, x, y, z = given
+    return (w, x, y, z), whole
+
+
+def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
+    """Return the attitude of three angles (degrees) about the axes of a sequence, one by one."""
+    if not isinstance(sequence, str) or sequence not in SEQUENCES:
+        name = sequence if isinstance(sequence, str) else kind_of(sequence)
+        raise unknown("sequence", name, SEQUENCES, where)
+    q: Quaternion = IDENTITY
+    for axis, angle in zip(sequence.split("-"), three(where, angles_deg), strict=True):
+        half = math.radians(math.remainder(angle, 720.0)) / 2.0
+        turn = [math.cos(half), 0.0, 0.0, 0.0]
+        turn[int(axis)] = math.sin(half)
+        q = product(q, (turn[0], turn[1], turn[2], turn[3]))
+    return q
+
+
+def product(p: Quaternion, q: Quaternion) -> Quaternion:
+    """Return Hamilton's product."""
+    a, b, c, d = p
+    e, f, g, h = q
+    return (
+        a * e - b * f - c * g - d * h,
+        a * f + b * e + c * h - d * g,
+        a * g - b * h + c * e + d * f,
+        a * h + b * g - c * f + d * e,
+    )
+
+
+def angles(attitude: Array, sequence: str) -> Array:
+    """Return the angles (degrees) of attitudes, shape (n, 4), about the axes of a sequence, (n, 3).
+
+    By arc tangents of half angles, which keep their digits at the poles. There only the sum of the
+    first and last angle is known, or their difference: the last one is then 0.
+    """
+    q0, q1, q2, q3 = attitude.T
+    if sequence == "3-1-3":
+        tilt = 2.0 * np.arctan2(np.hypot(q1, q2), np.hypot(q0, q3))
+        total, rest = np.arctan2(q3, q0), np.arctan2(q2, q1)
+        first, last = total + rest, total - rest
+        no_total, no_rest = np.hypot(q0, q3) == 0.0, np.hypot(q1, q2) == 0.0
+    else:
+        a, b, c, d = q0 - q2, q1 + q3, q2 + q0, q3 - q1
+        tilt = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b)) - np.pi / 2.0
+        total, rest = np.arctan2(b, a), np.arctan2(d, c)
+        first, last = total + rest, total - rest
+        no_total, no_rest = np.hypot(a, b) == 0.0, np.hypot(c, d) == 0.0
+    first = np.where(no_rest, 2.0 * total, np.where(no_total, 2.0 * rest, first))
+    last = np.where(no_rest | no_total, 0.0, last)
+    found = np.degrees(np.column_stack([first, tilt, last]))
+    found[:, [0, 2]] -= 360.0 * np.round(found[:, [0, 2]] / 360.0)
+    return found
+
+
+def matrices(attitude: Array) -> Array:
+    """Return the matrices, shape (n, 3, 3), that take vectors from body to space."""
+    w, x, y, z = attitude.T
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def angle_between(attitude: Array, other: Array) -> Array:
+    """Return the angles (rad), shape (n,), between attitudes; their signs play no part."""
+    a, b, c, d = attitude.T
+    e, f, g, h = other.T
+    vector = np.array([
+        b * e - a * f + d * g - c * h,
+        c * e - a * g + b * h - d * f,
+        d * e - a * h + c * f - b * g,
+    ])  # fmt: skip
+    sine: Array = np.sqrt((vector * vector).sum(axis=0))
+    return 2.0 * np.arcsin(np.minimum(1.0, sine))

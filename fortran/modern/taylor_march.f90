@@ -153,8 +153,10 @@ contains
       call torque_terms_at(constant, rate, now%t, now%t_low, h, order, longest, now%since == 0, &
                            waves, s%torque)
       if (with_attitude) then
-        s%turns(:, 0) = attitude%q
-        s%half = 0.5_dp*h
+        do i = 1, 4
+          s%turns(i, 0) = attitude%q(i)
+          s%half(i) = 0.5_dp*h
+        end do
         s%weight = now%scale
         call expand_both(order, s)
       else

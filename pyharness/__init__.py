@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from pyharness.methods.solve import solve
     from pyharness.model.errors import InputError, NotBuiltError
     from pyharness.model.listing import Listing, subset
+    from pyharness.model.principal import principal
     from pyharness.model.scene import Scene, TorqueLaw
     from pyharness.model.scene_file import case_scene, read_scene
     from pyharness.model.trajectory import Stop, Trajectory
@@ -32,6 +33,7 @@ __all__ = [
     "case_scene",
     "compare_programs",
     "prepare",
+    "principal",
     "read_scene",
     "run_program",
     "solve",
@@ -43,6 +45,7 @@ _ROOMS = {
     "compare.comparison": ("Comparison", "compare_programs"),
     "model.errors": ("InputError", "NotBuiltError"),
     "model.listing": ("Listing", "subset"),
+    "model.principal": ("principal",),
     "model.scene": ("Scene", "TorqueLaw"),
     "model.scene_file": ("case_scene", "read_scene"),
     "model.trajectory": ("Stop", "Trajectory"),

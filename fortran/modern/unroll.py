@@ -308,7 +308,7 @@ def c_source(level: str) -> Iterator[str]:
 
 
 def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
-    """Yield the statements for omega, and among them those for the attitude, which need not wait."""
+    """Yield the statements for omega, and among them those for the attitude, which wait less."""
     yield f"const __m256d f = {load(RATES)}, t0 = {load(0)};"
     yield "const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
     if with_attitude:

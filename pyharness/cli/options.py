@@ -10,11 +10,12 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 from pyharness.cli import say
+from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.report import Report
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import case_numbers, case_scene, read_scene
 
 FORMATS = ("table", "json", "csv", "markdown")
@@ -127,8 +128,11 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
     return only
 
 
-def chosen_scene(options: argparse.Namespace) -> Scene:
-    """Return the scene asked for; warn where no body has its moments."""
+def chosen_scene(options: argparse.Namespace, any_axes: bool = False) -> Scene:
+    """Return the scene asked for; warn where no body has its moments.
+
+    InputError for a full inertia matrix, but with `any_axes`.
+    """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
     if options.case is not None:
@@ -146,7 +150,9 @@ def chosen_scene(options: argparse.Namespace) -> Scene:
         changes["step_size"] = number(options.step_size, "--step-size")
     if options.steps is not None:
         changes["steps"] = whole(options.steps, "--steps")
-    scene = replace(scene, **changes)
+    if abs(scene.attitude_length - 1.0) > NEAR_ONE:
+        warn(f"the attitude has the length {scene.attitude_length:.6g}; divided by it")
+    scene = checked_scene(replace(scene, **changes), any_axes)
     if scene.is_impossible:
         warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
     return scene

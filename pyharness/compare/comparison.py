@@ -20,7 +20,7 @@ from pyharness.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
 from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
@@ -145,6 +145,7 @@ def compare_programs(
     listings = listings_for() if listings is None else listings
     for listing, implementation in itertools.product(listings, IMPLEMENTATIONS):
         check_steps(scene, listing.program, implementation, effort)
+    checked_scene(scene)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:

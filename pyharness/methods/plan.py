@@ -6,7 +6,7 @@ from functools import cached_property
 
 from pyharness.methods.registry import REGISTRY
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, checked_scene
 
 FINEST = REGISTRY["auto"].finest
 # For few digits Runge-Kutta takes fewer operations than a series; which, the kernel decides.
@@ -62,7 +62,7 @@ def plan(
     if not finest <= tolerance <= 1.0:
         place = " for quick" if method == "quick" else ""
         raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
-    form = closed_form(scene)
+    form = closed_form(checked_scene(scene))
     fallback = None
     if method == "auto":
         few_digits = tolerance >= (_WAVES_DIGITS if scene.torque.varies else FEW_DIGITS)

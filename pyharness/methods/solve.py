@@ -14,6 +14,7 @@ from pyharness.methods.scipy_ivp import finest_tolerance
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
+from pyharness.model.principal import given_back, principal
 from pyharness.model.same_motion import factor_near_one, is_ordinary, scaled, unscaled
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Trajectory
@@ -71,7 +72,7 @@ def solve(
     array([[3.5, 3.5, 3.5],
            [6. , 6. , 6. ]])
     """
-    checked_scene(scene)
+    checked_scene(scene, any_axes=True)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
@@ -92,6 +93,8 @@ def solve(
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:
         scene = replace(scene, attitude=start)
+    is_full = scene.inertia is not None
+    scene, axes = principal(scene)
     effort = checked_effort(effort)
     values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]
@@ -102,6 +105,8 @@ def solve(
         marches[0] = _reversed(marches[0])
     found = marches[0] if len(marches) == 1 else _joined(*marches)
     found = replace(found, moments=scene.moments)
+    if is_full:
+        found = given_back(found, axes)
     return _reversed(found) if turned else found
 
 

@@ -17,8 +17,8 @@ def taylor(
 ) -> Trajectory:
     """Solve a scene by Taylor series, each counted as one evaluation.
 
-    With the attitude, where the scene has one. Steps are those of the last march, evaluations those of all: a second one is made where the
-    first erred too much.
+    With the attitude, where the scene has one. Steps are those of the last march, evaluations those
+    of all: a second one is made where the first erred too much.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     attitudes = None

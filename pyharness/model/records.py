@@ -6,16 +6,17 @@ from typing import Any
 from pyharness.model.build import build
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, Wave
+from pyharness.model.scene_file import body_of
 from pyharness.model.trajectory import Trajectory
 
 
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene in the form of the scene file, with the number of its case."""
-    body = "moments" if scene.moments is not None else "coefficients"
+    body, values = body_of(scene)
     return {
         "name": scene.name,
         "case": scene.case,
-        "body": {body: list(scene.moments or scene.coefficients or ())},
+        "body": {body: values},
         "initial": {
             "omega": list(scene.omega),
             **({} if scene.attitude is None else {"attitude": list(scene.attitude)}),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, SupportsIndex
 from pyharness.model.attitude import Quaternion, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
+from pyharness.model.inertia import Matrix, checked_inertia, principal_axes
 from pyharness.model.values import (
     Number,
     Numbers,
@@ -31,6 +32,10 @@ _BYTES_PER_STEP = 2 * (8 * 8 + 4)
 # The compiled programs count steps and right-hand sides, five a step at the most, in 32 bits.
 _COUNTABLE_STEPS = 400_000_000
 _LONGEST_NAME = 60
+FULL_INERTIA = (
+    "the scene has a full inertia matrix, and this takes principal axes; allowed: moments, or the "
+    "scene of pyharness.principal"
+)
 
 
 @dataclass(frozen=True)
@@ -101,11 +106,11 @@ def _wave(function: Callable[[float], float], angle: float) -> float:
 class Scene:
     """One problem: what moves, under what, from where, in which steps.
 
-    Exactly one of `moments` (kg m2) and `coefficients` (A, B, C of equations 13-15) is given. Three
-    numbers may be a list, a tuple or an array; the fields are plain tuples of floats. `attitude`,
-    which a scene need not have, is a quaternion at time 0, scalar first, from body to space; it is
-    divided by its length. Of a name a line of 60 characters is kept, with what steers a terminal
-    escaped.
+    Exactly one of `moments` (kg m2), `coefficients` (A, B, C of equations 13-15) and `inertia`, a
+    full symmetric matrix (kg m2), is given. Three numbers may be a list, a tuple or an array; the
+    fields are plain tuples of floats. `attitude`, which a scene need not have, is a quaternion at
+    time 0, scalar first, from body to space; it is divided by its length. Of a name a line of 60
+    characters is kept, with what steers a terminal escaped.
 
     Raises
     ------
@@ -124,6 +129,7 @@ class Scene:
     forces: Triple = field(default_factory=lambda: _deck("forces"))
     case: int | None = None
     attitude: Quaternion | None = None
+    inertia: Matrix | None = None
     # Of the attitude as it was given, before it was divided by it.
     attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
@@ -142,6 +148,7 @@ class Scene:
             forces: Numbers = ...,
             case: SupportsIndex | None = None,
             attitude: Numbers | None = None,
+            inertia: Iterable[Numbers] | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -149,12 +156,16 @@ class Scene:
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
-        if (self.moments is None) == (self.coefficients is None):
-            raise InputError("[body]: give either moments or coefficients, three numbers")
+        if [self.moments, self.coefficients, self.inertia].count(None) != 2:
+            raise InputError(
+                "[body]: give one of moments or coefficients, three numbers, or inertia, three rows"
+            )
         if self.moments is not None:
             self._set("moments", _above_zero("[body] moments", "I", self.moments))
         if self.coefficients is not None:
             self._set("coefficients", three("[body] coefficients", self.coefficients))
+        if self.inertia is not None:
+            self._set("inertia", checked_inertia("[body] inertia", self.inertia))
         self._set("omega", three("[initial] omega", self.omega))
         if self.attitude is not None:
             unit, length = unit_quaternion("[initial] attitude", self.attitude)
@@ -187,19 +198,20 @@ class Scene:
 
     @property
     def euler_coefficients(self) -> Triple:
-        """A, B, C of equations 13-15, without unit."""
+        """A, B, C of equations 13-15, without unit; InputError for a full inertia matrix."""
         if self.coefficients is not None:
             return self.coefficients
-        assert self.moments is not None
+        if self.moments is None:
+            raise InputError(FULL_INERTIA)
         first, second, third = self.moments
         return (second - third) / first, (third - first) / second, (first - second) / third
 
     @property
     def is_impossible(self) -> bool:
         """Whether the moments break the triangle inequality, so that no body has them."""
-        if self.moments is None:
+        if self.coefficients is not None:
             return False
-        low, middle, high = sorted(self.moments)
+        low, middle, high = sorted(self.moments or principal_axes(self.inertia or ())[0])
         return high > low + middle
 
     def times(self) -> list[float]:
@@ -247,9 +259,14 @@ def _size(steps: int, limit: int) -> str:
     return f"{steps}{size if steps > limit else ''}"
 
 
-def checked_scene(scene: object) -> Scene:
-    """Return a scene; InputError where it is none."""
+def checked_scene(scene: object, any_axes: bool = False) -> Scene:
+    """Return a scene; InputError where it is none, or its axes are not the body's principal ones.
+
+    `any_axes`: it may have a full inertia matrix.
+    """
     if isinstance(scene, Scene):
+        if scene.inertia is not None and not any_axes:
+            raise InputError(FULL_INERTIA)
         return scene
     raise InputError(f"scene is {kind_of(scene)}; it must be a Scene, as case_scene makes one")
 

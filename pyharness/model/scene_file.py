@@ -15,7 +15,7 @@ from pyharness.model.values import whole
 
 _LARGEST_FILE = 1_000_000
 _TABLES = {
-    "body": ("moments", "coefficients"),
+    "body": ("moments", "coefficients", "inertia"),
     "initial": ("omega", "attitude", "angles_deg", "sequence"),
     "torque": ("constant", "rate", "sines", "cosines"),
     "run": ("step_size", "steps"),
@@ -92,11 +92,11 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """
     import json
 
-    body = "moments" if scene.moments is not None else "coefficients"
+    body, values = body_of(scene)
     law = scene.torque
     lines = [f"# {line}" for line in comments]
     lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
-    lines += [f"{body} = {list(scene.moments or scene.coefficients or ())}"]
+    lines += [f"{body} = {values}"]
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
     if scene.attitude is not None:
         lines.append(f"attitude = {list(scene.attitude)}")
@@ -106,6 +106,15 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
         lines.append(f"{name} = [{', '.join(each)}]")
     lines += ["[run]", f"step_size = {scene.step_size!r}", f"steps = {scene.steps}"]
     return "\n".join(lines) + "\n"
+
+
+def body_of(scene: Scene) -> tuple[str, list[Any]]:
+    """Return by what name a file gives the body of a scene, and how."""
+    if scene.inertia is not None:
+        return "inertia", [list(row) for row in scene.inertia]
+    if scene.moments is not None:
+        return "moments", list(scene.moments)
+    return "coefficients", list(scene.coefficients or ())
 
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:

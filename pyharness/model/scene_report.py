@@ -10,11 +10,13 @@ from pyharness.model.trajectory import Trajectory
 
 def heading(scene: Scene) -> list[str]:
     """Say what a scene is: name; body, torque, start, steps; that there is no such body."""
-    if scene.moments is not None:
+    if scene.inertia is not None:
+        body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
+    elif scene.moments is not None:
         body = f"I = {_tuple(scene.moments)} kg m2"
     else:
         body = f"A, B, C = {_tuple(scene.euler_coefficients)}"
-    unit = "N m" if scene.moments is not None else "1/s2"
+    unit = "N m" if scene.coefficients is None else "1/s2"
     torque = f"N = {_law(scene)} {unit}" if not scene.torque.is_zero else "no torque"
     lines = [
         f"Case {scene.case}: {scene.name}" if scene.case else scene.name,

@@ -75,6 +75,8 @@ class Trajectory:
         not asked for.
     moments : tuple of three floats, or None
         Of the body, kg m2; None where it has only coefficients.
+    axes : ndarray, shape (3, 3), or None
+        The axes of those moments, in columns; None where they are the body's own.
     """
 
     time: Array
@@ -90,6 +92,7 @@ class Trajectory:
     growth: float | None = None
     attitude: Array | None = None
     moments: tuple[float, float, float] | None = None
+    axes: Array | None = None
 
     def rotation(self) -> "Rotation":
         """Return the attitudes as rotations of SciPy, which turn vectors from body to space.
@@ -108,7 +111,7 @@ class Trajectory:
         """
         if frame not in FRAMES:
             raise unknown("frame", str(frame), FRAMES)
-        momentum = self.omega * self._moments()
+        momentum = self._momentum()
         return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
 
     def energy(self) -> Array:
@@ -116,18 +119,20 @@ class Trajectory:
 
         InputError for a body without moments.
         """
-        energy: Array = 0.5 * (self.omega * self.omega * self._moments()).sum(axis=1)
+        energy: Array = 0.5 * (self.omega * self._momentum()).sum(axis=1)
         return energy
+
+    def _momentum(self) -> Array:
+        if self.moments is None:
+            raise InputError("the body is given by coefficients; it takes moments to say that")
+        axes = np.eye(3) if self.axes is None else self.axes
+        momentum: Array = ((self.omega @ axes) * np.array(self.moments)) @ axes.T
+        return momentum
 
     def _attitudes(self) -> Array:
         if self.attitude is None:
             raise InputError("the trajectory has no attitude; ask for it: attitude=True")
         return self.attitude
-
-    def _moments(self) -> Array:
-        if self.moments is None:
-            raise InputError("the body is given by coefficients; it takes moments to say that")
-        return np.array(self.moments)
 
     @property
     def digits(self) -> float | None:

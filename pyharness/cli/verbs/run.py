@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 
 from pyharness.cli import options as shared
 from pyharness.methods.report import trajectory_report
@@ -22,7 +23,7 @@ OPTIONS = {
     "--method M": "a method in place of a program",
     **shared.LISTING,
     "--times T1,T2,...": "where results are wanted, s (methods)",
-    "--attitude FORM": f"the attitude too, as {', '.join(FORMS)}",
+    "--attitude FORM": f"the attitude too: {', '.join(FORMS)}",
     "--tolerance E": "error at these times over the largest |omega| (methods)",
     **shared.STRICT,
     **shared.EFFORT,
@@ -32,13 +33,14 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Run and show; 1 where a result is sensitive and that is not to be passed over."""
-    scene = shared.chosen_scene(options)
+    scene = shared.chosen_scene(options, any_axes=options.method is not None)
     if (options.program is None) == (options.method is None):
         from pyharness.methods.registry import METHODS
 
         raise InputError(
             f"run: give either --program ({', '.join(PROGRAMS)}) or --method ({', '.join(METHODS)})"
         )
+    shared.check_known("attitude", options.attitude, FORMS)
     if options.format in PROGRAM_FORMATS:
         _check_program_format(options, scene, options.format)
     listing: Listing | None = None
@@ -94,6 +96,11 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
         not options.no_stop,
         effort=shared.chosen_effort(options),
     )
+    if options.attitude is not None:
+        from pyharness.methods.from_rows import attitude_from_rows
+
+        rows = attitude_from_rows(scene, trajectory.time, trajectory.omega)
+        trajectory = replace(trajectory, attitude=rows)
     title = f"program {name} ({implementation}), {shared.listing_text(listing)}"
     return name, listing, title, trajectory
 
@@ -115,7 +122,6 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     shared.refuse(options, "--method", (*listing_options, "no_stop"))
     name = options.method
     shared.check_known("method", name, tuple(METHODS))
-    shared.check_known("attitude", options.attitude, FORMS)
     default = max(1e-9, METHODS[name].finest)
     tolerance = shared.positive(options.tolerance, "--tolerance", default)
     times = scene.times()

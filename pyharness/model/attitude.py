@@ -85,7 +85,7 @@ def angles(attitude: Array, sequence: str) -> Array:
         no_total, no_rest = np.hypot(a, b) == 0.0, np.hypot(c, d) == 0.0
     first = np.where(no_rest, 2.0 * total, np.where(no_total, 2.0 * rest, first))
     last = np.where(no_rest | no_total, 0.0, last)
-    found = np.degrees(np.column_stack([first, tilt, last]))
+    found: Array = np.degrees(np.column_stack([first, tilt, last]))
     found[:, [0, 2]] -= 360.0 * np.round(found[:, [0, 2]] / 360.0)
     return found
 

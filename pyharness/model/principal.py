@@ -37,7 +37,7 @@ def given_back(found: Trajectory, axes: Array) -> Trajectory:
     attitude = found.attitude
     if attitude is not None:
         w, x, y, z = _quaternion(axes)
-        attitude = np.array(product(tuple(attitude.T), (w, -x, -y, -z))).T  # type: ignore[arg-type]
+        attitude = np.array(product(tuple(attitude.T), (w, -x, -y, -z))).T
     return replace(found, omega=found.omega @ axes.T, attitude=attitude, axes=axes)
 
 

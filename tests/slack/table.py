@@ -271,7 +271,7 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Plant) ->
 
 
 def form_for_all(
-    size: float, scene: Scene, times: Sequence[float], name: str, *rest: float
+    size: float, scene: Scene, times: Sequence[float], name: str, *rest: Any
 ) -> Trajectory:
     """Solve by a closed form, or what stands for it where there is none."""
     return solved(0.0, scene, times) if size else solve(scene, times, name, *rest)

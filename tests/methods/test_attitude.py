@@ -1,0 +1,186 @@
+"""Attitude by the joint series, and beside any rows: against integrators of its own equations."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from pyharness import InputError, Scene, TorqueLaw, case_scene, run_program, solve, subset
+from pyharness.compare.random_scenes import draw
+from pyharness.methods.from_rows import attitude_from_rows
+from pyharness.methods.plan import plan
+from pyharness.model.attitude import IDENTITY, angle_between
+from pyharness.model.trajectory import Array, turned_to_space
+
+TURNED = (0.5, -0.1, 0.7, 0.5)
+# A spin hardly changes omega, and turns the body all the same.
+SPIN = Scene("", (0.0, 0.0, 10.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((0.0, 0.0, 1e-3)))
+SCENES = {
+    **{f"case {n}": replace(case_scene(n), attitude=TURNED) for n in range(1, 8)},
+    "spin": SPIN,
+    "coefficients": Scene("", (0.3, -1.0, 2.0), coefficients=(0.3, -0.7, 0.5)),
+    "rest": Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=TorqueLaw((1.0, 0.0, 2.0))),
+}
+
+
+def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
+    """Return omega and attitude by DOP853 on seven unknowns."""
+    slope = scene.right_hand_side()
+
+    def rates(t: float, y: Array) -> list[float]:
+        x, y_, z, a, b, c, d = y
+        return [
+            *slope(t, [x, y_, z]),
+            -0.5 * (b * x + c * y_ + d * z),
+            0.5 * (a * x + c * z - d * y_),
+            0.5 * (a * y_ + d * x - b * z),
+            0.5 * (a * z + b * y_ - c * x),
+        ]
+
+    start = [*scene.omega, *(scene.attitude or IDENTITY)]
+    way = (0.0, times[-1])
+    found = solve_ivp(rates, way, start, "DOP853", times, rtol=3e-14, atol=1e-14).y.T
+    return found[:, :3], found[:, 3:]
+
+
+@pytest.mark.parametrize("time", [2.0, -2.0])
+@pytest.mark.parametrize("name", SCENES)
+def test_series_agrees_with_seven_unknowns(name: str, time: float, level: int) -> None:
+    scene = SCENES[name]
+    times = [0.1 * time, 0.5 * time, time]
+    found = solve(scene, times, "taylor", 1e-12, attitude=True)
+    assert found.attitude is not None
+    omega, attitude = by_scipy(scene, times)
+    assert np.abs(found.omega - omega).max() < 1e-11 * max(1.0, np.abs(omega).max())
+    # The signs too: they are continuous.
+    assert np.abs(found.attitude - attitude).max() < 2e-11
+    assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("number", range(40))
+def test_tolerance_holds_for_the_angle(number: int) -> None:
+    drawn = draw("attitude", number)
+    scene = replace(drawn.scene, attitude=TURNED)
+    try:
+        fine = solve(scene, [0.4 * drawn.time, drawn.time], "taylor", 1e-14, attitude=True)
+    except InputError:
+        pytest.skip("too long for the finest tolerance")
+    if fine.ended == "overflow" or not fine.growth < 1e9:  # type: ignore[operator]
+        pytest.skip("no truth")
+    for tolerance in (1e-3, 1e-6, 1e-9):
+        found = solve(scene, fine.time.tolist(), "taylor", tolerance, attitude=True)
+        assert found.attitude is not None
+        assert fine.attitude is not None
+        limit = tolerance + 1e-15 * (fine.growth or 1.0)
+        assert angle_between(found.attitude, fine.attitude).max() <= limit
+        largest = max(np.abs(fine.omega).max(), max(map(abs, scene.omega)))
+        assert np.abs(found.omega - fine.omega).max() <= limit * largest
+
+
+def test_series_agrees_on_random_scenes_too() -> None:
+    for number in range(0, 24, 2):
+        drawn = draw("attitude", number)
+        time = min(drawn.time, 30.0 / max(map(abs, drawn.scene.omega)))
+        found = solve(drawn.scene, [time], "taylor", 1e-11, attitude=True)
+        _, attitude = by_scipy(drawn.scene, [time])
+        assert found.attitude is not None
+        assert angle_between(found.attitude, attitude).max() < 1e-9
+
+
+def test_momentum_in_space_is_what_torque_made_of_it() -> None:
+    scene = replace(case_scene(7), attitude=TURNED)
+
+    def torque_in_space(time: float, axis: int) -> float:
+        found = solve(scene, [time], "taylor", 1e-13, attitude=True)
+        assert found.attitude is not None
+        return float(turned_to_space(found.attitude, np.array([scene.torque.at(time)]))[0, axis])
+
+    end = solve(scene, [0.0, 1.0], "taylor", 1e-13, attitude=True)
+    momentum = end.angular_momentum("space")
+    for axis in range(3):
+        gained, _ = quad(torque_in_space, 0.0, 1.0, (axis,), epsrel=1e-11, limit=200)
+        assert momentum[1, axis] - momentum[0, axis] == pytest.approx(gained, abs=1e-9)
+
+
+def test_momentum_and_energy_without_torque_stay() -> None:
+    found = solve(
+        case_scene(4), np.linspace(0.1, 20.0, 50).tolist(), "taylor", 1e-13, attitude=True
+    )
+    momentum = found.angular_momentum("space")
+    assert np.abs(momentum - momentum[0]).max() < 2e-13 * np.abs(momentum).max()
+    assert found.energy() == pytest.approx(np.full(50, found.energy()[0]), rel=1e-13)
+    body = found.angular_momentum()
+    assert found.rotation().apply(body) == pytest.approx(momentum, rel=1e-13, abs=1e-12)
+
+
+def test_signs_are_continuous() -> None:
+    found = solve(case_scene(5), np.linspace(0.0, 3.0, 400).tolist(), "auto", attitude=True)
+    assert found.attitude is not None
+    assert (np.einsum("ni,ni->n", found.attitude[1:], found.attitude[:-1]) > 0.9).all()
+
+
+def test_estimate_tells_the_error() -> None:
+    ratios = []
+    for number in range(3, 8):
+        scene = case_scene(number)
+        fine = solve(scene, [3.0], "taylor", 1e-14, attitude=True).attitude
+        found = solve(scene, [3.0], "taylor", 1e-5, attitude=True)
+        assert found.attitude is not None
+        assert fine is not None
+        ratios.append(angle_between(found.attitude, fine)[0] / (found.error or 0.0))
+    # What is known of it was taken off.
+    assert 1e-4 < min(ratios) <= max(ratios) < 2.5
+    assert np.median(ratios) < 0.3
+
+
+def test_who_does_not_ask_gets_none() -> None:
+    scene = replace(case_scene(5), attitude=TURNED)
+    bare = solve(case_scene(5), [1.0], "taylor")
+    found = solve(scene, [1.0], "taylor")
+    assert found.attitude is None
+    assert found.omega.tolist() == bare.omega.tolist()
+    assert "attitude" in plan(case_scene(5)).skipped
+    assert "attitude" not in plan(scene).skipped
+    with pytest.raises(InputError, match="attitude=True"):
+        found.rotation()
+
+
+def test_step_from_row_to_row_has_order_four() -> None:
+    scene = replace(case_scene(5), attitude=TURNED)
+    errors = []
+    for count in (20, 40, 80):
+        fine = solve(scene, [n / count for n in range(1, count + 1)], "taylor", attitude=True)
+        assert fine.attitude is not None
+        rows = attitude_from_rows(scene, fine.time, fine.omega)
+        errors.append(angle_between(rows, fine.attitude).max())
+    assert errors[0] < 1e-4
+    assert [errors[0] / errors[1], errors[1] / errors[2]] == pytest.approx([16.0, 16.0], rel=0.1)
+
+
+def test_rows_of_a_program_have_an_attitude() -> None:
+    scene = replace(case_scene(3), attitude=TURNED)
+    rows = run_program(scene, subset("two-term", "corrected"))
+    found = attitude_from_rows(scene, rows.time, rows.omega)
+    fine = solve(scene, rows.time.tolist(), attitude=True).attitude
+    assert fine is not None
+    # The program's own error, and no more.
+    error = np.abs(rows.omega - solve(scene, rows.time.tolist()).omega).max()
+    assert 1e-6 < angle_between(found, fine).max() < 2.0 * error * rows.time[-1]
+
+
+def test_body_of_coefficients_has_no_momentum() -> None:
+    found = solve(SCENES["coefficients"], [1.0], attitude=True)
+    assert found.attitude is not None
+    for told in (found.angular_momentum, found.energy):
+        with pytest.raises(InputError, match="moments"):
+            told()
+
+
+def test_methods_that_carry_none_say_so() -> None:
+    with pytest.raises(InputError, match="gauss-4 carries no attitude; allowed: auto"):
+        solve(case_scene(3), [1.0], "gauss-4", 1e-9, attitude=True)
+    with pytest.raises(InputError, match="frame 'earth'"):
+        solve(case_scene(3), [1.0], attitude=True).angular_momentum("earth")

@@ -1,0 +1,146 @@
+"""Attitudes as given and as shown; full inertia matrices."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from pyharness import InputError, Scene, TorqueLaw, prepare, principal, read_scene, solve
+from pyharness.model.attitude import angles, matrices, of_angles, product
+from pyharness.model.scene_file import scene_text
+from pyharness.model.trajectory import Array
+
+TILTED = ((40.0, 2.0, -1.0), (2.0, 30.0, 3.0), (-1.0, 3.0, 20.0))
+BODY = "[body]\nmoments = [3, 2, 1]\n[initial]\nomega = [1, 2, 3]\n"
+
+
+def _random(count: int) -> Array:
+    found = np.random.default_rng(5).normal(size=(count, 4))
+    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+
+
+@pytest.mark.parametrize(("sequence", "scipy"), [("3-1-3", "ZXZ"), ("3-2-1", "ZYX")])
+def test_angles_are_those_of_scipy(sequence: str, scipy: str) -> None:
+    attitude = _random(500)
+    turned = Rotation.from_quat(attitude[:, [1, 2, 3, 0]])
+    found = angles(attitude, sequence)
+    assert found == pytest.approx(turned.as_euler(scipy, degrees=True), abs=1e-10)
+    assert matrices(attitude) == pytest.approx(turned.as_matrix(), abs=1e-15)
+    for row, q in zip(found, attitude, strict=True):
+        back = np.array(of_angles("", row, sequence))
+        assert min(abs(back - q).max(), abs(back + q).max()) < 4e-15
+
+
+@pytest.mark.parametrize(("sequence", "pole"), [("3-1-3", 0.0), ("3-1-3", 180.0), ("3-2-1", 90.0)])
+@pytest.mark.parametrize("beside", [0.0, 1e-8])
+def test_poles_keep_their_digits(sequence: str, pole: float, beside: float) -> None:
+    tilt = abs(pole - beside)
+    q = np.array([of_angles("", (30.0, tilt, 40.0), sequence)])
+    found = angles(q, sequence)
+    assert found[0, 1] == pytest.approx(tilt, abs=1e-13)
+    back = np.array([of_angles("", found[0], sequence)])
+    assert min(abs(back - q).max(), abs(back + q).max()) < 1e-15
+
+
+def test_product_is_hamiltons() -> None:
+    p, q = _random(2)
+    both = Rotation.from_quat(p[[1, 2, 3, 0]]) * Rotation.from_quat(q[[1, 2, 3, 0]])
+    found = np.array(product(tuple(p), tuple(q)))
+    assert min(abs(found - both.as_quat()[[3, 0, 1, 2]]).max(),
+               abs(found + both.as_quat()[[3, 0, 1, 2]]).max()) < 1e-15  # fmt: skip
+
+
+def test_attitude_is_divided_by_its_length(tmp_path: Path) -> None:
+    file = tmp_path / "scene.toml"
+    file.write_text(BODY + "attitude = [2, 0, 0, 1]\n")
+    scene = read_scene(file)
+    assert scene.attitude == pytest.approx((2 / 5**0.5, 0.0, 0.0, 1 / 5**0.5))
+    assert scene.attitude_length == pytest.approx(5**0.5)
+    file.write_text(scene_text(scene))
+    assert read_scene(file) == scene
+    assert replace(scene, steps=3).attitude == scene.attitude
+    huge = Scene("", (0.0, 0.0, 1.0), moments=(3.0, 2.0, 1.0), attitude=(1e308, 0.0, 1e308, 0.0))
+    assert huge.attitude == pytest.approx((0.5**0.5, 0.0, 0.5**0.5, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("attitude = [0, 0, 0, 0]", "all four are 0"),
+        ("attitude = [nan, 0, 0, 1]", "not finite"),
+        ("attitude = [1, 0, 0, 0, 0]", "5 numbers"),
+        ("attitude = 3", "whole number"),
+        ("angles_deg = [1, 2, 3]\nsequence = '3-1-2'", "unknown sequence '3-1-2'"),
+        ("angles_deg = [1, 2]\nsequence = '3-1-3'", "2 numbers"),
+        ("angles_deg = [1, 2, 3]", "with a sequence"),
+        ("attitude = [1, 0, 0, 0]\nsequence = '3-1-3'", "with a sequence"),
+    ],
+)
+def test_what_is_no_attitude_is_refused(text: str, told: str, tmp_path: Path) -> None:
+    file = tmp_path / "scene.toml"
+    file.write_text(BODY + text)
+    with pytest.raises(InputError, match=told) as caught:
+        read_scene(file)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "told"),
+    [
+        (((1.0, 0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "not symmetric, row 2 column 1"),
+        (((1.0, 2.0, 0.0), (2.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "least principal moment is -1"),
+        (((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "2 rows"),
+        (((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, float("inf"), 1.0)), "not finite"),
+    ],
+)
+def test_what_is_no_inertia_is_refused(inertia: object, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        Scene("", (1.0, 2.0, 3.0), inertia=inertia)  # type: ignore[arg-type]
+
+
+def test_full_inertia_is_solved_about_the_bodys_own_axes() -> None:
+    law = TorqueLaw((1.0, 2.0, 1.5), sines=(((0.5, 0.0, 1.0), 3.0),))
+    attitude = (0.5, -0.1, 0.7, 0.5)
+    scene = Scene("", (0.3, 1.0, -1.0), inertia=TILTED, torque=law, attitude=attitude)
+    inertia, times = np.array(TILTED), [1.0, 3.0]
+
+    def rates(t: float, y: Array) -> Array:
+        w, a, v = y[:3], y[3], y[4:]
+        slope = np.linalg.solve(inertia, np.array(law.at(t)) - np.cross(w, inertia @ w))
+        return np.concatenate([slope, [-0.5 * v @ w], 0.5 * (a * w + np.cross(v, w))])
+
+    start = [*scene.omega, *(scene.attitude or ())]
+    truth = solve_ivp(rates, (0.0, 3.0), start, "DOP853", times, rtol=1e-13, atol=1e-13).y.T
+    found = solve(scene, times, attitude=True)
+    assert found.attitude is not None
+    assert found.omega == pytest.approx(truth[:, :3], abs=1e-11)
+    assert found.attitude == pytest.approx(truth[:, 3:], abs=1e-11)
+    assert found.angular_momentum() == pytest.approx(found.omega @ inertia, abs=1e-12)
+    energy = 0.5 * np.einsum("ni,ij,nj->n", found.omega, inertia, found.omega)
+    assert found.energy() == pytest.approx(energy, rel=1e-13)
+
+
+def test_diagonal_inertia_is_its_moments() -> None:
+    scene = Scene("", (1.0, 2.0, 3.0), inertia=((3.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 2.0)))
+    bare, axes = principal(scene)
+    assert (bare.moments, axes.tolist()) == ((3.0, 1.0, 2.0), np.eye(3).tolist())
+    plain = solve(Scene("", (1.0, 2.0, 3.0), moments=(3.0, 1.0, 2.0)), [2.0])
+    assert solve(scene, [2.0]).omega.tolist() == plain.omega.tolist()
+    assert principal(bare)[0] is bare
+
+
+def test_impossible_inertia_is_told() -> None:
+    thin = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 3.0))
+    assert Scene("", (0.0, 0.0, 1.0), inertia=thin).is_impossible
+    assert not Scene("", (0.0, 0.0, 1.0), inertia=TILTED).is_impossible
+
+
+def test_who_takes_principal_axes_says_so() -> None:
+    scene = Scene("", (1.0, 2.0, 3.0), inertia=TILTED)
+    with pytest.raises(InputError, match="full inertia"):
+        prepare(scene)
+    with pytest.raises(InputError, match="full inertia"):
+        scene.right_hand_side()

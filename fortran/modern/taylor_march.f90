@@ -226,7 +226,8 @@ contains
         error = s%lanes(1, :)
         call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, n_times))
         if (with_attitude) then
-          call add_attitude_row(attitude%q_low, 1.0_dp, tolerance, attitude, attitudes(:, n_times))
+          call add_attitude_row(attitude%q_low, 1.0_dp, tolerance, attitude, &
+                                attitudes(:, n_times))
         end if
         found%n_rows = n_times
         exit

@@ -590,12 +590,17 @@ contains
     w(1) = sense*orbit%size(1)*(g*(even - odd))*inverse
     w(3) = orbit%size(3)*(g*(even + odd))*inverse
     even = (1.0_dp - gg) - qq*(hh - qq*(gg*gg) - qq**3*(hh*hh - qq*qq*gg**3))
-    w(2) = sign(sense, x)*orbit%size(2)*(even*inverse)
+    w(2) = sense*orbit%size(2)*(even*inverse)
     c = orbit%c(0)*(1.0_dp + g) + (orbit%c(1)*(h + q*gg) + (orbit%c(2)*(hh + qq*g*gg) &
                                    + (orbit%c(3)*(h*hh + q*qq*(gg*gg)) + orbit%c(4)*(hh*hh))))
     s = orbit%s(0)*(1.0_dp - g) + (orbit%s(1)*(h - q*gg) + (orbit%s(2)*(hh - qq*g*gg) &
                                    + (orbit%s(3)*(h*hh - q*qq*(gg*gg)) + orbit%s(4)*(hh*hh))))
-    if (x > 0.0_dp) s = -s
+    ! So far those of |x|, and of S what has to be taken off.
+    if (x < 0.0_dp) then
+      w(2) = -w(2)
+    else
+      s = -s
+    end if
   end subroutine functions
 
   pure function into_orbit(orbit, attitude) result(found)

@@ -73,7 +73,7 @@ def errors(motion: Motion) -> tuple[float, float]:
     largest = max(*map(abs, omega), *(abs(float(x)) for x in exact_omega))
     return (
         largest_error(attitudes[:, 0], exact_attitude),
-        largest_error(rows[:, 0], exact_omega) / largest,
+        largest_error(rows[:, 0], exact_omega) / (largest or 1.0),
     )
 
 

@@ -78,8 +78,8 @@ def exact(
         if steady:
             speed = mpmath.sqrt(sum(x * x for x in w))
             half = speed * t / 2
-            axis = [x / speed for x in w] if speed else w
-            turn = [mpmath.cos(half), *(x * mpmath.sin(half) for x in axis)]
+            along = [x / speed for x in w] if speed else w
+            turn = [mpmath.cos(half), *(x * mpmath.sin(half) for x in along)]
             return w, times(q0, turn)
         first, second, third, half_period = _orbit(moments, omega)
         sign = mpmath.sign(w[third])
@@ -127,8 +127,8 @@ def exact(
             end = run(state, rest)
             psi = _real(state[3]) + whole * _real(end[3])
             for axis in range(3):
-                back = _real(end[axis]) * (1 if axis == third else -1)
-                assert abs(back - w[axis]) < mpmath.mpf(10) ** -40 * max(map(abs, w))
+                closing = _real(end[axis]) * (1 if axis == third else -1)
+                assert abs(closing - w[axis]) < mpmath.mpf(10) ** -40 * max(map(abs, w))
         found = [_real(x) for x in state[:3]]
         if whole % 2:
             found = [x if axis == third else -x for axis, x in enumerate(found)]
@@ -165,7 +165,9 @@ def _orbit(
     first, third = (high, low) if gap >= 0 else (low, high)
     if not gap:
         return first, second, third, None
-    d12, d13, d23 = (abs(i[a] - i[b]) for a, b in ((first, second), (first, third), (second, third)))
+    d12, d13, d23 = (
+        abs(i[a] - i[b]) for a, b in ((first, second), (first, third), (second, third))
+    )
     e3 = d13 * i[third] * w[third] ** 2 + d12 * i[second] * w[second] ** 2
     frequency = mpmath.sqrt(_exact(d23 * e3 / (i[0] * i[1] * i[2])))
     comodulus = mpmath.sqrt(_exact(d13 * abs(gap) / (d23 * e3)))

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, columns
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
 
 
@@ -34,6 +35,18 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
             "smaller torques"
         )
     return found
+
+
+def remainders(scene: Scene) -> Triple:
+    """Return what rounding takes off A, B, C; without it a phase of 1e6 radians has lost 1e-10.
+
+    Coefficients that are given as such are exact.
+    """
+    if scene.moments is None or not np.isfinite(scene.euler_coefficients).all():
+        return 0.0, 0.0, 0.0
+    i1, i2, i3 = map(Fraction, scene.moments)
+    a, b, c = map(Fraction, scene.euler_coefficients)
+    return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 
 
 def known(estimate: float) -> float | None:

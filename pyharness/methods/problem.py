@@ -1,5 +1,6 @@
 """A scene as the modern kernels take it, and a trajectory of what they give."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -38,14 +39,15 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def remainders(scene: Scene) -> Triple:
-    """Return what rounding takes off A, B, C; without it a phase of 1e6 radians has lost 1e-10.
+    """Return what rounding takes off A, B, C: without it a phase of 1e6 radians has lost 1e-10.
 
-    Coefficients that are given as such are exact.
+    Zeros where coefficients are given as such, and under torque, where no kernel asks.
     """
-    if scene.moments is None or not np.isfinite(scene.euler_coefficients).all():
+    found = scene.euler_coefficients
+    if scene.moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
         return 0.0, 0.0, 0.0
     i1, i2, i3 = map(Fraction, scene.moments)
-    a, b, c = map(Fraction, scene.euler_coefficients)
+    a, b, c = map(Fraction, found)
     return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 
 

@@ -44,7 +44,7 @@ def draw(source: random.Random, kind: str, longest: float = 6.0) -> Motion:
         ratio = moments[high] * (moments[high] - moments[middle])
         ratio /= moments[low] * (moments[middle] - moments[low])
         omega[low] = math.copysign(omega[high] * math.sqrt(ratio), omega[low])
-        omega[low] *= 1.0 + source.choice((-1, 1)) * 10 ** source.uniform(-12, -1)
+        omega[low] *= 1.0 + source.choice((-1, 1)) * 10 ** source.uniform(-15, -1)
     elif kind in ("middle axis", "any axis", "steady"):
         along = middle if kind == "middle axis" else source.randrange(3)
         for axis in {0, 1, 2} - {along}:

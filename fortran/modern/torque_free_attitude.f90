@@ -10,8 +10,8 @@ module torque_free_attitude
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
   use theta_functions, only: elliptic_functions, start_of_phase, theta_series, theta_t
   use two_words, only: scaled, sine_cosine, two_sum
-  use word_pairs, only: difference_of, operator(*), operator(+), operator(-), operator(/), &
-                        pair_t, product_of, root
+  use word_pairs, only: difference_of, longer_product, operator(*), operator(+), operator(-), &
+                        operator(/), pair_t, product_of, root
   implicit none(type, external)
   private
 
@@ -19,8 +19,8 @@ module torque_free_attitude
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
   real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
-  real(dp), parameter :: FLAT = 4e-9_dp       ! a difference whose square no longer counts
-  real(dp), parameter :: LAST = 1e-17_dp      ! a term of which the next is at most a square
+  real(dp), parameter :: CANCELLED = 1e-4_dp  ! what is left where two words are too few
+  real(dp), parameter :: LAST = 1e-17_dp      ! a term after which the means differ, and the next is, by less
   real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
 
@@ -118,6 +118,9 @@ contains
     energies = [product_of(w(1), w(1))*moment(1), product_of(w(2), w(2))*moment(2), &
                 product_of(w(3), w(3))*moment(3)]
     e2 = energies(3)*d23 - energies(1)*d12
+    if (abs(e2%high) <= CANCELLED*energies(3)%high*d23%high) then
+      e2 = narrow_gap(moment, w, energies, d12, d23)
+    end if
     if (e2%high < 0.0_dp) then
       ! The other of the extreme axes keeps its direction.
       orbit%axes = orbit%axes([3, 2, 1])
@@ -142,6 +145,21 @@ contains
       call prepare_orbit(moment, w, energies, d12, d13, d23, e1, e2, e3, orbit)
     end if
   end subroutine prepare
+
+  pure type(pair_t) function narrow_gap(moment, w, energies, d12, d23) result(gap)
+    !! I3 omega3**2 d23 - I1 omega1**2 d12 beside the separatrix, where nearly all of it cancels:
+    !! from products of three words.
+    real(dp), intent(in) :: moment(3), w(3)
+    type(pair_t), intent(in) :: energies(3), d12, d23
+    real(dp) :: x(3), y(3)
+
+    x = longer_product(longer_product(longer_product([w(3), 0.0_dp, 0.0_dp], w(3)), moment(3)), &
+                       d23%high)
+    y = longer_product(longer_product(longer_product([w(1), 0.0_dp, 0.0_dp], w(1)), moment(1)), &
+                       d12%high)
+    gap = difference_of(x(1), y(1)) + difference_of(x(2), y(2)) + difference_of(x(3), y(3)) &
+          + (energies(3)*d23%low - energies(1)*d12%low)
+  end function narrow_gap
 
   pure subroutine take_axes(moment, w, orbit)
     !! Order the axes by their moments.
@@ -261,8 +279,7 @@ contains
       a = part/p
       share = share*((p - a)/(p + a))*0.5_dp
       total = total + share
-      half = abs(mean%high - g%high)
-      if (half <= FLAT*mean%high .and. abs(share%high) <= LAST) exit
+      if (abs(share%high) <= LAST) exit
       p = (p + a)*0.5_dp
       a = mean
       g = root(part)

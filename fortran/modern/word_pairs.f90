@@ -6,6 +6,8 @@ module word_pairs
   implicit none(type, external)
   private
 
+  real(dp), parameter :: SPLITTER = 134217729.0_dp ! 2**27 + 1
+
   type, public :: pair_t
     real(dp) :: high, low
   end type pair_t
@@ -26,12 +28,13 @@ module word_pairs
     module procedure quotient_of_pairs
   end interface operator(/)
 
-  public :: difference_of, operator(*), operator(+), operator(-), operator(/), product_of, root
+  public :: difference_of, longer_product, product_of, root
+  public :: operator(*), operator(+), operator(-), operator(/)
 
 contains
 
   pure type(pair_t) function product_of(x, y) result(found)
-    !! x y, exactly.
+    !! x y, up to 2**-106 of it.
     real(dp), intent(in) :: x, y
 
     call two_product(x, y, found%high, found%low)
@@ -43,6 +46,34 @@ contains
 
     call two_sum(x, -y, found%high, found%low)
   end function difference_of
+
+  pure function longer_product(x, y) result(found)
+    !! (x(1) + x(2) + x(3)) y in three words, each of them what the one before leaves out.
+    real(dp), intent(in) :: x(3), y
+    real(dp) :: found(3)
+    real(dp) :: first, middle, rest, left
+
+    call exact_product(x(1), y, found(1), first)
+    call exact_product(x(2), y, middle, rest)
+    call two_sum(first, middle, found(2), left)
+    found(3) = left + (rest + x(3)*y)
+  end function longer_product
+
+  pure subroutine exact_product(x, y, product, rest)
+    !! x y = product + rest, where 2**-106 of it counts too (Dekker, rounded halves).
+    real(dp), intent(in) :: x, y
+    real(dp), intent(out) :: product, rest
+    real(dp) :: xh, xl, yh, yl, part
+
+    part = SPLITTER*x
+    xh = part - (part - x)
+    xl = x - xh
+    part = SPLITTER*y
+    yh = part - (part - y)
+    yl = y - yh
+    product = x*y
+    rest = (((xh*yh - product) + xh*yl) + xl*yh) + xl*yl
+  end subroutine exact_product
 
   pure type(pair_t) function sum_of_pairs(x, y) result(found)
     type(pair_t), intent(in) :: x, y

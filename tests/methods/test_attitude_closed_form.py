@@ -19,7 +19,7 @@ from pyharness.model.trajectory import Array
 from tests.attitude_errors import KINDS, Motion, draw, errors, largest_error
 from tests.exact_attitude import exact, joint
 
-_BOUND = 5e-15
+_BOUND = 2e-15
 _OMEGA_BOUND = 2e-14
 _BODY = (0.7, 1.9, 2.3)
 _START = (1.1, -0.6, 0.9)

@@ -142,12 +142,15 @@ subroutine choose_instructions(highest, taken)
   taken = choose_level(highest)
 end subroutine choose_instructions
 
-subroutine torque_free_solution(coefficients, omega0, n_times, times, rows, n_rows, status)
+subroutine torque_free_solution(coefficients, coefficients_low, omega0, n_times, times, rows, &
+                                n_rows, status)
   ! Closed form of a body without torque.
   !f2py threadsafe
   use torque_free, only: torque_free_rows
   implicit none
   real(8), intent(in) :: coefficients(3)  ! A, B, C
+  !f2py real(8), optional, intent(in) :: coefficients_low(3) = 0.0
+  real(8), intent(in) :: coefficients_low(3) ! what rounding took off them
   real(8), intent(in) :: omega0(3)        ! rad/s at time 0
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)   ! s
@@ -155,8 +158,29 @@ subroutine torque_free_solution(coefficients, omega0, n_times, times, rows, n_ro
   integer(4), intent(out) :: n_rows       ! rows that hold a result
   integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 gave up
 
-  call torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
+  call torque_free_rows(coefficients, coefficients_low, omega0, n_times, times, rows, n_rows, &
+                        status)
 end subroutine torque_free_solution
+
+subroutine torque_free_attitude_solution(moments, omega0, attitude0, n_times, times, rows, &
+                                         attitudes, n_rows, status)
+  ! Closed form of a body without torque, and of its attitude: a quaternion, body to space.
+  !f2py threadsafe
+  use torque_free_attitude, only: torque_free_attitude_rows
+  implicit none
+  real(8), intent(in) :: moments(3)       ! kg m2
+  real(8), intent(in) :: omega0(3)        ! rad/s at time 0
+  real(8), intent(in) :: attitude0(4)     ! at time 0, scalar first, of any length
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times)   ! s, in any order
+  real(8), intent(out) :: rows(3, n_times)
+  real(8), intent(out) :: attitudes(4, n_times)
+  integer(4), intent(out) :: n_rows       ! rows that hold a result
+  integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 gave up
+
+  call torque_free_attitude_rows(moments, omega0, attitude0, n_times, times, rows, attitudes, &
+                                 n_rows, status)
+end subroutine torque_free_attitude_solution
 
 subroutine torque_free_growth(coefficients, omega0, t_end, growth)
   ! How much the closed form of a body without torque makes of a small difference.

@@ -9,8 +9,8 @@ module prepared
   use levels, only: quick_solve, taylor_solve
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, IMPROVED_EULER, QUICK, &
                      QUICK_OR_TAYLOR, RK4, SPHERE, TAYLOR
-  use places, only: COEFFICIENTS, CONSTANT, EFFORT, METHOD, N_COSINES, N_SINES, RATE, STEP, &
-                    TOLERANCE, WAVES
+  use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, N_COSINES, &
+                    N_SINES, RATE, STEP, TOLERANCE, WAVES
   use problem, only: problem_t
   use sphere, only: sphere_rows
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
@@ -141,8 +141,9 @@ contains
     found = -1.0_dp
     select case (code)
     case (CLOSED_FORM, CLOSED_FORM_OR_TAYLOR)
-      call torque_free_rows(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, 1, times, omega, &
-                            n_rows, ended)
+      call torque_free_rows(packed(COEFFICIENTS:COEFFICIENTS + 2), &
+                            packed(COEFFICIENTS_LOW:COEFFICIENTS_LOW + 2), omega0, 1, times, &
+                            omega, n_rows, ended)
       if (ended == REFUSED .and. code == CLOSED_FORM_OR_TAYLOR) then
         call unpack(packed, n_packed, problem)
         call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &

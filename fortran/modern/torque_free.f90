@@ -43,9 +43,11 @@ module torque_free
 
 contains
 
-  subroutine torque_free_rows(coefficients, omega0, n_times, times, rows, n_rows, status)
+  subroutine torque_free_rows(coefficients, coefficients_low, omega0, n_times, times, rows, &
+                              n_rows, status)
     !! Angular velocity of a torque-free body at each of `times`.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C; not all of one sign, finite
+    real(dp), intent(in) :: coefficients_low(3) !! what rounding took off them
     real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)   !! s, in any order, finite
@@ -56,7 +58,7 @@ contains
     integer :: i
 
     n_rows = 0
-    call prepare(coefficients, omega0, orbit, status)
+    call prepare(coefficients, coefficients_low, omega0, orbit, status)
     if (status /= COMPLETE) return
     do i = 1, n_times
       call evaluate(orbit, times(i), rows(:, i), status)
@@ -71,14 +73,14 @@ contains
     end do
   end subroutine torque_free_rows
 
-  pure subroutine prepare(coefficients, omega0, orbit, status)
+  pure subroutine prepare(coefficients, coefficients_low, omega0, orbit, status)
     !! Everything about a motion that does not depend on the time.
-    real(dp), intent(in) :: coefficients(3), omega0(3)
+    real(dp), intent(in) :: coefficients(3), coefficients_low(3), omega0(3)
     type(orbit_t), intent(out) :: orbit
     integer, intent(out) :: status           !! COMPLETE or REFUSED
     real(dp) :: a(3)         ! coefficients along the axes of the orbit
     real(dp) :: w(3)         ! angular velocity along them
-    real(dp) :: s(3)         ! |a|
+    real(dp) :: s(3), s_low(3) ! |a|
     real(dp) :: y(3), y_low(3) ! squares of w
     real(dp) :: left, left_low, right, right_low ! parts of sums
     real(dp) :: gap, gap_low ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
@@ -88,12 +90,14 @@ contains
     integer :: i, j
 
     a = coefficients
+    s_low = sign(1.0_dp, a)*coefficients_low
     w = omega0
     orbit%time_exponent = 0
     orbit%omega_exponent = 0
     largest = max(abs(a(1)), abs(a(2)), abs(a(3)))
     if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
       call bring_near_one(a, orbit%time_exponent)
+      s_low = scale(s_low, -orbit%time_exponent)
     end if
     largest = max(abs(w(1)), abs(w(2)), abs(w(3)))
     if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
@@ -116,6 +120,7 @@ contains
     a = a(orbit%axes)
     w = w(orbit%axes)
     s = abs(a)
+    s_low = s_low(orbit%axes)
     ! Growth without bound: the product of two equal signs, and nothing against it.
     if (.not. s(2) > 0.0_dp .and. s(1)*s(3) > 0.0_dp) then
       status = REFUSED
@@ -129,24 +134,27 @@ contains
     call scaled(y(1), y_low(1), s(3), right, right_low)
     call two_sum(left, -right, gap, gap_low)
     left = gap
-    left_low = gap_low + (left_low - right_low)
+    left_low = gap_low + ((left_low + y(3)*s_low(1)) - (right_low + y(1)*s_low(3)))
     call two_sum(left, left_low, gap, gap_low)
     if (gap < 0.0_dp) then
       orbit%axes = [orbit%axes(3), orbit%axes(2), orbit%axes(1)]
       a = [a(3), a(2), a(1)]
       w = [w(3), w(2), w(1)]
       s = [s(3), s(2), s(1)]
+      s_low = [s_low(3), s_low(2), s_low(1)]
       y = [y(3), y(2), y(1)]
       y_low = [y_low(3), y_low(2), y_low(1)]
       gap = -gap
       gap_low = -gap_low
     end if
     call scaled(gap, gap_low, s(2), comodulus, comodulus_low)
+    comodulus_low = comodulus_low + gap*s_low(2)
     call scaled(y(2), y_low(2), s(3), left, left_low)
     call scaled(y(3), y_low(3), s(2), right, right_low)
     call two_sum(left, right, gap, gap_low)
-    gap_low = gap_low + (left_low + right_low)
+    gap_low = gap_low + ((left_low + y(2)*s_low(3)) + (right_low + y(3)*s_low(2)))
     call scaled(gap, gap_low, s(1), modulus, modulus_low)
+    modulus_low = modulus_low + gap*s_low(1)
 
     orbit%omega = w
     orbit%rates = [a(1)*w(2)*w(3), a(2)*w(3)*w(1), a(3)*w(1)*w(2)]

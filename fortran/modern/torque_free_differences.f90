@@ -10,6 +10,7 @@ module torque_free_differences
   ! is small to the end as long as any digit is left.
   real(dp), parameter :: SMALL = 2.0_dp**(-48)
   integer, parameter :: INSTANTS = 64
+  real(dp), parameter :: EXACTLY(3) = 0.0_dp ! rounding of the coefficients makes no difference
   real(dp), parameter :: GOLDEN = 0.6180339887498949_dp ! so that no period hides between instants
 
   public :: torque_free_growth_of
@@ -43,7 +44,7 @@ contains
     do i = 1, INSTANTS
       instants_at(i) = time*((real(i - 1, dp) + modulo((i - 1)*GOLDEN, 1.0_dp))/INSTANTS)
     end do
-    call torque_free_rows(coefficients, start, INSTANTS, instants_at, rows, n, status)
+    call torque_free_rows(coefficients, EXACTLY, start, INSTANTS, instants_at, rows, n, status)
     growth = -1.0_dp
     if (n < INSTANTS) return
     growth = 1.0_dp
@@ -55,8 +56,8 @@ contains
           beside(axis) = beside(axis) + SMALL*maxval(abs(rows(:, i)))
           step = beside(axis) - rows(axis, i)
         end if
-        call torque_free_rows(coefficients, beside, 1, [time - instants_at(i)], ends(:, axis), &
-                              n_rows, status)
+        call torque_free_rows(coefficients, EXACTLY, beside, 1, [time - instants_at(i)], &
+                              ends(:, axis), n_rows, status)
         if (status /= COMPLETE) exit
         if (axis > 0) total = total + abs(ends(:, axis) - ends(:, 0))/step
       end do

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.methods.problem import normalized, trajectory_of
+from pyharness.methods.problem import normalized, remainders, trajectory_of
 from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive
 from pyharness.model.effort import advice, waves
 from pyharness.model.errors import InputError, TimedError
@@ -34,7 +34,7 @@ def known_solution(
         )
     else:
         rows, n_rows, status = extension().torque_free_solution(
-            scene.euler_coefficients, scene.omega, times
+            scene.euler_coefficients, scene.omega, times, coefficients_low=remainders(scene)
         )
     if status == REFUSED:
         raise InputError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
-from pyharness.methods.problem import known, normalized
+from pyharness.methods.problem import known, normalized, remainders
 from pyharness.methods.registry import GAUSS
 from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, motion_growth
 from pyharness.model.codes import Methods, Places
@@ -281,4 +281,5 @@ def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     packed[Places.CONSTANT : Places.RATE] = constant
     packed[Places.RATE : Places.EFFORT] = rate
     packed[Places.EFFORT] = effort
+    packed[Places.COEFFICIENTS_LOW : Places.WAVES] = remainders(scene)
     return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])

@@ -1,13 +1,15 @@
 """A scene as the modern kernels take it, and a trajectory of what they give."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, columns
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
 
 
@@ -34,6 +36,19 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
             "smaller torques"
         )
     return found
+
+
+def remainders(scene: Scene) -> Triple:
+    """Return what rounding takes off A, B, C: without it a phase of 1e6 radians has lost 1e-10.
+
+    Zeros where coefficients are given as such, and under torque, where no kernel asks.
+    """
+    found = scene.euler_coefficients
+    if scene.moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
+        return 0.0, 0.0, 0.0
+    i1, i2, i3 = map(Fraction, scene.moments)
+    a, b, c = map(Fraction, found)
+    return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 
 
 def known(estimate: float) -> float | None:

@@ -40,4 +40,5 @@ class Places:
     CONSTANT = 8  # three, 1/s2
     RATE = 11  # three, 1/s3
     EFFORT = 14  # factor on the limits
-    WAVES = 15  # four for each sine, then for each cosine
+    COEFFICIENTS_LOW = 15  # three: what rounding took off, for the closed form
+    WAVES = 18  # four for each sine, then for each cosine

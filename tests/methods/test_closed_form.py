@@ -12,13 +12,15 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene
+from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare
 from pyharness.methods.solve import solve
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
+from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
+from tests.attitude_errors import draw
 from tests.exact_tops import DIGITS, exact_top
 
 _UNIT = 2.0**-53
@@ -70,6 +72,44 @@ def test_any_top_at_any_time(kind: str) -> None:
         assert _error(_at(coefficients, omega, time), exact, omega) <= _BOUND, (
             coefficients, omega, time,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["generic", "near symmetry", "near separatrix", "needle"])
+def test_moments_count_to_all_their_digits(kind: str) -> None:
+    """A, B, C rounded to one word cost 1e-11 by 1e6 s; a prepared solver has both words too."""
+    source = random.Random(kind)
+    for _ in range(10):
+        moments, omega, _, _ = draw(source, kind)
+        time = source.choice((-1.0, 1.0)) * source.uniform(1e5, 1e6)
+        scene = Scene("", omega, moments=moments)
+        exact = [mpmath.mpf(str(x)) for x in torque_free(scene, time)]
+        rows = solve(scene, [time], "closed-form", 1e-9).omega
+        # Of a needle omega1 may be large at other times.
+        bound = _BOUND * (10 if kind == "needle" else 1)
+        assert _error(rows[0], exact, scene.omega) <= bound, scene
+        np.testing.assert_array_equal(prepare(scene, "closed-form")(omega, time), rows[0])
+
+
+def test_moments_of_any_size_have_their_second_words() -> None:
+    moments, omega = (0.7, 1.9, 2.3), (1.1, -0.6, 0.9)
+    near = solve(Scene("", omega, moments=moments), [1e6], "closed-form", 1e-9).omega
+    for power in (-300, 200):
+        w = [x * 2.0**power for x in omega]
+        far = Scene("", w, moments=[x * 2.0**900 for x in moments])
+        found = solve(far, [1e6 / 2.0**power], "closed-form", 1e-9).omega
+        np.testing.assert_array_equal(found / 2.0**power, near)
+
+
+@pytest.mark.parametrize("size", [1e-120, 1e-35])
+def test_small_coefficients_have_their_second_words(size: float) -> None:
+    a, low = (0.25, -2.0 / 3.0, 0.5), (1e-17, 3e-17, -2e-17)
+    near = extension().torque_free_solution(a, (1.0, 0.3, -0.9), [1e6], coefficients_low=low)[0]
+    factor = 2.0 ** round(math.log2(size))
+    far = extension().torque_free_solution(
+        [x * factor for x in a], (1.0, 0.3, -0.9), [1e6 / factor],
+        coefficients_low=[x * factor for x in low],
+    )[0]  # fmt: skip
+    np.testing.assert_array_equal(far, near)
 
 
 @pytest.mark.parametrize("power", [-990, -600, 500, 900])

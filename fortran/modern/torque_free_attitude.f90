@@ -1,0 +1,440 @@
+module torque_free_attitude
+  !! Closed form of equations 13-15 without torque, from the moments, and of the attitude beside
+  !! it: omega by Jacobi's elliptic functions, the turn about the angular momentum by a theta
+  !! function of the same phase. Neither cost nor error depends on the time.
+  !! A unit quaternion q, scalar first, turns body into space: v_space = q v_body q*, and
+  !! q' = q (0, omega)/2. It is q0 D(0)* D(t), where D = (turn about axis 3) (turn of the angular
+  !! momentum to axis 3, the short way).
+  use interruption, only: interrupt_raised
+  use kinds, only: dp
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
+  use theta_functions, only: elliptic_functions, start_of_phase, theta_series, theta_t
+  use two_words, only: scaled, sine_cosine, two_sum
+  use word_pairs, only: difference_of, longer_product, operator(*), operator(+), operator(-), &
+                        operator(/), pair_t, product_of, root
+  implicit none(type, external)
+  private
+
+  integer, parameter :: BETWEEN_LOOKS = 2**17 ! at the user; times
+  integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
+
+  real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
+  real(dp), parameter :: CANCELLED = 1e-4_dp  ! what is left where two words are too few
+  real(dp), parameter :: LAST = 1e-17_dp      ! a term after which the means differ, and the next is, by less
+  real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
+  real(dp), parameter :: LARGE_PHASE = 1e15_dp
+
+  type :: orbit_t
+    !! One torque-free motion, in axes of its own: 2 has the middle moment, 3 is the one about
+    !! which the motion does not change its direction, and 1, 2, 3 are right-handed.
+    logical :: is_steady
+    integer :: axes(3)          !! of the body, for each of the orbit
+    real(dp) :: signs(3)        !! a component of the orbit is this times that of the body
+    integer :: omega_exponent   !! angular velocity is 2**this times the orbit's
+    real(dp) :: omega(3)        !! at time 0, body axes, as given
+    real(dp) :: attitude(4)     !! at time 0, body axes
+    real(dp) :: before(4)       !! q = before D, vector in axes of the orbit
+    type(pair_t) :: half_rate   !! of the turn about axis 3 beside what the theta function adds
+    type(pair_t) :: frequency   !! of the phase
+    type(pair_t) :: start       !! the phase at time 0
+    type(theta_t) :: theta      !! its sizes are those of omega
+    real(dp) :: direction(3)    !! omega times it is L/|L|; of a steady omega, omega/|omega|
+    real(dp) :: sense           !! of the phase: the sign of I3 - I1
+  end type orbit_t
+
+  public :: torque_free_attitude_rows
+
+contains
+
+  subroutine torque_free_attitude_rows(moments, omega0, attitude0, n_times, times, rows, &
+                                       attitudes, n_rows, status)
+    !! Angular velocity and attitude of a torque-free body at each of `times`.
+    real(dp), intent(in) :: moments(3)       !! kg m2, or in any unit
+    real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
+    real(dp), intent(in) :: attitude0(4)     !! at time 0, of any length
+    integer, intent(in) :: n_times
+    real(dp), intent(in) :: times(n_times)   !! s, in any order, finite
+    real(dp), intent(out) :: rows(3, n_times) !! rad/s
+    real(dp), intent(out) :: attitudes(4, n_times) !! unit quaternions
+    integer, intent(out) :: n_rows           !! rows that hold a result
+    integer, intent(out) :: status           !! any but STOPPED
+    type(orbit_t) :: orbit
+    integer :: i
+
+    n_rows = 0
+    call prepare(moments, omega0, attitude0, orbit, status)
+    if (status /= COMPLETE) return
+    do i = 1, n_times
+      call evaluate(orbit, times(i), rows(:, i), attitudes(:, i), status)
+      if (status /= COMPLETE) return
+      n_rows = i
+      if (mod(i, BETWEEN_LOOKS) == 0) then
+        if (interrupt_raised() /= 0) then
+          status = INTERRUPTED
+          return
+        end if
+      end if
+    end do
+  end subroutine torque_free_attitude_rows
+
+  ! ---- What does not depend on the time ----------------------------------------------------------
+
+  pure subroutine prepare(moments, omega0, attitude0, orbit, status)
+    !! Everything about a motion that does not depend on the time.
+    real(dp), intent(in) :: moments(3), omega0(3), attitude0(4)
+    type(orbit_t), intent(out) :: orbit
+    integer, intent(out) :: status           !! COMPLETE or REFUSED
+    real(dp) :: moment(3)   ! along the axes of the orbit, brought near 1
+    real(dp) :: w(3)        ! angular velocity along them
+    real(dp) :: largest
+    type(pair_t) :: d12, d13, d23  ! differences of the moments, without sign
+    type(pair_t) :: energies(3)    ! I omega**2
+    type(pair_t) :: e1, e2, e3     ! d13 omega1**2 I1 + d23 omega2**2 I2 and so on
+    integer :: power
+
+    status = REFUSED
+    moment = moments
+    w = omega0
+    orbit%omega = omega0
+    orbit%omega_exponent = 0
+    if (.not. (all(moment > 0.0_dp) .and. all(moment <= huge(largest)))) return
+    if (.not. all(abs(w) <= huge(largest))) return
+    largest = max(abs(attitude0(1)), abs(attitude0(2)), abs(attitude0(3)), abs(attitude0(4)))
+    if (.not. (largest > 0.0_dp .and. largest <= huge(largest))) return
+    orbit%attitude = attitude0
+    if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
+      orbit%attitude = scale(attitude0, -exponent(largest))
+    end if
+    orbit%attitude = orbit%attitude/sqrt(sum(orbit%attitude*orbit%attitude))
+    call bring_near_one(moment, power)
+    if (.not. all(moment >= 1.0_dp/LARGE)) return
+    call bring_near_one(w, orbit%omega_exponent)
+
+    call take_axes(moment, w, orbit)
+    status = COMPLETE
+    d12 = unsigned(difference_of(moment(1), moment(2)))
+    d13 = unsigned(difference_of(moment(1), moment(3)))
+    d23 = unsigned(difference_of(moment(2), moment(3)))
+    energies = [product_of(w(1), w(1))*moment(1), product_of(w(2), w(2))*moment(2), &
+                product_of(w(3), w(3))*moment(3)]
+    e2 = energies(3)*d23 - energies(1)*d12
+    if (abs(e2%high) <= CANCELLED*energies(3)%high*d23%high) then
+      e2 = narrow_gap(moment, w, energies, d12, d23)
+    end if
+    if (e2%high < 0.0_dp) then
+      ! The other of the extreme axes keeps its direction.
+      orbit%axes = orbit%axes([3, 2, 1])
+      moment = moment([3, 2, 1])
+      w = w([3, 2, 1])
+      energies = energies([3, 2, 1])
+      e1 = d12
+      d12 = d23
+      d23 = e1
+      e2 = pair_t(-e2%high, -e2%low)
+    end if
+    e1 = energies(1)*d13 + energies(2)*d23
+    e3 = energies(3)*d13 + energies(2)*d12
+    call take_signs(w, orbit)
+
+    if (.not. d23%high*e3%high > 0.0_dp .or. .not. max(abs(w(1)), abs(w(3))) > 0.0_dp) then
+      call prepare_steady(w, orbit)
+    else if (energies(3)%high*d13%high <= FAINT*e3%high) then
+      ! About the middle axis, all but exactly.
+      status = REFUSED
+    else
+      call prepare_orbit(moment, w, energies, d12, d13, d23, e1, e2, e3, orbit)
+    end if
+  end subroutine prepare
+
+  pure type(pair_t) function narrow_gap(moment, w, energies, d12, d23) result(gap)
+    !! I3 omega3**2 d23 - I1 omega1**2 d12 beside the separatrix, where nearly all of it cancels:
+    !! from products of three words.
+    real(dp), intent(in) :: moment(3), w(3)
+    type(pair_t), intent(in) :: energies(3), d12, d23
+    real(dp) :: x(3), y(3)
+
+    x = longer_product(longer_product(longer_product([w(3), 0.0_dp, 0.0_dp], w(3)), moment(3)), &
+                       d23%high)
+    y = longer_product(longer_product(longer_product([w(1), 0.0_dp, 0.0_dp], w(1)), moment(1)), &
+                       d12%high)
+    gap = difference_of(x(1), y(1)) + difference_of(x(2), y(2)) + difference_of(x(3), y(3)) &
+          + (energies(3)*d23%low - energies(1)*d12%low)
+  end function narrow_gap
+
+  pure subroutine take_axes(moment, w, orbit)
+    !! Order the axes by their moments.
+    real(dp), intent(inout) :: moment(3), w(3)
+    type(orbit_t), intent(inout) :: orbit
+    integer :: low, high
+
+    low = 1
+    if (moment(2) < moment(low)) low = 2
+    if (moment(3) < moment(low)) low = 3
+    high = mod(low, 3) + 1
+    if (moment(6 - low - high) >= moment(high)) high = 6 - low - high
+    orbit%axes = [high, 6 - low - high, low]
+    moment = moment(orbit%axes)
+    w = w(orbit%axes)
+  end subroutine take_axes
+
+  pure subroutine take_signs(w, orbit)
+    !! Point axes 3 and 1 where omega does, and axis 2 so that they are right-handed.
+    real(dp), intent(inout) :: w(3)
+    type(orbit_t), intent(inout) :: orbit
+
+    orbit%signs = sign(1.0_dp, w)
+    orbit%signs(2) = orbit%signs(1)*orbit%signs(3)
+    if (mod(orbit%axes(1), 3) + 1 /= orbit%axes(2)) orbit%signs(2) = -orbit%signs(2)
+    w = w*orbit%signs
+  end subroutine take_signs
+
+  pure subroutine prepare_steady(w, orbit)
+    !! A turn about an axis that does not change.
+    real(dp), intent(in) :: w(3)
+    type(orbit_t), intent(inout) :: orbit
+    type(pair_t) :: speed
+
+    orbit%is_steady = .true.
+    orbit%direction = 0.0_dp
+    orbit%half_rate = pair_t(0.0_dp, 0.0_dp)
+    orbit%before = into_orbit(orbit, orbit%attitude)
+    speed = product_of(w(1), w(1)) + product_of(w(2), w(2)) + product_of(w(3), w(3))
+    if (.not. speed%high > 0.0_dp) return
+    speed = root(speed)
+    orbit%half_rate = speed*0.5_dp
+    orbit%direction = w/speed%high
+  end subroutine prepare_steady
+
+  pure subroutine prepare_orbit(moment, w, energies, d12, d13, d23, e1, e2, e3, orbit)
+    !! Rates, phase and theta series of a motion that is not steady.
+    real(dp), intent(in) :: moment(3), w(3)
+    type(pair_t), intent(in) :: energies(3), d12, d13, d23, e1, e2, e3
+    type(orbit_t), intent(inout) :: orbit
+    real(dp) :: largest(3)  ! of omega on the way
+    real(dp) :: pole(2)     ! (I2 - I1) I3/((I3 - I2) I1) and I1 E1/(I3 E3), whose product is k**2
+    real(dp) :: k, comodulus, slope
+    type(pair_t) :: momentum         ! |L|
+    type(pair_t) :: scales(2)        ! lambda, lambda k' times `inertia`; u' = lambda
+    type(pair_t) :: inertia          ! root of the product of the moments
+
+    orbit%is_steady = .false.
+    momentum = root(energies(1)*moment(1) + energies(2)*moment(2) + energies(3)*moment(3))
+    inertia = root(product_of(moment(1), moment(2))*moment(3))
+    pole = [d12%high*moment(3)/(d23%high*moment(1)), e1%high*moment(1)/(e3%high*moment(3))]
+    k = sqrt(pole(1)*pole(2))
+    largest = sqrt([e1%high/(moment(1)*d13%high), e1%high/(moment(2)*d23%high), &
+                    e3%high/(moment(3)*d13%high)])
+    orbit%sense = sign(1.0_dp, moment(3) - moment(1))
+    orbit%direction = moment/momentum%high
+    scales(1) = root(d23*e3)
+    if (e2%high > 0.0_dp) then
+      scales(2) = root(d13*e2)
+      comodulus = scales(2)%high/scales(1)%high
+      call take_rates(moment, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
+    else
+      comodulus = 0.0_dp
+      orbit%frequency = scales(1)/inertia*0.5_dp
+      orbit%half_rate = momentum/pair_t(moment(2), 0.0_dp)*0.5_dp
+    end if
+    slope = orbit%frequency%high*inertia%high/scales(1)%high
+    call theta_series(pole, k, comodulus, orbit%theta)
+    orbit%start = pair_t(0.0_dp, 0.0_dp)
+    if (e1%high > FAINT*e3%high) then
+      call start_of_phase(orbit%theta, k, comodulus, slope, w(1)/largest(1), &
+                          orbit%sense*w(2)/largest(2), w(3)/largest(3), orbit%start%high, &
+                          orbit%start%low)
+    else
+      ! About axis 3, all but exactly.
+      largest(1:2) = 0.0_dp
+    end if
+    orbit%theta%size = orbit%theta%size*[largest(1), orbit%sense*largest(2), largest(3)]
+    call take_before(orbit)
+  end subroutine prepare_orbit
+
+  pure subroutine take_rates(moment, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
+    !! The mean rates: of the phase by the arithmetic-geometric mean, of the turn about the angular
+    !! momentum by the sum that goes with it, of an integral of the third kind (Gauss).
+    real(dp), intent(in) :: moment(3), pole(2)
+    type(pair_t), intent(in) :: momentum, inertia, scales(2), d12, d13, d23, e1, e3
+    type(orbit_t), intent(inout) :: orbit
+    type(pair_t) :: a, g, p, total, share, part, mean
+    logical :: by_moments ! the first of the poles, else the second: the one nearer to 0
+    real(dp) :: half
+    integer :: n
+
+    by_moments = pole(1) < pole(2)
+    if (by_moments) then
+      p = root(d13*e3*moment(2)/pair_t(moment(1), 0.0_dp))
+    else
+      p = momentum*root(d13*d23/pair_t(moment(3), 0.0_dp))
+    end if
+    a = scales(1)
+    g = scales(2)
+    share = pair_t(1.0_dp, 0.0_dp)
+    total = share
+    mean = a
+    do n = 1, MOST_LEVELS
+      mean = (a + g)*0.5_dp
+      part = a*g
+      a = part/p
+      share = share*((p - a)/(p + a))*0.5_dp
+      total = total + share
+      if (abs(share%high) <= LAST) exit
+      p = (p + a)*0.5_dp
+      a = mean
+      g = root(part)
+    end do
+    ! What one more level would take off.
+    half = (mean%high - g%high) + (mean%low - g%low)
+    mean%low = mean%low - half*half/(4.0_dp*mean%high)
+    orbit%frequency = mean/inertia
+    if (by_moments) then
+      part = pair_t(moment(2), 0.0_dp)*2.0_dp - d12*total*orbit%sense
+      orbit%half_rate = momentum*part/(product_of(moment(1), moment(2))*4.0_dp) &
+                        - orbit%frequency*(0.5_dp*orbit%sense)
+    else
+      part = momentum*momentum*2.0_dp + e1*total*orbit%sense
+      orbit%half_rate = part/(momentum*(4.0_dp*moment(3)))
+    end if
+  end subroutine take_rates
+
+  pure subroutine take_before(orbit)
+    !! So that q is the given one at time 0.
+    type(orbit_t), intent(inout) :: orbit
+    real(dp) :: omega(3), turn(4)
+    logical :: has_phase
+
+    call turned(orbit, 0.0_dp, omega, turn, has_phase)
+    orbit%before = product_of_quaternions(into_orbit(orbit, orbit%attitude), &
+                                          [turn(1), -turn(2), -turn(3), -turn(4)])
+  end subroutine take_before
+
+  ! ---- At a time ---------------------------------------------------------------------------------
+
+  pure subroutine evaluate(orbit, time, omega, attitude, status)
+    !! The state at a time.
+    type(orbit_t), intent(in) :: orbit
+    real(dp), intent(in) :: time
+    real(dp), intent(out) :: omega(3), attitude(4)
+    integer, intent(out) :: status
+    real(dp) :: t              ! in the orbit's unit
+    real(dp) :: w(3), turn(4)
+    logical :: has_phase
+    integer :: i
+
+    status = COMPLETE
+    t = time
+    if (orbit%omega_exponent /= 0) t = scale(time, orbit%omega_exponent)
+    if (.not. abs(t) > 0.0_dp) then
+      omega = orbit%omega
+      attitude = orbit%attitude
+      return
+    end if
+    call turned(orbit, t, w, turn, has_phase)
+    if (.not. has_phase) then
+      status = GAVE_UP
+      return
+    end if
+    turn = product_of_quaternions(orbit%before, turn)
+    attitude(1) = turn(1)
+    do i = 1, 3
+      attitude(1 + orbit%axes(i)) = orbit%signs(i)*turn(1 + i)
+    end do
+    if (orbit%is_steady) then
+      omega = orbit%omega
+      return
+    end if
+    if (orbit%omega_exponent /= 0) w = scale(w, orbit%omega_exponent)
+    if (.not. (abs(w(1)) <= huge(t) .and. abs(w(2)) <= huge(t) .and. abs(w(3)) <= huge(t))) then
+      status = OVERFLOW
+      return
+    end if
+    do i = 1, 3
+      omega(orbit%axes(i)) = orbit%signs(i)*w(i)
+    end do
+  end subroutine evaluate
+
+  pure subroutine turned(orbit, t, w, turn, has_phase)
+    !! Angular velocity and the turn D, in axes of the orbit.
+    type(orbit_t), intent(in) :: orbit
+    real(dp), intent(in) :: t
+    real(dp), intent(out) :: w(3), turn(4)
+    logical, intent(out) :: has_phase ! whether the phase has a digit left
+    real(dp) :: angle, angle_low, rest, sine, cosine
+    real(dp) :: c, s           ! theta function of the turn: its real and its imaginary part
+    real(dp) :: part           ! of the angle that the theta function adds
+    real(dp) :: m(3)           ! direction of the angular momentum
+    real(dp) :: along, across, inverse
+    type(pair_t) :: phase
+
+    has_phase = .false.
+    w = 0.0_dp
+    turn = 0.0_dp
+    call scaled(orbit%half_rate%high, orbit%half_rate%low, t, angle, angle_low)
+    if (.not. abs(angle) <= 0.5_dp*LARGE_PHASE) return
+    if (orbit%is_steady) then
+      call sine_cosine(angle, angle_low, sine, cosine)
+      turn = [cosine, orbit%direction*sine]
+      has_phase = .true.
+      return
+    end if
+    call scaled(orbit%frequency%high, orbit%frequency%low, t, c, s)
+    if (.not. abs(c) <= LARGE_PHASE) return
+    has_phase = .true.
+    call two_sum(orbit%start%high, c, phase%high, phase%low)
+    phase%low = phase%low + (s + orbit%start%low)
+    call elliptic_functions(orbit%theta, phase%high, phase%low, w, c, s, part)
+    part = part*orbit%sense
+    call two_sum(angle, part, angle, rest)
+    call sine_cosine(angle, angle_low + rest, sine, cosine)
+    m = w*orbit%direction
+    s = s*orbit%sense
+    inverse = 1.0_dp/sqrt((c*c + s*s)*(2.0_dp + 2.0_dp*m(3)))
+    along = (cosine*c - sine*s)*inverse
+    across = (sine*c + cosine*s)*inverse
+    turn = [along*(1.0_dp + m(3)), along*m(2) + across*m(1), across*m(2) - along*m(1), &
+            across*(1.0_dp + m(3))]
+  end subroutine turned
+
+  pure function into_orbit(orbit, attitude) result(found)
+    !! A quaternion with its vector in axes of the orbit.
+    type(orbit_t), intent(in) :: orbit
+    real(dp), intent(in) :: attitude(4)
+    real(dp) :: found(4)
+
+    found(1) = attitude(1)
+    found(2:4) = orbit%signs*attitude(1 + orbit%axes)
+  end function into_orbit
+
+  pure function product_of_quaternions(p, q) result(found)
+    real(dp), intent(in) :: p(4), q(4)
+    real(dp) :: found(4)
+
+    found = [p(1)*q(1) - p(2)*q(2) - (p(3)*q(3) + p(4)*q(4)), &
+             p(1)*q(2) + p(2)*q(1) + (p(3)*q(4) - p(4)*q(3)), &
+             p(1)*q(3) + p(3)*q(1) + (p(4)*q(2) - p(2)*q(4)), &
+             p(1)*q(4) + p(4)*q(1) + (p(2)*q(3) - p(3)*q(2))]
+  end function product_of_quaternions
+
+  pure type(pair_t) function unsigned(x)
+    !! |x|.
+    type(pair_t), intent(in) :: x
+
+    unsigned = x
+    if (x%high < 0.0_dp) unsigned = pair_t(-x%high, -x%low)
+  end function unsigned
+
+  pure subroutine bring_near_one(x, power)
+    !! Where the largest of x is far from 1, divide by a power of two that brings it there.
+    real(dp), intent(inout) :: x(3)
+    integer, intent(out) :: power
+    real(dp) :: largest
+
+    largest = max(abs(x(1)), abs(x(2)), abs(x(3)))
+    power = 0
+    if (largest <= LARGE .and. largest >= 1.0_dp/LARGE .or. .not. largest > 0.0_dp) return
+    power = exponent(largest)
+    x = scale(x, -power)
+  end subroutine bring_near_one
+
+end module torque_free_attitude

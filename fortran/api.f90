@@ -99,8 +99,8 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
 end subroutine taylor_rows
 
 subroutine attitude_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                       omega0, n_times, times, tolerance, effort, attitudes, rows, n_rows, status, &
-                         steps)
+                         omega0, n_times, times, tolerance, effort, attitudes, rows, n_rows, &
+                         status, steps)
   ! Taylor series: omega and attitude at times that lead away from 0 on one side.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc

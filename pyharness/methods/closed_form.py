@@ -18,7 +18,17 @@ def known_solution(
 ) -> Trajectory:
     """Solve a scene that has a closed form; the tolerance tells only whether it is sensitive."""
     work = np.array([effort, 0.0])
-    if not any(scene.euler_coefficients):
+    attitudes = None
+    if scene.attitude is not None:
+        if not scene.torque.is_zero or scene.moments is None:
+            raise InputError(
+                "closed-form: attitude with torque, or of a body given by coefficients, has none; "
+                "allowed: moments, and no torque"
+            )
+        rows, attitudes, n_rows, status = extension().torque_free_attitude_solution(
+            scene.moments, scene.omega, scene.attitude, times
+        )
+    elif not any(scene.euler_coefficients):
         rows, n_rows, status = extension().sphere_solution(
             *normalized(scene)[1:], scene.omega, times, effort=work
         )
@@ -48,7 +58,7 @@ def known_solution(
             times[n_rows],
         )
     if status != COMPLETE:
-        return trajectory_of(times, rows, n_rows, status, len(times), 0)
+        return trajectory_of(times, rows, n_rows, status, len(times), 0, attitudes=attitudes)
     error, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, times[-1])
     status = SENSITIVE if is_sensitive(growth, tolerance) else COMPLETE
-    return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth)
+    return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth, attitudes)

@@ -5,7 +5,8 @@ three arguments and enters the kernel.
 """
 
 import reprlib
-from typing import TYPE_CHECKING, Any, Self
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from pyharness.model.values import (
 
 if TYPE_CHECKING:
     from pyharness._solver import BoundKernel
+    from pyharness.methods.prepared_attitude import AttitudeSolver
 else:
     try:
         from pyharness._solver import BoundKernel
@@ -169,8 +171,6 @@ class Solver(BoundKernel):
         if self.plan.closed_form and not steps:
             error, growth = closed_form_estimate(scene.euler_coefficients, omega0, t_end)
         elif self.plan.method in GAUSS:
-            from dataclasses import replace
-
             growth = motion_growth(replace(scene, omega=omega0), t_end)
         else:
             return status, error, growth
@@ -181,8 +181,6 @@ class Solver(BoundKernel):
 
         InputError for a start that is not three finite numbers, or times out of order.
         """
-        from dataclasses import replace
-
         from pyharness.methods.registry import METHODS
         from pyharness.methods.solve import solve
 
@@ -194,9 +192,30 @@ class Solver(BoundKernel):
         return solve(scene, times, method, tolerance, effort)
 
 
+@overload
 def prepare(
-    scene: Scene, method: str = "auto", tolerance: Number = 1e-12, effort: float = 1.0
-) -> Solver:
+    scene: Scene,
+    method: str = ...,
+    tolerance: Number = ...,
+    effort: float = ...,
+    attitude: Literal[False] = ...,
+) -> Solver: ...
+@overload
+def prepare(
+    scene: Scene,
+    method: str = ...,
+    tolerance: Number = ...,
+    effort: float = ...,
+    *,
+    attitude: Literal[True],
+) -> "AttitudeSolver": ...
+def prepare(
+    scene: Scene,
+    method: str = "auto",
+    tolerance: Number = 1e-12,
+    effort: float = 1.0,
+    attitude: bool = False,
+) -> "Solver | AttitudeSolver":
     """Prepare a solver of a scene.
 
     Parameters
@@ -211,12 +230,14 @@ def prepare(
         method keeps less than some 1e-15 K.
     effort : float
         Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
+    attitude : bool
+        Whether calls give the attitude too.
 
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene, or a tolerance or an effort out of
-        range.
+        For an unknown method, one that can't take the scene or carry its attitude, or a tolerance
+        or an effort out of range.
     NotBuiltError
         Where the extension is not built.
 
@@ -233,6 +254,12 @@ def prepare(
         raise unknown("method", method, PREPARED)
     tolerance = tolerance_of(tolerance, FINEST)
     effort = checked_effort(effort)
+    if attitude:
+        from pyharness.methods.prepared_attitude import prepared_attitude
+
+        return prepared_attitude(scene, method, tolerance, effort)
+    # Who does not ask for it pays nothing.
+    scene = replace(scene, attitude=None)
     return Solver(plan(scene, method, tolerance), tolerance, method, effort)
 
 

@@ -125,6 +125,7 @@ REGISTRY = {
             1e-14,
             _from("closed_form", "known_solution"),
             any_scale=True,
+            attitude=True,
         ),
         *map(_gauss, range(1, 9)),
         _fixed_step("improved-euler", "improved Euler", "Jacobs 1982, eq. 29", 2, 2),

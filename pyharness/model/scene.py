@@ -156,7 +156,8 @@ class Scene:
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
-        if [self.moments, self.coefficients, self.inertia].count(None) != 2:
+        bodies = (self.moments, self.coefficients, self.inertia)
+        if sum(each is not None for each in bodies) != 1:
             raise InputError(
                 "[body]: give one of moments or coefficients, three numbers, or inertia, three rows"
             )

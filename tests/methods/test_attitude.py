@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene, run_program, solve, subset
+from pyharness import (
+    InputError,
+    Scene,
+    TorqueLaw,
+    case_scene,
+    prepare,
+    run_program,
+    solve,
+    subset,
+)
 from pyharness.compare.random_scenes import draw
 from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.plan import plan
@@ -184,3 +193,42 @@ def test_methods_that_carry_none_say_so() -> None:
         solve(case_scene(3), [1.0], "gauss-4", 1e-9, attitude=True)
     with pytest.raises(InputError, match="frame 'earth'"):
         solve(case_scene(3), [1.0], attitude=True).angular_momentum("earth")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_prepared_solver_gives_what_solve_gives(name: str) -> None:
+    scene = SCENES[name]
+    solver = prepare(scene, tolerance=1e-10, attitude=True)
+    assert (solver.status, solver.digits, solver.steps) == ("complete", None, 0)
+    for time in (0.7, -1.5):
+        omega, attitude = solver(scene.omega, time)
+        found = solve(scene, [time], tolerance=1e-10, attitude=True)
+        assert found.attitude is not None
+        assert (omega.tolist(), attitude.tolist()) == (
+            found.omega[0].tolist(),
+            found.attitude[0].tolist(),
+        )
+        assert (solver.status, solver.error, solver.growth) == (
+            found.ended,
+            found.error,
+            found.growth,
+        )
+
+
+def test_prepared_solver_takes_another_start() -> None:
+    scene = replace(case_scene(4), attitude=TURNED)
+    solver = prepare(scene, attitude=True)
+    _, attitude = solver((1.0, 2.0, 3.0), 1.0, (2.0, 0.0, 0.0, 0.0))
+    bare = replace(scene, omega=(1.0, 2.0, 3.0), attitude=None)
+    found = solve(bare, [1.0], attitude=True).attitude
+    assert found is not None
+    assert attitude.tolist() == found[0].tolist()
+    _, attitude = solver((float("nan"), 2.0, 3.0), 1.0)
+    assert solver.status == "overflow"
+    assert np.isnan(attitude).all()
+    with pytest.raises(InputError, match="all four are 0"):
+        solver((1.0, 2.0, 3.0), 1.0, (0.0, 0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="carries no attitude"):
+        prepare(scene, "rk4", 1.0, attitude=True)
+    omega = prepare(replace(scene, torque=TorqueLaw((1.0, 0.0, 0.0))), attitude=False)
+    assert omega((1.0, 2.0, 3.0), 1.0).shape == (3,)

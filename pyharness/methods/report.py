@@ -108,11 +108,19 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
     """Draw the components over time; say where they end, if not with the last step."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.0, 7.0), dpi=110, layout="constrained")
+    has_attitude = trajectory.attitude is not None and len(trajectory.time) > 0
+    figure = Figure(figsize=(12.5 if has_attitude else 7.0, 7.0), dpi=110, layout="constrained")
     marker = "o" if len(trajectory.time) == 1 else ""
     style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "marker": marker}
     note = f"x: {ending(trajectory)}" if not trajectory.has_all_rows else ""
-    axes = figure.subplots(3, 1, sharex=True)
+    left: Any = figure
+    if has_attitude:
+        from pyharness.methods.attitude_picture import draw_sphere
+
+        parts: Any = figure.subfigures(1, 2, width_ratios=(7.0, 5.5))
+        left, right = parts
+        draw_sphere(right.add_subplot(projection="3d"), trajectory)
+    axes = left.subplots(3, 1, sharex=True)
     for row in range(3):
         axes[row].plot(trajectory.time, trajectory.omega[:, row], **style)
         if note:

@@ -24,6 +24,7 @@ OPTIONS = {
     **shared.LISTING,
     "--times T1,T2,...": "where results are wanted, s (methods)",
     "--attitude FORM": f"the attitude too: {', '.join(FORMS)}",
+    "--animate FILE": "a turning brick, as .gif or .html (methods; with --attitude)",
     "--tolerance E": "error at these times over the largest |omega| (methods)",
     **shared.STRICT,
     **shared.EFFORT,
@@ -81,7 +82,7 @@ def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) 
 
 
 def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, str, Trajectory]:
-    shared.refuse(options, "--program", ("times", "tolerance", "strict"))
+    shared.refuse(options, "--program", ("times", "tolerance", "strict", "animate"))
     listing = shared.chosen_listing(options)
     name = listing.program
     lipschitz = shared.chosen_lipschitz(options)
@@ -128,7 +129,27 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     if options.times is not None:
         times = shared.numbers(options.times, "--times")
     shared.check_outputs(options)
+    if options.animate is not None:
+        _check_animation(options, scene)
     effort, attitude = shared.chosen_effort(options), options.attitude is not None
     trajectory = solve(scene, times, name, tolerance, effort, attitude)
+    if options.animate is not None:
+        from pyharness.cli.output import write_files
+        from pyharness.methods.attitude_picture import animation
+
+        moving = animation(scene, name, tolerance, max(times, key=abs), options.animate)
+        write_files({options.animate: moving}, "--animate")
     title = f"method {name}: {METHODS[name].title}, tolerance {tolerance:g}"
     return name, title, trajectory
+
+
+def _check_animation(options: argparse.Namespace, scene: Scene) -> None:
+    from pyharness.cli.output import check_writable
+    from pyharness.methods.attitude_picture import check_animation
+    from pyharness.views.pictures import check_matplotlib
+
+    if options.attitude is None:
+        raise InputError("--animate shows an attitude; ask for one, as in --attitude quaternion")
+    check_animation(options.animate, scene)
+    check_matplotlib("--animate")
+    check_writable(options.animate, "--animate")

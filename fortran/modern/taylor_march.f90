@@ -168,6 +168,8 @@ contains
         ! What a body at rest is about to reach.
         now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
         allowed = share*now%scale
+        if (with_attitude) s%weight = now%scale
+        last = size_of(s, order)
         ! From rest a torque that grows with time makes every third term only.
         last = last + size_of(s, order - 2)
       end if

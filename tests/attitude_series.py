@@ -1,0 +1,64 @@
+"""`python -m tests.attitude_series 3000`: whether the joint series keeps its tolerance.
+
+Random scenes of `verify`, plain and nasty, with torque or not, to a tolerance of each; the truth is
+the same series at 1e-14, which `tests/methods/test_attitude.py` holds to seven unknowns of SciPy.
+"""
+
+import sys
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+
+from pyharness import InputError, solve
+from pyharness.compare.random_scenes import draw
+from pyharness.model.attitude import angle_between
+
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+_MOST_GROWTH = 1e6
+_ROUNDING = 1e-15  # for each factor of growth
+
+
+def main(count: int, seed: str) -> int:
+    """Print what became of `count` scenes; 1 where one exceeds its tolerance."""
+    said: Counter[str] = Counter()
+    shares: list[float] = []
+    for number in range(count):
+        drawn = draw(seed, number)
+        tolerance = TOLERANCES[number % len(TOLERANCES)]
+        times = [0.4 * drawn.time, drawn.time]
+        scene = replace(drawn.scene, attitude=(0.5, -0.1, 0.7, 0.5))
+        try:
+            fine = solve(scene, times, "taylor", 1e-14, attitude=True)
+            found = solve(scene, times, "taylor", tolerance, attitude=True)
+        except InputError:
+            said["refused"] += 1
+            continue
+        if not (found.has_all_rows and fine.has_all_rows) or fine.growth is None:
+            said[found.ended] += 1
+            continue
+        if fine.growth > _MOST_GROWTH:
+            said["growth beyond 1e6"] += 1
+            continue
+        assert found.attitude is not None
+        assert fine.attitude is not None
+        largest = max(float(np.abs(fine.omega).max()), *map(abs, scene.omega), 1e-300)
+        error = max(
+            float(angle_between(found.attitude, fine.attitude).max()),
+            float(np.abs(found.omega - fine.omega).max()) / largest,
+        )
+        share = error / (tolerance + _ROUNDING * fine.growth)
+        shares.append(share)
+        if share > 1.0:
+            said["exceeds"] += 1
+            print(f"draw {number} of seed {seed} ({scene.name}) at {tolerance:g}: {error:.1e}")
+        said["held" if share <= 1.0 else "too large"] += 1
+    print(f"{count} scenes of seed {seed}: {dict(said)}")
+    quantiles = np.quantile(shares, [0.5, 0.99, 1.0])
+    print("error over tolerance, median, 99 %, most: " + ", ".join(f"{x:.2g}" for x in quantiles))
+    return 1 if said["exceeds"] else 0
+
+
+if __name__ == "__main__":
+    words = [*sys.argv[1:], "300", "attitude"]
+    sys.exit(main(int(words[0]), words[1] if len(sys.argv) > 2 else "attitude"))

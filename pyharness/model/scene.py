@@ -159,7 +159,7 @@ class Scene:
         bodies = (self.moments, self.coefficients, self.inertia)
         if sum(each is not None for each in bodies) != 1:
             raise InputError(
-                "[body]: give one of moments or coefficients, three numbers, or inertia, three rows"
+                "[body]: give either moments or coefficients, three numbers, or inertia, three rows"
             )
         if self.moments is not None:
             self._set("moments", _above_zero("[body] moments", "I", self.moments))

@@ -166,8 +166,13 @@ def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
     return terms
 
 
-def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, float]:
-    """Return relative errors of energy and momentum, and the error of phase (rad), with sign."""
+def errors(
+    scene: Scene, body: Orbit, time: float, omega: Array, rounded: bool = True
+) -> dict[str, float]:
+    """Return relative errors of energy and momentum, and the error of phase (rad), with sign.
+
+    `rounded`: the method has A, B, C in binary64, and not the moments.
+    """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
     moments = [Decimal(i) for i in scene.moments or ()]
@@ -179,7 +184,7 @@ def errors(scene: Scene, body: Orbit, time: float, omega: Array) -> dict[str, fl
         )
         return float((after - before) / before)
 
-    truth = torque_free(scene, time, rounded=True)
+    truth = torque_free(scene, time, rounded=rounded)
     error = np.array([float(x - y) for x, y in zip(found, truth, strict=True)])
     x, y, z = (float(w) for w in truth)
     slope = np.array(scene.euler_coefficients) * np.array([y * z, z * x, x * y])

@@ -220,7 +220,7 @@ def _closed_form(motion: str, prefix: str) -> Iterator[Check]:
     scene, body = MOTIONS[motion], orbit_of(motion)
     times = [r * 2.0 * math.pi / body.largest for r in REVOLUTIONS]
     rows = solved("closed-form", METHODS["closed-form"].finest).rows(scene, times).omega
-    found = [brouwer.errors(scene, body, t, row) for t, row in zip(times, rows, strict=True)]
+    found = [brouwer.errors(scene, body, t, row, False) for t, row in zip(times, rows, strict=True)]
     for what in LAWS:
         gain = body.turn if what == "phase" else body.gains[what]
         limit = _CLOSED_FORM * gain + (0.0 if what == "phase" else 4.0 * brouwer.ROUNDING)

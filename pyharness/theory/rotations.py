@@ -277,9 +277,7 @@ def _points(products: Sequence[float]) -> tuple[str, Places]:
         return "none: the square of a component would be below 0, for ABC M1 M2 M3 > 0", []
     roots = [math.sqrt(abs(each)) for each in products]
     signs = [1.0, math.copysign(1.0, products[2]), math.copysign(1.0, products[1])]
-    x, y, z = (
-        signs[axis] * roots[axis - 2] * roots[axis - 1] / roots[axis] for axis in range(3)
-    )
+    x, y, z = (signs[axis] * roots[axis - 2] * roots[axis - 1] / roots[axis] for axis in range(3))
     told = (
         "torque about all three axes: two rotations, opposite to each other, and so are their "
         "rates; neither is stable, for three rates whose sum is 0 and whose product is not have a "

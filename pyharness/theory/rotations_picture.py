@@ -1,26 +1,28 @@
 """The picture of `rotations`: polhodes on the momentum sphere, and the growth of all bodies."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.model.report import Picture, numbers
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Array
 from pyharness.theory.polhodes import growth_of_bodies, polhodes
-from pyharness.theory.rotations import rates
+from pyharness.theory.rotations import steady_rotations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Where the sphere is seen from; axis 3 points up.
-_VIEW = np.array([0.80, 0.48, 0.36]) / np.linalg.norm([0.80, 0.48, 0.36])
+# Where the sphere is seen from, by the axes of the smallest moment, which points up, the middle and
+# the largest.
+_VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
 _HIDDEN = 0.22  # opacity behind the sphere
 _SEPARATRIX: dict[str, Any] = {"color": "#c02020", "linewidth": 1.8}
 _POLHODE: dict[str, Any] = {"color": "#1040a0", "linewidth": 0.9}
-_MIDDLES = {(0.5, -0.5): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0.3, 0.7): 3,
+_MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0.3, 0.7): 3,
             (-0.3, -0.7): 3}  # fmt: skip
 
 
@@ -31,34 +33,32 @@ def rotations_picture(scene: Scene) -> Picture:
     figure = Figure(figsize=(11.0, 5.9), dpi=100, layout="constrained")
     sphere, square = figure.subplots(1, 2)
     rows = _sphere(sphere, scene) + _square(square, scene)
-    title = (
-        f"{scene.name}: left, L / |L| in the body without torque (dot: stable, ring: unstable, red: "
-        "the separatrix); right, Re Q over the spin about the middle axis, for all bodies",
-    )
-    return Picture(figure, numbers("panel curve x y z", rows), title)
+    return Picture(figure, numbers("panel curve x y z", rows), [scene.name])
 
 
 def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
     assert scene.moments is not None
     rows = []
+    low, middle, high = np.eye(3)[np.argsort(scene.moments, kind="stable")]
+    toward = _VIEW @ [low, middle, high] / np.linalg.norm(_VIEW)
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.fill(np.cos(turn), np.sin(turn), facecolor="#f4f4f4", edgecolor="#909090", linewidth=0.8)
     for name, curve in polhodes(scene.moments):
         style = _SEPARATRIX if name == "separatrix" else _POLHODE
-        x, y, near = _seen(curve)
+        x, y, near = _seen(curve, low, toward)
         for shown, opacity in ((near >= 0.0, 1.0), (near <= 0.0, _HIDDEN)):
             line = np.where(shown, x, np.nan), np.where(shown, y, np.nan)
             axes.plot(*line, alpha=opacity, **style)
         rows += [["sphere", name, *point] for point in curve.tolist()]
-    for axis, unit in enumerate(np.eye(3)):
-        found = rates(scene.euler_coefficients, (unit[0], unit[1], unit[2]))
-        stable = found[0].real == 0.0
+    free = replace(scene, torque=TorqueLaw(), omega=(0.0, 0.0, 1.0))
+    for axis, each in enumerate(steady_rotations(free, 0.5).rotations):
+        unit = np.array(each.omega)
         for sign in (1.0, -1.0):
-            x, y, near = _seen(sign * unit[None])
+            x, y, near = _seen(sign * unit[None], low, toward)
             opacity = 1.0 if near[0] > 0.0 else _HIDDEN
             axes.plot(
                 x, y, marker="o", markersize=6.0, color="black", alpha=opacity,
-                markerfacecolor="black" if stable else "white",
+                markerfacecolor="black" if each.stable else "white",
             )  # fmt: skip
             if sign > 0.0:
                 axes.annotate(
@@ -68,14 +68,16 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
                 )  # fmt: skip
     axes.set_aspect("equal")
     axes.set_axis_off()
+    told = "L / |L| without torque\ndot: stable, ring: not stable, red: separatrix"
+    axes.set_title(told, fontsize=9)
     return rows
 
 
-def _seen(points: Array) -> tuple[Array, Array, Array]:
+def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
     """Return how far right, up and near points of the sphere are, shape (n,) each."""
-    right = np.cross([0.0, 0.0, 1.0], _VIEW)
+    right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
-    return points @ right, points @ np.cross(_VIEW, right), points @ _VIEW
+    return points @ right, points @ np.cross(toward, right), points @ toward
 
 
 def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
@@ -92,7 +94,7 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
     marked: dict[tuple[float, float], list[str]] = {}
     outside = []
     scenes = [(f"{number}", case_scene(number)) for number in case_numbers()]
-    for label, each in [*scenes, *([] if scene.case else [(scene.name, scene)])]:
+    for label, each in [*scenes, *([] if scene.case else [("this scene", scene)])]:
         a, _, c = each.euler_coefficients
         if each.is_impossible:
             outside.append(label)
@@ -103,14 +105,15 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
         axes.plot(x, y, marker="o", markersize=5.0, color="#c02020")
         axes.annotate(
             ", ".join(labels), (x, y), (6, 5), textcoords="offset points", fontsize=9,
-            color="#c02020", fontweight="bold", parse_math=False,
+            color="#c02020", fontweight="bold",
         )  # fmt: skip
         height = float(growth_of_bodies(np.array(x), np.array(y)))
         rows += [["case", label, x, y, height] for label in labels]
     axes.set_aspect("equal")
     axes.set_xlabel("K1 = A = (I2 - I3) / I1")
     axes.set_ylabel("K3 = -C = (I2 - I1) / I3")
-    told = "red: cases" + (f"; outside, no body: {', '.join(outside)}" if outside else "")
-    axes.set_title(told, fontsize=9, parse_math=False)
+    told = "growth about the middle axis, all bodies\nred: cases"
+    told += f"; outside, no body: {', '.join(outside)}" if outside else ""
+    axes.set_title(told, fontsize=9)
     table = np.column_stack([first.ravel(), third.ravel(), growth.ravel()]).tolist()
     return rows + [["bodies", "Re Q / spin", *row] for row in table]

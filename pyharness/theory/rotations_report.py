@@ -53,9 +53,7 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
         Column("stable", lambda stable: "yes" if stable else "no", left=True),
         *(Column(head, _SECONDS) for head in ("doubling", "period", "flips", "linear")),
     ]
-    rows = [
-        [each.place, *each.omega, each.rates, each.stable, *_times(each)] for each in rotations
-    ]
+    rows = [[each.place, *each.omega, each.rates, each.stable, *_times(each)] for each in rotations]
     return Table(columns, rows)
 
 

@@ -21,7 +21,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     one; where two moments are equal both are the plane across the third axis.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
-    j = 1.0 / np.array(moments)
+    j = min(moments) / np.array(moments)
     if j[high] == j[low]:
         return
     turn = np.linspace(0.0, 2.0 * np.pi, _POINTS)

@@ -167,7 +167,7 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float:
     d**2 / 4 times the first coefficient over that of the other.
     """
     spun, *others = map(abs, coefficients)
-    shift = 0.25 * share**2 * spun * rate / min(others) if spun else 0.0
+    shift = 0.25 * share**2 * spun * rate / min(others) if spun and rate else 0.0
     return OFF / shift if shift else math.inf
 
 

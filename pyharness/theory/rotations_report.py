@@ -20,8 +20,8 @@ _KEY = (
     "with t. doubling, period: of a disturbance, s. flips: the shortest time between flips, s. "
     "linear: when the linear picture is a tenth off, s."
 )
-_OMEGA = digits(".5g")
-_SECONDS = digits(".4g")
+_OMEGA = digits(".4g")
+_SECONDS = digits(".3g")
 
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
@@ -49,11 +49,11 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
     columns = [
         *words("rotation"),
         *(Column(f"w{axis}", _OMEGA) for axis in (1, 2, 3)),
-        Column("Q", _rates, left=True),
         Column("stable", lambda stable: "yes" if stable else "no", left=True),
         *(Column(head, _SECONDS) for head in ("doubling", "period", "flips", "linear")),
+        Column("Q", _rates, left=True, fit="wrap"),
     ]
-    rows = [[each.place, *each.omega, each.rates, each.stable, *_times(each)] for each in rotations]
+    rows = [[each.place, *each.omega, each.stable, *_times(each), each.rates] for each in rotations]
     return Table(columns, rows)
 
 

@@ -20,6 +20,7 @@ VERBS = {
     "claims": "every statement of the thesis about results, judged",
     "family": "the weighted residual methods: orders derived, and orders measured",
     "plan": "what a scene needs, what is therefore not computed, and why",
+    "rotations": "the steady rotations of a scene, their stability, and the time between flips",
     "bench": "run time against error: ours, the programs, and other people's integrators",
     "verify": "bits between languages, error against the truth, and what changed since recorded",
     "stress": "numerical stability tried to breaking, each trial with a bound derived beforehand",

@@ -5,6 +5,7 @@ import textwrap
 from pyharness.model.report import Field, Line, Report, Section, Table
 
 _WIDTH = 100
+_NARROWEST = 12  # that a last column is wrapped to
 _MOST_ROWS = 200
 _END_ROWS = 10
 
@@ -43,7 +44,8 @@ def _aligned(table: Table) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     fit = table.columns[-1].fit
     if fit == "wrap":
-        widths[-1] = min(widths[-1], _WIDTH - sum(widths[:-1]) - 2 * (len(widths) - 1))
+        room = _WIDTH - sum(widths[:-1]) - 2 * (len(widths) - 1)
+        widths[-1] = min(widths[-1], max(_NARROWEST, room))
     gap = "  " if sum(widths) + 2 * (len(widths) - 1) <= _WIDTH else " "
     lines = []
     for *row, last in cells:

@@ -134,7 +134,8 @@ THEORY = {
     "ii3-partial": FALSE, "ii5-bounded-lipschitz": FALSE,
     "iii1-crandall": REPRODUCED, "iii2-improved-euler-error": REPRODUCED,
     "iii2-taylor-error": REPRODUCED, "iii2-runge-kutta-error": REPRODUCED,
-    "iii2-five-term-taylor": IN_PART, "iv1-symmetric-uncoupled": IN_PART,
+    "iii2-five-term-taylor": IN_PART, "iii4-stability-criteria": REPRODUCED,
+    "iii4-solves-some": REPRODUCED, "iv1-symmetric-uncoupled": IN_PART,
     "iv1-linear-top": REPRODUCED, "iv3-same-step": REPRODUCED, "v1-rigid-bodies": FALSE,
     "v1-not-known": FALSE,
 }  # fmt: skip
@@ -158,6 +159,8 @@ def test_theory_is_judged_by_its_numbers() -> None:
     assert theory.known_in_closed_form(lab, [4], 0.0).verdict == REPRODUCED
     assert theory.local_error(lab, [4], "rk4", 4.0, 0.1).verdict == NOT_REPRODUCED
     assert theory.step_on_cards(lab, 0.001).verdict == NOT_REPRODUCED
+    assert theory.rates_tell_growth(lab, [4], 1e-9).verdict == FALSE
+    assert theory.trial_form_solves(lab, [3, 4], 1e-13).verdict == NOT_REPRODUCED
     shares = theory.points_inside(lab, [4]).numbers
     assert set(shares.values()) == {0.01}
     assert theory.points_inside(Laboratory(False), [4]).verdict == REPRODUCED

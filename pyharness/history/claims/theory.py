@@ -13,10 +13,12 @@ import numpy as np
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
 from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, Judged, graded
 from pyharness.history.family.members import Member, run
+from pyharness.methods.linearised import jacobians
 from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array
 from pyharness.original.cards import deck
+from pyharness.theory.rotations import steady_rotations
 from pyharness.truth.reference import reference
 
 Weights = Sequence[Callable[[Array], Any]]
@@ -216,6 +218,48 @@ def _weighted(t: Array, weight: Array, by: Weights) -> Array:
             row += [(factor * (1 + s)).sum(), (factor * (2 * s + s**2)).sum(), -factor.sum()]
         rows.append(row)
     return np.array(rows)
+
+
+def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
+    """Hold Re Q of eq. 32 against the growth of a small disturbance of each steady rotation."""
+    numbers, told = {}, True
+    for case in cases:
+        scene = lab.scene(case)
+        for each in steady_rotations(scene, 1e-8).rotations:
+            disturbance = 1e-8 * math.hypot(*each.omega) * np.array([0.6, 0.5, 0.4])
+            start = tuple((each.omega + disturbance).tolist())
+            rate = each.rates[0].real
+            # Later what shrinks is gone, and sooner what grows is small.
+            times = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
+            if rate:
+                times = np.array([8.0, 10.0]) / rate
+            found = solve(replace(scene, omega=start), times, tolerance=1e-14).omega - each.omega
+            sizes = np.linalg.norm(found, axis=1)
+            name = f"case {case}, {each.place}"
+            if rate:
+                measured = math.log(sizes[1] / sizes[0]) / (times[1] - times[0]) / rate
+                numbers[f"{name}: growth over Re Q"] = measured
+                told &= abs(measured - 1.0) <= within
+            else:
+                largest_size = float(sizes.max() / np.linalg.norm(disturbance))
+                numbers[f"{name}: largest disturbance over the first"] = largest_size
+                told &= largest_size <= 10.0
+    return graded(numbers, told, otherwise=FALSE)
+
+
+def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
+    """Hold trial solutions of eq. 32 about axis 3, at the start's own omega3, against the truth."""
+    numbers = {}
+    for case in cases:
+        scene, truth = lab.scene(case), lab.truth(case)
+        steady = np.array([0.0, 0.0, scene.omega[2]])
+        rates, amplitudes = np.linalg.eig(jacobians(scene, steady[None])[0])
+        shares = np.linalg.solve(amplitudes, scene.omega - steady)
+        grown = np.exp(np.outer(truth.time, rates)) * shares
+        omega = steady + (grown @ amplitudes.T).real
+        share = distance(omega, truth.omega) / largest(truth)
+        numbers[f"case {case}: error over the largest omega"] = share
+    return graded(numbers, min(numbers.values()) <= limit)
 
 
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:

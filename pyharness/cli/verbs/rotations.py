@@ -1,0 +1,27 @@
+"""`rotations`: the steady rotations of a scene, and what a small disturbance makes of each."""
+
+import argparse
+
+from pyharness.cli import options as shared
+from pyharness.model.errors import InputError
+from pyharness.theory.rotations import steady_rotations
+from pyharness.theory.rotations_report import rotations_report
+
+OPTIONS = {
+    **shared.SCENE,
+    "--disturbance D": "size of a disturbance over that of the rotation (default 0.001)",
+    **shared.outputs(plot="draw polhodes, and the growth of all bodies"),
+}
+
+
+def run(options: argparse.Namespace) -> int:
+    """Find and show."""
+    scene = shared.chosen_scene(options)
+    disturbance = shared.positive(options.disturbance, "--disturbance", 1e-3)
+    if disturbance >= 1.0:
+        raise InputError(f"--disturbance: {disturbance:g}; allowed: above 0 and below 1")
+    if options.plot is not None and scene.moments is None:
+        raise InputError("--plot draws the momentum of a body; give a scene with moments")
+    shared.check_outputs(options)
+    shared.show(rotations_report(scene, steady_rotations(scene, disturbance)), options)
+    return 0

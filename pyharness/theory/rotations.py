@@ -1,0 +1,286 @@
+"""Steady rotations under constant torque, and what becomes of a small disturbance of each.
+
+Grammel's way, equation 32 of the thesis (III.4.a): omega = (a, b, c) + small amplitudes times
+exp(Q t). With M = N / I the constants are steady where
+
+    A bc = -M1,    B ca = -M2,    C ab = -M3,
+
+and the rates Q (1/s) are the roots of
+
+    Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
+"""
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.methods.linearised import jacobians
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.trajectory import ROUNDING, Array
+
+Rates = tuple[complex, complex, complex]
+Places = list[tuple[str, Triple]]  # steady rotations (rad/s), each with what it is
+
+# One component of the points that are shown of a hyperbola, over that of its vertex.
+_ALONG = (0.25, 0.5, 1.0, 2.0, 4.0)
+_SHOWN = "shown, of one branch, the vertex and points of 1/4, 1/2, 2 and 4 times its"
+# What the linear picture may be off by where it is said to end: of the disturbance, or radians.
+OFF = 0.1
+
+
+@dataclass(frozen=True)
+class SteadyRotation:
+    """A rotation that stays as it is, and what a small disturbance does."""
+
+    place: str  # an axis, a point of a hyperbola, ...
+    omega: Triple  # rad/s
+    rates: Rates  # Q of equation 32 (1/s), the fastest growth first
+    # whether no small disturbance grows, neither with exp(Q t) nor, where Q is 0, with t
+    stable: bool
+    # s, shortest time between flips of a motion so much disturbed; None where nothing flips
+    flip_interval: float | None
+    # s, when the linear picture is off by a tenth at the soonest; None where it is not known
+    linear_until: float | None
+
+    @property
+    def doubling_time(self) -> float | None:
+        """In which the fastest disturbance doubles (s), None where none grows with exp(Q t)."""
+        rate = self.rates[0].real
+        return math.log(2.0) / rate if rate > 0.0 else None
+
+    @property
+    def period(self) -> float | None:
+        """Of the oscillation (s), None where nothing oscillates."""
+        rate = max(abs(each.imag) for each in self.rates)
+        return 2.0 * math.pi / rate if rate > 0.0 else None
+
+
+@dataclass(frozen=True)
+class SteadyRotations:
+    """Those of a scene; of a family some members."""
+
+    told: str  # what there is, and what is shown of it
+    disturbance: float  # its size over that of the rotation
+    rotations: tuple[SteadyRotation, ...]
+
+
+def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
+    """Return the steady rotations of a scene, each disturbed by that share of its size.
+
+    InputError where the torque varies, or a rotation is beyond binary64.
+    """
+    if scene.torque.varies:
+        raise InputError(
+            "rotations: the torque varies with time, so that no rotation is steady; "
+            "allowed: a constant torque, or none"
+        )
+    told, places = _places(scene)
+    if not np.isfinite([omega for _, omega in places]).all():
+        raise InputError("rotations: a steady rotation is beyond binary64")
+    found = tuple(_rotation(scene, place, omega, disturbance) for place, omega in places)
+    return SteadyRotations(told, disturbance, found)
+
+
+def rates(coefficients: Triple, omega: Triple) -> Rates:
+    """Return Q of a steady rotation (1/s), the largest real part first."""
+    size = max(map(abs, omega))
+    if size == 0.0:
+        return 0j, 0j, 0j
+    # Near 1 no product overflows.
+    (a, b, c), (x, y, z) = coefficients, (w / size for w in omega)
+    terms = (b * c * x * x, c * a * y * y, a * b * z * z)
+    slope, half = sum(terms), a * b * c * x * y * z
+    if abs(slope) <= 16.0 * ROUNDING * sum(map(abs, terms)):
+        slope = 0.0  # what rounding leaves where they cancel
+    roots = sorted(_roots(slope, half), key=lambda q: (-q.real, -q.imag))
+    first, second, third = (size * q + 0j for q in roots)  # no -0.0
+    return first, second, third
+
+
+def _roots(slope: float, half: float) -> Rates:
+    """Return the roots of Q**3 - slope Q - 2 half, small ones to all their digits too."""
+    if half == 0.0:
+        root = cmath.sqrt(slope)
+        return root, 0j, -root
+    # The one root of the sign of `half` is simple, and no difference.
+    unit = math.sqrt(abs(slope) / 3.0)
+    ratio = abs(half) / unit**3 if unit**3 > 0.0 else math.inf
+    if math.isinf(ratio):
+        first = math.cbrt(2.0 * abs(half))
+    elif slope < 0.0:
+        first = 2.0 * unit * math.sinh(math.asinh(ratio) / 3.0)
+    elif ratio > 1.0:
+        first = 2.0 * unit * math.cosh(math.acosh(ratio) / 3.0)
+    else:
+        first = 2.0 * unit * math.cos(math.acos(ratio) / 3.0)
+    first = math.copysign(first, half)
+    rest = slope - 0.75 * first * first
+    if rest <= 0.0:
+        pair = complex(-0.5 * first, math.sqrt(-rest))
+        return complex(first), pair, pair.conjugate()
+    second = -0.5 * first - math.copysign(math.sqrt(rest), first)
+    return complex(first), complex(second), complex(2.0 * half / (first * second))
+
+
+def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> SteadyRotation:
+    found = rates(scene.euler_coefficients, omega)
+    matrix = jacobians(scene, np.array([omega]))[0]
+    # They add up to 0. Where all are 0 and the matrix is not, a disturbance grows with t.
+    stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
+    flips: float | None = None
+    until: float | None = None
+    if found[0].real > 0.0:
+        until = _growing(scene, omega, found[0], matrix, disturbance)
+    if scene.torque.is_zero and any(omega):
+        axis = max(range(3), key=lambda i: abs(omega[i]))
+        coefficients = np.roll(scene.euler_coefficients, -axis).tolist()
+        if stable:
+            until = _phase(coefficients, found[0].imag, disturbance)
+        elif found[0].real > 0.0:
+            flips = _flip_interval(coefficients, abs(omega[axis]), disturbance)
+    return SteadyRotation(place, omega, found, stable, flips, until)
+
+
+def _growing(scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float) -> float:
+    """Return when the products of a growing disturbance have come to a tenth of it (s)."""
+    # The vector that `rate` belongs to is what the matrix, less the rate, takes to 0.
+    grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
+    second = 0.0
+    for twice, other in ((2.0 * rate, grows), (2.0 * rate.real, grows.conj())):
+        products = np.roll(grows, -1) * np.roll(other, -2) + np.roll(grows, -2) * np.roll(other, -1)
+        forced = 0.5 * np.array(scene.euler_coefficients) * products
+        answer = np.linalg.solve(twice * np.eye(3) - matrix, forced)
+        second += 0.5 * float(np.linalg.norm(answer))
+    if second == 0.0:
+        return math.inf
+    return max(0.0, math.log(OFF / second / (share * math.hypot(*omega))) / rate.real)
+
+
+def _phase(coefficients: Sequence[float], rate: float, share: float) -> float:
+    """Return when the phase about a stable axis without torque is a tenth of a radian off (s).
+
+    A tilt d from the axis, whose coefficient is the first, towards another one changes the rate by
+    d**2 / 4 times the first coefficient over that of the other.
+    """
+    spun, *others = map(abs, coefficients)
+    shift = 0.25 * share**2 * spun * rate / min(others) if spun and rate else 0.0
+    return OFF / shift if shift else math.inf
+
+
+def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> float | None:
+    """Return the shortest time between flips about the middle axis (s), whose coefficient is first.
+
+    It is 2 K / lambda, near (2 / lambda) ln(4 / k') where the disturbance is small, and shortest
+    where that points along the axis of the smaller coefficient. None where signs are no body's.
+    """
+    first, second, third = coefficients
+    if first * second >= 0.0 or first * third >= 0.0:
+        return None
+    scale = math.sqrt(abs(first)) * math.sqrt(abs(second)) * math.sqrt(abs(third))
+    tilt = share / math.sqrt(min(abs(second), abs(third)))
+    high, low = scale * math.hypot(tilt, 1.0 / math.sqrt(abs(first))), scale * tilt
+    # K = pi / 2 over the arithmetic-geometric mean of 1 and k'.
+    while high - low > 4.0 * ROUNDING * high:
+        high, low = 0.5 * (high + low), math.sqrt(high) * math.sqrt(low)
+    return math.pi / high / spin
+
+
+def _places(scene: Scene) -> tuple[str, Places]:
+    """Return in words what steady rotations there are, and those that are shown."""
+    coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
+    held = [axis for axis in range(3) if torque[axis] != 0.0]
+    if not held:
+        return _axes(coefficients, math.hypot(*scene.omega))
+    for axis in held:
+        if coefficients[axis] == 0.0:
+            told = f"none: {'ABC'[axis]} = 0, so that nothing holds the torque about axis"
+            return f"{told} {axis + 1}", []
+    # w2 w3, w3 w1 and w1 w2, as far as they have to hold a torque.
+    products = [-m / k if k else 0.0 for m, k in zip(torque, coefficients, strict=True)]
+    if len(held) == 3:
+        return _points(products)
+    if len(held) == 1:
+        return _hyperbola(coefficients, products[held[0]], held[0])
+    (free,) = {0, 1, 2} - set(held)
+    if coefficients[free] == 0.0:
+        return _across(products, free)
+    told = f"none: what holds torque about axes {held[0] + 1} and {held[1] + 1}"
+    return f"{told} turns the body about axis {free + 1}", []
+
+
+def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
+    if spin == 0.0:
+        return "no torque, and a start at rest: shown is rest", [("rest", (0.0, 0.0, 0.0))]
+    told = f"no torque: rotation about each axis, shown at the spin of the start, {spin:.6g} rad/s"
+    zeros = [axis for axis in range(3) if coefficients[axis] == 0.0]
+    if len(zeros) == 3:
+        told += "; a sphere, for which every rotation is steady"
+    elif len(zeros) == 2:
+        (axis,) = {0, 1, 2} - set(zeros)
+        one, other = (f"w{(axis + k) % 3 + 1}" for k in (1, 2))
+        told += f"; every other with {one} = 0 or {other} = 0 is steady too"
+    elif zeros:
+        told += f"; about every axis across axis {zeros[0] + 1} as about the two shown"
+    unit = [(spin, 0.0, 0.0), (0.0, spin, 0.0), (0.0, 0.0, spin)]
+    return told, [(f"axis {number}", omega) for number, omega in enumerate(unit, 1)]
+
+
+def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
+    """Return points of one branch; the other has their opposites."""
+    one, other = (held + 1) % 3, (held + 2) % 3
+    told = (
+        f"torque about axis {held + 1}: the hyperbola w{one + 1} w{other + 1} = {product:.6g}, "
+        f"w{held + 1} = 0; {_SHOWN} w{one + 1}"
+    )
+    if coefficients[one] == coefficients[other] == 0.0:
+        told += f"; to each any w{held + 1} may be added"
+    along = dict.fromkeys(_ALONG, "hyperbola")
+    # Where C (B a**2 + A b**2), the square of Q, changes its sign.
+    if coefficients[one] * coefficients[other] < 0.0:
+        along[(-coefficients[one] / coefficients[other]) ** 0.25] = "its margin"
+        told += ", and the margin of stability"
+    vertex = math.sqrt(abs(product))
+    places: Places = []
+    for factor in sorted(along):
+        omega = [0.0, 0.0, 0.0]
+        omega[one] = vertex * factor
+        omega[other] = math.copysign(vertex / factor, product)
+        places.append((along[factor], (omega[0], omega[1], omega[2])))
+    return told, places
+
+
+def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
+    """Return points of the hyperbola of a body symmetric about `axis`, torque across that."""
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    # w_one w_axis and w_other w_axis.
+    across = products[other], products[one]
+    told = (
+        f"torque across the axis of symmetry: the hyperbola w{one + 1} w{axis + 1} = "
+        f"{across[0]:.6g}, w{other + 1} w{axis + 1} = {across[1]:.6g}; {_SHOWN} w{axis + 1}"
+    )
+    vertex = math.sqrt(math.hypot(*across))
+    places: Places = []
+    for factor in _ALONG:
+        omega = [0.0, 0.0, 0.0]
+        omega[axis] = vertex * factor
+        omega[one], omega[other] = (each / omega[axis] for each in across)
+        places.append(("hyperbola", (omega[0], omega[1], omega[2])))
+    return told, places
+
+
+def _points(products: Sequence[float]) -> tuple[str, Places]:
+    if sum(each < 0.0 for each in products) % 2:
+        return "none: the square of a component would be below 0, for ABC M1 M2 M3 > 0", []
+    roots = [math.sqrt(abs(each)) for each in products]
+    signs = [1.0, math.copysign(1.0, products[2]), math.copysign(1.0, products[1])]
+    x, y, z = (signs[axis] * roots[axis - 2] * roots[axis - 1] / roots[axis] for axis in range(3))
+    told = (
+        "torque about all three axes: two rotations, opposite to each other, and so are their "
+        "rates; neither is stable, for three rates whose sum is 0 and whose product is not have a "
+        "real part above 0"
+    )
+    return told, [("first", (x, y, z)), ("second", (-x, -y, -z))]

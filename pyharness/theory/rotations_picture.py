@@ -1,0 +1,119 @@
+"""The picture of `rotations`: polhodes on the momentum sphere, and the growth of all bodies."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyharness.model.report import Picture, numbers
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.trajectory import Array
+from pyharness.theory.polhodes import growth_of_bodies, polhodes
+from pyharness.theory.rotations import steady_rotations
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Where the sphere is seen from, by the axes of the smallest moment, which points up, the middle and
+# the largest.
+_VIEW = np.array([0.36, 0.72, 0.60])
+_GRID = 101
+_HIDDEN = 0.22  # opacity behind the sphere
+_SEPARATRIX: dict[str, Any] = {"color": "#c02020", "linewidth": 1.8}
+_POLHODE: dict[str, Any] = {"color": "#1040a0", "linewidth": 0.9}
+_MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0.3, 0.7): 3,
+            (-0.3, -0.7): 3}  # fmt: skip
+
+
+def rotations_picture(scene: Scene) -> Picture:
+    """Draw the polhodes of a scene's body beside the growth of all bodies; it has moments."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 5.9), dpi=100, layout="constrained")
+    sphere, square = figure.subplots(1, 2)
+    rows = _sphere(sphere, scene) + _square(square, scene)
+    return Picture(figure, numbers("panel curve x y z", rows), [scene.name])
+
+
+def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
+    assert scene.moments is not None
+    rows = []
+    low, middle, high = np.eye(3)[np.argsort(scene.moments, kind="stable")]
+    toward = _VIEW @ [low, middle, high] / np.linalg.norm(_VIEW)
+    turn = np.linspace(0.0, 2.0 * np.pi, 361)
+    axes.fill(np.cos(turn), np.sin(turn), facecolor="#f4f4f4", edgecolor="#909090", linewidth=0.8)
+    for name, curve in polhodes(scene.moments):
+        style = _SEPARATRIX if name == "separatrix" else _POLHODE
+        x, y, near = _seen(curve, low, toward)
+        for shown, opacity in ((near >= 0.0, 1.0), (near <= 0.0, _HIDDEN)):
+            line = np.where(shown, x, np.nan), np.where(shown, y, np.nan)
+            axes.plot(*line, alpha=opacity, **style)
+        rows += [["sphere", name, *point] for point in curve.tolist()]
+    free = replace(scene, torque=TorqueLaw(), omega=(0.0, 0.0, 1.0))
+    for axis, each in enumerate(steady_rotations(free, 0.5).rotations):
+        unit = np.array(each.omega)
+        for sign in (1.0, -1.0):
+            x, y, near = _seen(sign * unit[None], low, toward)
+            opacity = 1.0 if near[0] > 0.0 else _HIDDEN
+            axes.plot(
+                x, y, marker="o", markersize=6.0, color="black", alpha=opacity,
+                markerfacecolor="black" if each.stable else "white",
+            )  # fmt: skip
+            if sign > 0.0:
+                axes.annotate(
+                    f"axis {axis + 1}", (x[0], y[0]), (7, 7), textcoords="offset points",
+                    fontsize=9, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8,
+                    "alpha": 0.8},
+                )  # fmt: skip
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    told = "L / |L| without torque\ndot: stable, ring: not stable, red: separatrix"
+    axes.set_title(told, fontsize=9)
+    return rows
+
+
+def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
+    """Return how far right, up and near points of the sphere are, shape (n,) each."""
+    right = np.cross(upward, toward)
+    right /= np.linalg.norm(right)
+    return points @ right, points @ np.cross(toward, right), points @ toward
+
+
+def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
+    side = np.linspace(-1.0, 1.0, _GRID)
+    first, third = np.meshgrid(side, side)
+    growth = growth_of_bodies(first, third)
+    shades = axes.contourf(first, third, growth, levels=np.linspace(0.0, 1.0, 11), cmap="Blues")
+    axes.figure.colorbar(shades, ax=axes, label="Re Q / spin", shrink=0.85)
+    # Here two moments are equal.
+    for ends in (([0, 0], [-1, 1]), ([-1, 1], [0, 0]), ([-1, 1], [-1, 1])):
+        axes.plot(*ends, color="#505050", linewidth=0.8)
+    for place, middle in _MIDDLES.items():
+        axes.text(*place, f"axis {middle}\nmiddle", fontsize=8, ha="center", va="center")
+    marked: dict[tuple[float, float], list[str]] = {}
+    outside = []
+    scenes = [(f"{number}", case_scene(number)) for number in case_numbers()]
+    for label, each in [*scenes, *([] if scene.case else [("this scene", scene)])]:
+        a, _, c = each.euler_coefficients
+        if each.is_impossible:
+            outside.append(label)
+        else:
+            marked.setdefault((a, 0.0 - c), []).append(label)
+    rows = []
+    for (x, y), labels in marked.items():
+        axes.plot(x, y, marker="o", markersize=5.0, color="#c02020")
+        axes.annotate(
+            ", ".join(labels), (x, y), (6, 5), textcoords="offset points", fontsize=9,
+            color="#c02020", fontweight="bold",
+        )  # fmt: skip
+        height = float(growth_of_bodies(np.array(x), np.array(y)))
+        rows += [["case", label, x, y, height] for label in labels]
+    axes.set_aspect("equal")
+    axes.set_xlabel("K1 = A = (I2 - I3) / I1")
+    axes.set_ylabel("K3 = -C = (I2 - I1) / I3")
+    told = "growth about the middle axis, all bodies\nred: cases"
+    told += f"; outside, no body: {', '.join(outside)}" if outside else ""
+    axes.set_title(told, fontsize=9)
+    table = np.column_stack([first.ravel(), third.ravel(), growth.ravel()]).tolist()
+    return rows + [["bodies", "Re Q / spin", *row] for row in table]

@@ -253,7 +253,7 @@ def shorter() -> AbstractContextManager[Any]:
 def watched(error: Callable[[float, float], float]) -> Plant:
     """Let the error of energy, momentum and phase be `error(size, time)`."""
 
-    def faulty(size: float, scene: Scene, body: Any, time: float, _: Array) -> dict[str, float]:
+    def faulty(size: float, scene: Scene, body: Any, time: float, *_: Any) -> dict[str, float]:
         return dict.fromkeys(brouwer.LAWS, error(size, time))
 
     return beside(shorter, made_by("pyharness.theory.brouwer.errors", faulty))

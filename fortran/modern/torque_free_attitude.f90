@@ -20,7 +20,7 @@ module torque_free_attitude
 
   real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
   real(dp), parameter :: CANCELLED = 1e-4_dp  ! what is left where two words are too few
-  real(dp), parameter :: LAST = 1e-17_dp      ! a term after which the means differ, and the next is, by less
+  real(dp), parameter :: LAST = 1e-17_dp      ! a term after which the means differ by less
   real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
 

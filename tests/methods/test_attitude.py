@@ -133,16 +133,18 @@ def test_signs_are_continuous() -> None:
 
 def test_estimate_tells_the_error() -> None:
     ratios = []
-    for number in range(3, 8):
-        scene = case_scene(number)
+    for number in range(2, 8):
+        scene = replace(case_scene(number), attitude=TURNED)
         fine = solve(scene, [3.0], "taylor", 1e-14, attitude=True).attitude
-        found = solve(scene, [3.0], "taylor", 1e-5, attitude=True)
-        assert found.attitude is not None
-        assert fine is not None
-        ratios.append(angle_between(found.attitude, fine)[0] / (found.error or 0.0))
+        for tolerance in (1e-3, 1e-5, 1e-8):
+            found = solve(scene, [3.0], "taylor", tolerance, attitude=True)
+            assert found.attitude is not None
+            assert fine is not None
+            ratios.append(angle_between(found.attitude, fine)[0] / (found.error or 0.0))
     # What is known of it was taken off.
-    assert 1e-4 < min(ratios) <= max(ratios) < 2.5
-    assert np.median(ratios) < 0.3
+    assert 1e-3 < min(ratios) <= max(ratios) < 2.5
+    assert sorted(ratios)[len(ratios) // 2] < 0.22
+    assert sorted(ratios)[-2] < 1.0
 
 
 def test_who_does_not_ask_gets_none() -> None:
@@ -232,3 +234,25 @@ def test_prepared_solver_takes_another_start() -> None:
         prepare(scene, "rk4", 1.0, attitude=True)
     omega = prepare(replace(scene, torque=TorqueLaw((1.0, 0.0, 0.0))), attitude=False)
     assert omega((1.0, 2.0, 3.0), 1.0).shape == (3,)
+
+
+def test_rows_come_in_the_order_of_their_times() -> None:
+    scene = replace(case_scene(5), attitude=TURNED)
+    forth = solve(scene, [-1.0, 0.0, 0.5, 1.0], "taylor", attitude=True)
+    back = solve(scene, [1.0, 0.5, 0.0, -1.0], "taylor", attitude=True)
+    assert forth.attitude is not None
+    assert back.attitude is not None
+    assert back.attitude[::-1].tolist() == forth.attitude.tolist()
+    assert forth.attitude[1] == pytest.approx(np.array(TURNED), abs=1e-16)
+    only = solve(scene, [0.0], "taylor", attitude=True).attitude
+    assert only is not None
+    assert only[0] == pytest.approx(np.array(TURNED), abs=1e-16)
+
+
+def test_growth_has_the_way_in_it() -> None:
+    """An error of omega turns the body all the way."""
+    bare = solve(case_scene(4), [50.0], "taylor", 1e-9)
+    found = solve(case_scene(4), [50.0], "taylor", 1e-9, attitude=True)
+    largest = float(np.abs(solve(case_scene(4), np.linspace(0.0, 5.0, 200).tolist()).omega).max())
+    assert bare.growth is not None
+    assert found.growth == pytest.approx(bare.growth * (1.0 + 0.5 * largest * 50.0), rel=0.05)

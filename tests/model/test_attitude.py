@@ -144,3 +144,16 @@ def test_who_takes_principal_axes_says_so() -> None:
         prepare(scene)
     with pytest.raises(InputError, match="full inertia"):
         scene.right_hand_side()
+
+
+def test_principal_axes_are_a_right_handed_frame() -> None:
+    generator = np.random.default_rng(8)
+    for _ in range(200):
+        turn = Rotation.random(rng=generator).as_matrix()
+        moments = generator.uniform(1.0, 2.0, 3)
+        matrix = turn @ np.diag(moments) @ turn.T
+        rows = (0.5 * (matrix + matrix.T)).tolist()
+        bare, axes = principal(Scene("", (1.0, 2.0, 3.0), inertia=rows))
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        assert sorted(bare.moments or ()) == pytest.approx(sorted(moments))
+        assert axes @ np.diag(np.array(bare.moments)) @ axes.T == pytest.approx(matrix)

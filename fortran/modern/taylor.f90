@@ -51,23 +51,27 @@ contains
     real(c_double), intent(out) :: found(3) !! error, relative; growth; steps of all marches
     type(problem_t), pointer :: problem
     type(room_t), pointer :: room
-    real(c_double), pointer :: attitudes(:, :)
+    real(c_double), pointer, contiguous :: attitudes(:, :)
     real(c_double), target :: none(4, 1)
     real(c_double), target :: place(storage_size(room)/64 + ALIGNED/8)
     type(wave_t) :: few(FEW_WAVES)
     type(wave_t), allocatable :: many(:)
-    integer :: n_waves, failed
+    integer :: n_attitudes, n_waves, failed
     integer(c_intptr_t) :: address
 
     call c_f_pointer(problem_at, problem)
     address = transfer(c_loc(place), address)
     call c_f_pointer(c_loc(place(1 + modulo(-address, ALIGNED)/8)), room)
     attitudes => none
-    if (c_associated(attitudes_at)) call c_f_pointer(attitudes_at, attitudes, [4, n_times + 1])
+    n_attitudes = 0
+    if (c_associated(attitudes_at)) then
+      call c_f_pointer(attitudes_at, attitudes, [4, n_times + 1])
+      n_attitudes = n_times
+    end if
     n_waves = problem%n_sines + problem%n_cosines
     if (n_waves <= FEW_WAVES) then
       call solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, few, rows, &
-                 attitudes, n_rows, status, steps, needed, found)
+                 n_attitudes, attitudes, n_rows, status, steps, needed, found)
     else
       allocate (many(n_waves), stat=failed)
       status = GAVE_UP
@@ -76,13 +80,13 @@ contains
       needed = 0.0_dp
       if (failed == 0) then
         call solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, many, rows, &
-                   attitudes, n_rows, status, steps, needed, found)
+                   n_attitudes, attitudes, n_rows, status, steps, needed, found)
       end if
     end if
   end subroutine taylor_solve
 
   subroutine solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, waves, rows, &
-                   attitudes, n_rows, status, steps, needed, found)
+                   n_attitudes, attitudes, n_rows, status, steps, needed, found)
     !! The same with room.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3), tolerance, effort
@@ -92,7 +96,8 @@ contains
     type(room_t), intent(inout) :: room
     type(wave_t), intent(inout) :: waves(n_waves)
     real(dp), intent(inout) :: rows(3, n_times)
-    real(dp), intent(inout) :: attitudes(:, 0:)
+    integer, intent(in) :: n_attitudes
+    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes)
     integer, intent(out) :: n_rows, status
     integer(int64), intent(out) :: steps
     real(dp), intent(out) :: needed, found(3)
@@ -116,7 +121,8 @@ contains
     do
       call march(problem, omega, asked, tolerance, precise, most - spent, &
                  1 + int(STEPS_BETWEEN_LOOKS/cost, int64), n_times, times, room%s, room%blocks, &
-                 room%now, room%attitude, waves, rows, attitudes, outcome)
+                 room%now, room%attitude, waves, rows, n_attitudes, attitudes, &
+                 outcome)
       spent = spent + real(outcome%steps, dp)
       ! Rounding chose the way where a difference grew so much; at its end is another motion.
       growth = outcome%growth

@@ -68,7 +68,7 @@ module taylor_march
 contains
 
   subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, &
-                   s, blocks, now, attitude, waves, rows, attitudes, found)
+                   s, blocks, now, attitude, waves, rows, n_attitudes, attitudes, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
@@ -85,7 +85,8 @@ contains
     type(attitude_t), intent(inout) :: attitude
     type(wave_t), intent(inout) :: waves(:)
     real(dp), intent(inout) :: rows(3, n_times)         !! omega for n_rows times, rad/s
-    real(dp), intent(inout) :: attitudes(:, 0:)         !! at time 0 and then; or none
+    integer, intent(in) :: n_attitudes                  !! as many as times, or 0
+    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes) !! at time 0, and then
     type(outcome_t), intent(out) :: found
     real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
     real(dp) :: left(4)       ! by the step, rad/s
@@ -111,7 +112,7 @@ contains
     real(dp) :: t_half           ! the time then, s
 
     found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true.)
-    with_attitude = size(attitudes, 2) > 1
+    with_attitude = n_attitudes > 0
     rest = times(n_times)
     if (rest == 0.0_dp) then
       rows(:, 1) = omega
@@ -212,7 +213,7 @@ contains
         call turn_error(s, order, poles, error, s%lanes(1, :) + left(:3), attitude)
       end if
       call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
-                    attitudes, found)
+                    n_attitudes, attitudes, found)
       if (found%status /= COMPLETE) exit
       call count_step(precise, s%lanes, blocks)
       call add_change(s%change, now)
@@ -306,7 +307,7 @@ contains
   end subroutine fit_to_end
 
   subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, attitude, rows, &
-                      attitudes, found)
+                      n_attitudes, attitudes, found)
     !! Rows within the step, but for the last of all, from its terms; the error by Hermite's cubic.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
@@ -319,7 +320,8 @@ contains
     type(state_t), intent(inout) :: now
     type(attitude_t), intent(inout) :: attitude
     real(dp), intent(inout) :: rows(:, :)
-    real(dp), intent(inout) :: attitudes(:, 0:)
+    integer, intent(in) :: n_attitudes
+    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes)
     type(outcome_t), intent(inout) :: found !! its rows and its status
     real(dp) :: rises(3, 2)  ! of the error at either end, times the step
     real(dp) :: carried(3)   ! the error at the end, but for what the step left out
@@ -345,7 +347,7 @@ contains
         found%status = OVERFLOW
         return
       end if
-      if (size(attitudes, 2) > 1) then
+      if (n_attitudes > 0) then
         call add_attitude_row(attitude%q_low + turned(s, order, part), part, tolerance, attitude, &
                               attitudes(:, found%n_rows + 1))
       end if

@@ -67,10 +67,11 @@ subroutine solve_linear(n, m, a, b, factors, x, ier)
 end subroutine solve_linear
 
 subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                       omega0, n_times, times, tolerance, effort, rows, n_rows, status, steps)
-  ! Taylor series: omega at times that lead away from 0 on one side.
+                       omega0, n_times, times, tolerance, n_attitudes, attitudes, effort, rows, &
+                       n_rows, status, steps)
+  ! Taylor series: omega, and the attitude where it is asked for, at times that lead away from 0 on
+  ! one side.
   !f2py threadsafe
-  use, intrinsic :: iso_c_binding, only: c_null_ptr
   use levels, only: taylor_solve
   use problem, only: problem_t
   implicit none
@@ -87,6 +88,10 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|
   !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
   real(8), intent(inout) :: effort(5) ! factor on the limits; out: due; error, growth, all steps
+  !f2py integer(4), optional, intent(in) :: n_attitudes = 0
+  integer(4), intent(in) :: n_attitudes         ! n_times, or 0
+  !f2py real(8), optional, intent(inout) :: attitudes = 0.0
+  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! the first is that at time 0
   real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up, 6 sensitive
@@ -95,42 +100,8 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                               cosines), &
                     omega0, tolerance, effort(1), n_times, times, rows, &
-                    c_null_ptr, n_rows, status, steps, effort(2), effort(3:5))
+                    n_attitudes, attitudes, n_rows, status, steps, effort(2), effort(3:5))
 end subroutine taylor_rows
-
-subroutine attitude_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                         omega0, n_times, times, tolerance, effort, attitudes, rows, n_rows, &
-                         status, steps)
-  ! Taylor series: omega and attitude at times that lead away from 0 on one side.
-  !f2py threadsafe
-  use, intrinsic :: iso_c_binding, only: c_loc
-  use levels, only: taylor_solve
-  use problem, only: problem_t
-  implicit none
-  real(8), intent(in) :: coefficients(3)        ! A, B, C
-  real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
-  real(8), intent(in) :: m_rate(3)              ! 1/s3
-  integer(4), intent(in) :: n_sines
-  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
-  integer(4), intent(in) :: n_cosines
-  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
-  real(8), intent(in) :: omega0(3)              ! rad/s
-  integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times)         ! s
-  real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|
-  !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
-  real(8), intent(inout) :: effort(5) ! factor on the limits; out: due; error, growth, all steps
-  real(8), intent(inout), target :: attitudes(4, n_times + 1) ! the first is that at time 0
-  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up, 6 sensitive
-  integer(8), intent(out) :: steps
-
-  call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
-                              cosines), &
-                    omega0, tolerance, effort(1), n_times, times, rows, &
-                    c_loc(attitudes), n_rows, status, steps, effort(2), effort(3:5))
-end subroutine attitude_rows
 
 subroutine choose_instructions(highest, taken)
   ! For tests: the kernels of one instruction set. 0 plain, 1 AVX2, 2 AVX-512, or the best below.

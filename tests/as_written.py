@@ -20,7 +20,7 @@ COMPILER = os.environ.get("FC", "gfortran")
 _FORTRAN = Path(__file__).parent.parent / "fortran"
 _MODULES = (
     "two_words", "problem", "torque_terms", "taylor_plan", "taylor_series", "taylor_attitude",
-    "taylor_error", "taylor_march", "taylor",
+    "taylor_error", "taylor_rows", "taylor_march", "taylor",
 )  # fmt: skip
 
 

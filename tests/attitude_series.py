@@ -60,5 +60,5 @@ def main(count: int, seed: str) -> int:
 
 
 if __name__ == "__main__":
-    words = [*sys.argv[1:], "300", "attitude"]
-    sys.exit(main(int(words[0]), words[1] if len(sys.argv) > 2 else "attitude"))
+    number, seed = [*sys.argv[1:], *("300", "attitude")[len(sys.argv) - 1 :]]
+    sys.exit(main(int(number), seed))

@@ -4,8 +4,8 @@
 
 #define ARGUMENTS                                                                              \
   const void *problem, const double *omega, const double *tolerance, const double *effort,     \
-      int n_times, const double *times, double *rows, double *attitudes, int *n_rows,          \
-      int *status, int64_t *steps, double *needed, double *found
+      int n_times, const double *times, double *rows, int n_attitudes,                         \
+      double *attitudes, int *n_rows, int *status, int64_t *steps, double *needed, double *found
 
 #define QUICK_ARGUMENTS                                                                        \
   const void *problem, const double *omega, const double *tolerance, const double *effort,     \
@@ -62,7 +62,7 @@ __attribute__((constructor)) static void choose_best(void) { choose_level(2); }
 
 void taylor_solve(ARGUMENTS)
 {
-  chosen(problem, omega, tolerance, effort, n_times, times, rows, attitudes, n_rows, status, steps,
+  chosen(problem, omega, tolerance, effort, n_times, times, rows, n_attitudes, attitudes, n_rows, status, steps,
          needed, found);
 }
 

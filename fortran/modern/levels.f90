@@ -1,7 +1,7 @@
 module levels
   !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a problem_t
   !! on as it is, and knows no more of it than its address.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   implicit none(type, external)
   private
 
@@ -15,17 +15,19 @@ module levels
       integer(c_int), intent(in), value :: highest
     end function choose_level
 
-    subroutine taylor_solve(problem, omega, tolerance, effort, n_times, times, rows, attitudes, &
-                            n_rows, status, steps, needed, found) bind(c, name="taylor_solve")
+    subroutine taylor_solve(problem, omega, tolerance, effort, n_times, times, rows, &
+                            n_attitudes, attitudes, n_rows, status, steps, needed, found) &
+      bind(c, name="taylor_solve")
       !! As in taylor.f90.
-      import :: c_double, c_int, c_int64_t, c_ptr
+      import :: c_double, c_int, c_int64_t
       implicit none(type, external)
       type(*), intent(in) :: problem
       real(c_double), intent(in) :: omega(3), tolerance, effort
       integer(c_int), intent(in), value :: n_times
       real(c_double), intent(in) :: times(n_times)
       real(c_double), intent(inout) :: rows(3, n_times)
-      type(c_ptr), intent(in), value :: attitudes !! or null
+      integer(c_int), intent(in), value :: n_attitudes
+      real(c_double), intent(inout) :: attitudes(4, 0:n_attitudes)
       integer(c_int), intent(out) :: n_rows, status
       integer(c_int64_t), intent(out) :: steps
       real(c_double), intent(out) :: needed, found(3)

@@ -1,7 +1,6 @@
 module prepared
   !! One door for a solver that was prepared: all that does not change lies packed in one array,
   !! so that a call from Python converts three arguments and not fourteen.
-  use, intrinsic :: iso_c_binding, only: c_null_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use fixed_step, only: fixed_step_rows
   use gauss_collocation, only: gauss_rows
@@ -133,7 +132,7 @@ contains
     real(dp) :: reached(4)
     integer :: code, n_rows, quick_steps
     integer(int64) :: evaluations
-    real(dp) :: needed, estimates(3)
+    real(dp) :: needed, estimates(3), no_attitude(4, 1)
 
     code = int(packed(METHOD))
     times(1) = t_end
@@ -147,7 +146,7 @@ contains
       if (ended == REFUSED .and. code == CLOSED_FORM_OR_TAYLOR) then
         call unpack(packed, n_packed, problem)
         call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
-                          c_null_ptr, n_rows, ended, count, needed, estimates)
+                          0, no_attitude, n_rows, ended, count, needed, estimates)
         found = estimates(:2)
       end if
     case (SPHERE)
@@ -165,7 +164,7 @@ contains
       end if
       if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
         call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
-                          c_null_ptr, n_rows, ended, count, needed, estimates)
+                          0, no_attitude, n_rows, ended, count, needed, estimates)
         found = estimates(:2)
       end if
     case (IMPROVED_EULER:RK4)

@@ -1,12 +1,13 @@
 module taylor
   !! Taylor series: marches from 0 to the last time, until one errs little enough or none can.
-  use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int
   use, intrinsic :: iso_c_binding, only: c_int64_t, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
-  use taylor_march, only: march, outcome_t, room_t
+  use taylor_march, only: march, room_t
+  use taylor_rows, only: outcome_t
   use torque_terms, only: wave_t, waves_of
   implicit none(type, external)
   private
@@ -33,7 +34,7 @@ module taylor
 contains
 
   subroutine taylor_solve(problem_at, omega, tolerance, effort, n_times, times, rows, &
-                          attitudes_at, n_rows, status, steps, needed, found) &
+                          n_attitudes, attitudes, n_rows, status, steps, needed, found) &
     bind(c, name="taylor_solve_level")
     !! Solution at `times`, which lead away from 0 on one side.
     type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
@@ -43,7 +44,8 @@ contains
     integer(c_int), intent(in), value :: n_times
     real(c_double), intent(in) :: times(n_times)        !! s
     real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
-    type(c_ptr), intent(in), value :: attitudes_at      !! (4, 0:n_times), the first given; or null
+    integer(c_int), intent(in), value :: n_attitudes    !! n_times, or 0
+    real(c_double), intent(inout) :: attitudes(4, 0:n_attitudes) !! the first is given
     integer(c_int), intent(out) :: n_rows
     integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted, 6
     integer(c_int64_t), intent(out) :: steps            !! of the last march
@@ -51,23 +53,15 @@ contains
     real(c_double), intent(out) :: found(3) !! error, relative; growth; steps of all marches
     type(problem_t), pointer :: problem
     type(room_t), pointer :: room
-    real(c_double), pointer, contiguous :: attitudes(:, :)
-    real(c_double), target :: none(4, 1)
     real(c_double), target :: place(storage_size(room)/64 + ALIGNED/8)
     type(wave_t) :: few(FEW_WAVES)
     type(wave_t), allocatable :: many(:)
-    integer :: n_attitudes, n_waves, failed
+    integer :: n_waves, failed
     integer(c_intptr_t) :: address
 
     call c_f_pointer(problem_at, problem)
     address = transfer(c_loc(place), address)
     call c_f_pointer(c_loc(place(1 + modulo(-address, ALIGNED)/8)), room)
-    attitudes => none
-    n_attitudes = 0
-    if (c_associated(attitudes_at)) then
-      call c_f_pointer(attitudes_at, attitudes, [4, n_times + 1])
-      n_attitudes = n_times
-    end if
     n_waves = problem%n_sines + problem%n_cosines
     if (n_waves <= FEW_WAVES) then
       call solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, few, rows, &

@@ -18,8 +18,7 @@ module taylor_attitude
     real(dp) :: worst     !! largest error of a row so far, rad
   end type attitude_t
 
-  public :: add_attitude_row, begin_attitude, expand_both, rescale_turns, turn_error, turn_on, &
-            turned
+  public :: add_attitude_row, begin_attitude, expand_both, turn_error, turn_on
 
 contains
 
@@ -69,23 +68,6 @@ contains
     now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
   end subroutine begin_attitude
 
-  pure subroutine rescale_turns(s, order, ratio)
-    !! The terms of a step that is `ratio` times as long.
-    type(series_t), intent(inout) :: s
-    integer, intent(in) :: order
-    real(dp), intent(in) :: ratio
-    real(dp) :: power
-    integer :: k
-
-    power = 1.0_dp
-    do k = 1, order
-      power = power*ratio
-      s%turns(:, k) = s%turns(:, k)*power
-    end do
-    s%half = s%half*ratio
-    s%turn = sum(s%turns(:, order:1:-1), dim=2)
-  end subroutine rescale_turns
-
   pure subroutine turn_error(s, order, poles, before, carried, now)
     !! The error at the end of the step: what that of omega turns, by the trapezoidal rule, and what
     !! the step leaves out of the attitude itself.
@@ -115,25 +97,11 @@ contains
     end do
   end subroutine turn_on
 
-  pure function turned(s, order, part) result(change)
-    !! Change of the attitude at a part of the step.
-    type(series_t), intent(in) :: s
-    integer, intent(in) :: order
-    real(dp), intent(in) :: part
-    real(dp) :: change(4)
-    integer :: k
-
-    change = 0.0_dp
-    do k = order, 1, -1
-      change = (change + s%turns(:, k))*part
-    end do
-  end function turned
-
-  pure subroutine add_attitude_row(small, part, tolerance, now, row)
+  pure subroutine add_attitude_row(small, part, known, now, row)
     !! A row, its error taken off where it is small enough to be known; of length 1.
     real(dp), intent(in) :: small(4) !! what is added to the attitude
     real(dp), intent(in) :: part     !! of the way from the error before to that at the end
-    real(dp), intent(in) :: tolerance
+    real(dp), intent(in) :: known    !! error that may be taken off, rad
     type(attitude_t), intent(inout) :: now
     real(dp), intent(out) :: row(4)
     real(dp) :: error(3), size
@@ -142,7 +110,7 @@ contains
     size = 2.0_dp*sqrt(dot_product(error, error))
     if (.not. size <= now%worst) now%worst = size
     row = now%q + small
-    if (size <= tolerance) row = now%q + (small - from_left(error, row))
+    if (size <= known) row = now%q + (small - from_left(error, row))
     row = row/sqrt(dot_product(row, row))
   end subroutine add_attitude_row
 

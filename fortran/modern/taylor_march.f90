@@ -6,18 +6,17 @@ module taylor_march
   use kinds, only: dp
   use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
-  use taylor_attitude, only: add_attitude_row, attitude_t, begin_attitude, expand_both, &
-                             rescale_turns, turn_error, turn_on, turned
+  use taylor_attitude, only: attitude_t, begin_attitude, expand_both, turn_error, turn_on
   use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
   use taylor_plan, only: LEAST_SHARE, plan
-  use taylor_series, only: carry, carry_precisely, expand, fitting, following, inside, rescale, &
-                           series_t, size_of
+  use taylor_rows, only: add_last_row, add_rows, outcome_t, state_t
+  use taylor_series, only: carry, carry_precisely, expand, fitting, following, rescale, series_t, &
+                           size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t
   use two_words, only: two_sum
   implicit none(type, external)
   private
 
-  integer, parameter :: ROWS_BETWEEN_LOOKS = 2**19 ! at the user
   integer, parameter :: MANY_WAVES = 1000 ! so that a step is worth a look
   integer, parameter :: MOST_TRIES = 60
   real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
@@ -27,33 +26,7 @@ module taylor_march
   real(dp), parameter :: A_STEP = 60.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
-  ! Error, relative, beyond which its linear motion says little, and the one that says no more.
-  real(dp), parameter :: LINEAR = 0.1_dp
-  real(dp), parameter :: NO_DIGIT = 1e100_dp
-
-  ! Where a run stands.
-  type :: state_t
-    real(dp) :: w(4)      ! omega, rad/s, and 0
-    real(dp) :: w_low(4)  ! what its rounding left out
-    real(dp) :: t         ! s
-    real(dp) :: t_low     ! what its rounding left out
-    real(dp) :: scale     ! largest |omega| so far, rad/s
-    real(dp) :: worst     ! largest error of a row so far, rad/s
-    integer :: since      ! steps since the waves' sines were made; 0: to be made
-  end type state_t
-
-  ! What a march came to.
-  type, public :: outcome_t
-    integer :: status
-    integer :: n_rows
-    integer(int64) :: steps
-    real(dp) :: error    ! largest of a row, relative, before it was taken off
-    real(dp) :: growth   ! of a small difference until the end
-    real(dp) :: largest  ! and until any time on the way
-    real(dp) :: ahead    ! steps to the end, as far as known; where it gave up
-    real(dp) :: precise_steps ! to the end, at the least, of a march that is precise
-    logical :: finest    ! no step could err less
-  end type outcome_t
+  real(dp), parameter :: NO_DIGIT = 1e100_dp ! an error that says no more, relative
 
   ! Columns of four begin where a register's load does: Fortran can't ask for it of a variable.
   type, public :: room_t
@@ -163,17 +136,16 @@ contains
       else
         call expand(order, s)
       end if
-      last = size_of(s, order)
       if (found%steps == 0) then
         call following(h, s, order, part, allowed, decay, next)
         ! What a body at rest is about to reach.
         now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
         allowed = share*now%scale
         if (with_attitude) s%weight = now%scale
-        last = size_of(s, order)
-        ! From rest a torque that grows with time makes every third term only.
-        last = last + size_of(s, order - 2)
       end if
+      last = size_of(s, order)
+      ! From rest a torque that grows with time makes every third term only.
+      if (found%steps == 0) last = last + size_of(s, order - 2)
       call following(h, s, order, part, allowed, decay, next)
       if ((.not. last <= SLACK*allowed) .or. (found%steps == 0 .and. tries == 0)) then
         ! The first step is a guess, and a later one may be too long: the terms need only a factor.
@@ -197,8 +169,7 @@ contains
         if (abs(next) > abs(rest)) next = rest
         at_end = abs(next) >= abs(rest)
         if (.not. at_end .and. abs(rest) < 4.0_dp*abs(next)) next = rest/ceiling(rest/next)
-        call rescale(s, order, next/h)
-        if (with_attitude) call rescale_turns(s, order, next/h)
+        call rescale(s, order, next/h, with_attitude)
         now%since = lasting
         h = next
       end if
@@ -226,13 +197,8 @@ contains
         exit
       end if
       if (at_end) then
-        error = s%lanes(1, :)
-        call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, n_times))
-        if (with_attitude) then
-          call add_attitude_row(attitude%q_low, 1.0_dp, tolerance, attitude, &
-                                attitudes(:, n_times))
-        end if
-        found%n_rows = n_times
+        call add_last_row(s%lanes(1, :), tolerance, now, attitude, rows, n_attitudes, attitudes, &
+                          found)
         exit
       end if
       now%since = merge(0, now%since + 1, now%since + 1 >= lasting)
@@ -305,90 +271,6 @@ contains
       h = rest/ceiling(rest/h)
     end if
   end subroutine fit_to_end
-
-  subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, attitude, rows, &
-                      n_attitudes, attitudes, found)
-    !! Rows within the step, but for the last of all, from its terms; the error by Hermite's cubic.
-    type(series_t), intent(in) :: s
-    integer, intent(in) :: order
-    real(dp), intent(in) :: h               !! s
-    logical, intent(in) :: at_end
-    real(dp), intent(in) :: before(3)       !! the error at the step's beginning, rad/s
-    real(dp), intent(in) :: left(3)         !! what the step left out, rad/s
-    real(dp), intent(in) :: times(:)        !! s
-    real(dp), intent(in) :: tolerance
-    type(state_t), intent(inout) :: now
-    type(attitude_t), intent(inout) :: attitude
-    real(dp), intent(inout) :: rows(:, :)
-    integer, intent(in) :: n_attitudes
-    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes)
-    type(outcome_t), intent(inout) :: found !! its rows and its status
-    real(dp) :: rises(3, 2)  ! of the error at either end, times the step
-    real(dp) :: carried(3)   ! the error at the end, but for what the step left out
-    real(dp) :: part, to_go
-    integer :: last
-
-    last = size(times)
-    if (at_end) last = last - 1
-    if (found%n_rows >= last) return
-    if (abs(times(found%n_rows + 1) - now%t) > abs(h)) return
-    rises(:, 1) = rise(s%factors(:3), now%w(:3), before)
-    carried = s%lanes(1, :) + left
-    rises(:, 2) = rise(s%factors(:3), now%w(:3) + s%change(:3), carried)
-    do while (found%n_rows < last)
-      if (abs(times(found%n_rows + 1) - now%t) > abs(h)) exit
-      part = ((times(found%n_rows + 1) - now%t) - now%t_low)/h
-      to_go = 1.0_dp - part
-      call add_row(now%w(:3), now%w_low(:3) + inside(s, order, part), &
-                   (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
-                   + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
-                   - part**(order + 1)*left, tolerance, now, rows(:, found%n_rows + 1))
-      if (.not. all(abs(rows(:, found%n_rows + 1)) <= huge(h))) then
-        found%status = OVERFLOW
-        return
-      end if
-      if (n_attitudes > 0) then
-        call add_attitude_row(attitude%q_low + turned(s, order, part), part, tolerance, attitude, &
-                              attitudes(:, found%n_rows + 1))
-      end if
-      found%n_rows = found%n_rows + 1
-      if (mod(found%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
-        if (interrupt_raised() /= 0) then
-          found%status = INTERRUPTED
-          return
-        end if
-      end if
-    end do
-  end subroutine add_rows
-
-  pure function rise(factors, w, error)
-    !! Of a small difference, times the step, rad/s.
-    real(dp), intent(in) :: factors(3), w(3), error(3)
-    real(dp) :: rise(3)
-
-    rise(1) = factors(1)*(w(2)*error(3) + w(3)*error(2))
-    rise(2) = factors(2)*(w(1)*error(3) + w(3)*error(1))
-    rise(3) = factors(3)*(w(1)*error(2) + w(2)*error(1))
-  end function rise
-
-  pure subroutine add_row(w, small, error, tolerance, now, row)
-    !! A row, its error taken off where it is small enough to be known: an estimate that is wrong
-    !! costs no more than the tolerance.
-    real(dp), intent(in) :: w(3), small(3) !! whose sum is omega, rad/s
-    real(dp), intent(in) :: error(3)       !! rad/s
-    real(dp), intent(in) :: tolerance
-    type(state_t), intent(inout) :: now
-    real(dp), intent(out) :: row(3)        !! rad/s
-    real(dp) :: size
-
-    size = max(abs(error(1)), abs(error(2)), abs(error(3)))
-    if (.not. size <= now%worst) now%worst = size
-    if (size <= min(LINEAR, tolerance)*now%scale) then
-      row = w + (small - error)
-    else
-      row = w + small
-    end if
-  end subroutine add_row
 
   pure subroutine add_change(change, now)
     !! Omega at the end of the step, with what its rounding leaves out.

@@ -195,37 +195,51 @@ contains
     fitting = transfer(transfer(h, change) + change, h)
   end function fitting
 
-  pure subroutine rescale(s, order, ratio)
+  pure subroutine rescale(s, order, ratio, with_attitude)
     !! The terms of a step that is `ratio` times as long.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: ratio
+    logical, intent(in) :: with_attitude
+
+    call rescale_terms(order, ratio, s%terms, s%change)
+    s%factors = s%factors*ratio
+    if (with_attitude) then
+      call rescale_terms(order, ratio, s%turns, s%turn)
+      s%half = s%half*ratio
+    end if
+  end subroutine rescale
+
+  pure subroutine rescale_terms(order, ratio, terms, change)
+    integer, intent(in) :: order
+    real(dp), intent(in) :: ratio
+    real(dp), intent(inout) :: terms(4, 0:MOST_ORDER)
+    real(dp), intent(out) :: change(4) !! sum of the terms from 1
     real(dp) :: power
     integer :: k
 
     power = 1.0_dp
     do k = 1, order
       power = power*ratio
-      s%terms(:, k) = s%terms(:, k)*power
+      terms(:, k) = terms(:, k)*power
     end do
-    s%factors = s%factors*ratio
-    s%change = s%terms(:, order)
+    change = terms(:, order)
     do k = order - 1, 1, -1
-      s%change = s%change + s%terms(:, k)
+      change = change + terms(:, k)
     end do
-  end subroutine rescale
+  end subroutine rescale_terms
 
-  pure function inside(s, order, part) result(change)
-    !! Change of omega at a part of the step, rad/s.
-    type(series_t), intent(in) :: s
+  pure function inside(terms, order, part) result(change)
+    !! Change of omega, or of an attitude, at a part of the step.
+    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
     integer, intent(in) :: order
     real(dp), intent(in) :: part
-    real(dp) :: change(3)
+    real(dp) :: change(4)
     integer :: k
 
     change = 0.0_dp
     do k = order, 1, -1
-      change = (change + s%terms(:3, k))*part
+      change = (change + terms(:, k))*part
     end do
   end function inside
 

@@ -5,6 +5,7 @@ module torque_free
   !! integrals of arguments that overflow as M3 -> 0, and is slower than a Taylor step.
   use interruption, only: interrupt_raised
   use kinds, only: dp
+  use nearness, only: bring_near_one
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
   use two_words, only: scaled, sine_cosine, square_root, two_product, two_sum
   implicit none(type, external)
@@ -16,7 +17,6 @@ module torque_free
   integer, parameter :: BETWEEN_LOOKS = 2**17 ! at the user; times
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
-  real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
   real(dp), parameter :: FLAT = 4e-9_dp       ! a difference whose square no longer counts
   real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
@@ -86,24 +86,15 @@ contains
     real(dp) :: gap, gap_low ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
     real(dp) :: modulus, modulus_low     ! square of the larger start of the mean
     real(dp) :: comodulus, comodulus_low ! square of the smaller one
-    real(dp) :: largest
     integer :: i, j
 
     a = coefficients
     s_low = sign(1.0_dp, a)*coefficients_low
     w = omega0
-    orbit%time_exponent = 0
-    orbit%omega_exponent = 0
-    largest = max(abs(a(1)), abs(a(2)), abs(a(3)))
-    if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
-      call bring_near_one(a, orbit%time_exponent)
-      s_low = scale(s_low, -orbit%time_exponent)
-    end if
-    largest = max(abs(w(1)), abs(w(2)), abs(w(3)))
-    if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
-      call bring_near_one(w, orbit%omega_exponent)
-      orbit%time_exponent = orbit%time_exponent + orbit%omega_exponent
-    end if
+    call bring_near_one(a, orbit%time_exponent)
+    if (orbit%time_exponent /= 0) s_low = scale(s_low, -orbit%time_exponent)
+    call bring_near_one(w, orbit%omega_exponent)
+    orbit%time_exponent = orbit%time_exponent + orbit%omega_exponent
 
     ! Which coefficient has the odd sign? A zero goes with either.
     status = COMPLETE
@@ -308,18 +299,5 @@ contains
     omega(orbit%axes(2)) = w(2)
     omega(orbit%axes(3)) = w(3)
   end subroutine evaluate
-
-  pure subroutine bring_near_one(x, power)
-    !! Divide by the power of two that brings the largest of x into [1/2, 1).
-    real(dp), intent(inout) :: x(3)
-    integer, intent(out) :: power
-    real(dp) :: largest
-
-    largest = max(abs(x(1)), abs(x(2)), abs(x(3)))
-    power = 0
-    if (.not. (largest > 0.0_dp .and. largest <= huge(largest))) return
-    power = exponent(largest)
-    x = scale(x, -power)
-  end subroutine bring_near_one
 
 end module torque_free

@@ -7,9 +7,10 @@ module torque_free_attitude
   !! momentum to axis 3, the short way).
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
-  use theta_functions, only: elliptic_functions, start_of_phase, theta_series, theta_t
-  use two_words, only: scaled, sine_cosine, two_sum
+  use nearness, only: bring_near_one, LARGE
+  use statuses, only: COMPLETE, INTERRUPTED, REFUSED
+  use theta_functions, only: start_of_phase, theta_series
+  use torque_free_turn, only: evaluate, into_orbit, orbit_t, product_of_quaternions, turned
   use word_pairs, only: difference_of, longer_product, operator(*), operator(+), operator(-), &
                         operator(/), pair_t, product_of, root
   implicit none(type, external)
@@ -18,29 +19,9 @@ module torque_free_attitude
   integer, parameter :: BETWEEN_LOOKS = 2**17 ! at the user; times
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
-  real(dp), parameter :: LARGE = 2.0_dp**100  ! beyond it, or below its inverse, numbers are scaled
   real(dp), parameter :: CANCELLED = 1e-4_dp  ! what is left where two words are too few
   real(dp), parameter :: LAST = 1e-17_dp      ! a term after which the means differ by less
   real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
-  real(dp), parameter :: LARGE_PHASE = 1e15_dp
-
-  type :: orbit_t
-    !! One torque-free motion, in axes of its own: 2 has the middle moment, 3 is the one about
-    !! which the motion does not change its direction, and 1, 2, 3 are right-handed.
-    logical :: is_steady
-    integer :: axes(3)          !! of the body, for each of the orbit
-    real(dp) :: signs(3)        !! a component of the orbit is this times that of the body
-    integer :: omega_exponent   !! angular velocity is 2**this times the orbit's
-    real(dp) :: omega(3)        !! at time 0, body axes, as given
-    real(dp) :: attitude(4)     !! at time 0, body axes
-    real(dp) :: before(4)       !! q = before D, vector in axes of the orbit
-    type(pair_t) :: half_rate   !! of the turn about axis 3 beside what the theta function adds
-    type(pair_t) :: frequency   !! of the phase
-    type(pair_t) :: start       !! the phase at time 0
-    type(theta_t) :: theta      !! its sizes are those of omega
-    real(dp) :: direction(3)    !! omega times it is L/|L|; of a steady omega, omega/|omega|
-    real(dp) :: sense           !! of the phase: the sign of I3 - I1
-  end type orbit_t
 
   public :: torque_free_attitude_rows
 
@@ -77,8 +58,6 @@ contains
     end do
   end subroutine torque_free_attitude_rows
 
-  ! ---- What does not depend on the time ----------------------------------------------------------
-
   pure subroutine prepare(moments, omega0, attitude0, orbit, status)
     !! Everything about a motion that does not depend on the time.
     real(dp), intent(in) :: moments(3), omega0(3), attitude0(4)
@@ -86,7 +65,6 @@ contains
     integer, intent(out) :: status           !! COMPLETE or REFUSED
     real(dp) :: moment(3)   ! along the axes of the orbit, brought near 1
     real(dp) :: w(3)        ! angular velocity along them
-    real(dp) :: largest
     type(pair_t) :: d12, d13, d23  ! differences of the moments, without sign
     type(pair_t) :: energies(3)    ! I omega**2
     type(pair_t) :: e1, e2, e3     ! d13 omega1**2 I1 + d23 omega2**2 I2 and so on
@@ -97,14 +75,11 @@ contains
     w = omega0
     orbit%omega = omega0
     orbit%omega_exponent = 0
-    if (.not. (all(moment > 0.0_dp) .and. all(moment <= huge(largest)))) return
-    if (.not. all(abs(w) <= huge(largest))) return
-    largest = max(abs(attitude0(1)), abs(attitude0(2)), abs(attitude0(3)), abs(attitude0(4)))
-    if (.not. (largest > 0.0_dp .and. largest <= huge(largest))) return
+    if (.not. (all(moment > 0.0_dp) .and. all(moment <= huge(w)))) return
+    if (.not. all(abs(w) <= huge(w))) return
+    if (.not. (any(abs(attitude0) > 0.0_dp) .and. all(abs(attitude0) <= huge(w)))) return
     orbit%attitude = attitude0
-    if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
-      orbit%attitude = scale(attitude0, -exponent(largest))
-    end if
+    call bring_near_one(orbit%attitude, power)
     orbit%attitude = orbit%attitude/sqrt(sum(orbit%attitude*orbit%attitude))
     call bring_near_one(moment, power)
     if (.not. all(moment >= 1.0_dp/LARGE)) return
@@ -309,113 +284,6 @@ contains
                                           [turn(1), -turn(2), -turn(3), -turn(4)])
   end subroutine take_before
 
-  ! ---- At a time ---------------------------------------------------------------------------------
-
-  pure subroutine evaluate(orbit, time, omega, attitude, status)
-    !! The state at a time.
-    type(orbit_t), intent(in) :: orbit
-    real(dp), intent(in) :: time
-    real(dp), intent(out) :: omega(3), attitude(4)
-    integer, intent(out) :: status
-    real(dp) :: t              ! in the orbit's unit
-    real(dp) :: w(3), turn(4)
-    logical :: has_phase
-    integer :: i
-
-    status = COMPLETE
-    t = time
-    if (orbit%omega_exponent /= 0) t = scale(time, orbit%omega_exponent)
-    if (.not. abs(t) > 0.0_dp) then
-      omega = orbit%omega
-      attitude = orbit%attitude
-      return
-    end if
-    call turned(orbit, t, w, turn, has_phase)
-    if (.not. has_phase) then
-      status = GAVE_UP
-      return
-    end if
-    turn = product_of_quaternions(orbit%before, turn)
-    attitude(1) = turn(1)
-    do i = 1, 3
-      attitude(1 + orbit%axes(i)) = orbit%signs(i)*turn(1 + i)
-    end do
-    if (orbit%is_steady) then
-      omega = orbit%omega
-      return
-    end if
-    if (orbit%omega_exponent /= 0) w = scale(w, orbit%omega_exponent)
-    if (.not. (abs(w(1)) <= huge(t) .and. abs(w(2)) <= huge(t) .and. abs(w(3)) <= huge(t))) then
-      status = OVERFLOW
-      return
-    end if
-    do i = 1, 3
-      omega(orbit%axes(i)) = orbit%signs(i)*w(i)
-    end do
-  end subroutine evaluate
-
-  pure subroutine turned(orbit, t, w, turn, has_phase)
-    !! Angular velocity and the turn D, in axes of the orbit.
-    type(orbit_t), intent(in) :: orbit
-    real(dp), intent(in) :: t
-    real(dp), intent(out) :: w(3), turn(4)
-    logical, intent(out) :: has_phase ! whether the phase has a digit left
-    real(dp) :: angle, angle_low, rest, sine, cosine
-    real(dp) :: c, s           ! theta function of the turn: its real and its imaginary part
-    real(dp) :: part           ! of the angle that the theta function adds
-    real(dp) :: m(3)           ! direction of the angular momentum
-    real(dp) :: along, across, inverse
-    type(pair_t) :: phase
-
-    has_phase = .false.
-    w = 0.0_dp
-    turn = 0.0_dp
-    call scaled(orbit%half_rate%high, orbit%half_rate%low, t, angle, angle_low)
-    if (.not. abs(angle) <= 0.5_dp*LARGE_PHASE) return
-    if (orbit%is_steady) then
-      call sine_cosine(angle, angle_low, sine, cosine)
-      turn = [cosine, orbit%direction*sine]
-      has_phase = .true.
-      return
-    end if
-    call scaled(orbit%frequency%high, orbit%frequency%low, t, c, s)
-    if (.not. abs(c) <= LARGE_PHASE) return
-    has_phase = .true.
-    call two_sum(orbit%start%high, c, phase%high, phase%low)
-    phase%low = phase%low + (s + orbit%start%low)
-    call elliptic_functions(orbit%theta, phase%high, phase%low, w, c, s, part)
-    part = part*orbit%sense
-    call two_sum(angle, part, angle, rest)
-    call sine_cosine(angle, angle_low + rest, sine, cosine)
-    m = w*orbit%direction
-    s = s*orbit%sense
-    inverse = 1.0_dp/sqrt((c*c + s*s)*(2.0_dp + 2.0_dp*m(3)))
-    along = (cosine*c - sine*s)*inverse
-    across = (sine*c + cosine*s)*inverse
-    turn = [along*(1.0_dp + m(3)), along*m(2) + across*m(1), across*m(2) - along*m(1), &
-            across*(1.0_dp + m(3))]
-  end subroutine turned
-
-  pure function into_orbit(orbit, attitude) result(found)
-    !! A quaternion with its vector in axes of the orbit.
-    type(orbit_t), intent(in) :: orbit
-    real(dp), intent(in) :: attitude(4)
-    real(dp) :: found(4)
-
-    found(1) = attitude(1)
-    found(2:4) = orbit%signs*attitude(1 + orbit%axes)
-  end function into_orbit
-
-  pure function product_of_quaternions(p, q) result(found)
-    real(dp), intent(in) :: p(4), q(4)
-    real(dp) :: found(4)
-
-    found = [p(1)*q(1) - p(2)*q(2) - (p(3)*q(3) + p(4)*q(4)), &
-             p(1)*q(2) + p(2)*q(1) + (p(3)*q(4) - p(4)*q(3)), &
-             p(1)*q(3) + p(3)*q(1) + (p(4)*q(2) - p(2)*q(4)), &
-             p(1)*q(4) + p(4)*q(1) + (p(2)*q(3) - p(3)*q(2))]
-  end function product_of_quaternions
-
   pure type(pair_t) function unsigned(x)
     !! |x|.
     type(pair_t), intent(in) :: x
@@ -423,18 +291,5 @@ contains
     unsigned = x
     if (x%high < 0.0_dp) unsigned = pair_t(-x%high, -x%low)
   end function unsigned
-
-  pure subroutine bring_near_one(x, power)
-    !! Where the largest of x is far from 1, divide by a power of two that brings it there.
-    real(dp), intent(inout) :: x(3)
-    integer, intent(out) :: power
-    real(dp) :: largest
-
-    largest = max(abs(x(1)), abs(x(2)), abs(x(3)))
-    power = 0
-    if (largest <= LARGE .and. largest >= 1.0_dp/LARGE .or. .not. largest > 0.0_dp) return
-    power = exponent(largest)
-    x = scale(x, -power)
-  end subroutine bring_near_one
 
 end module torque_free_attitude

@@ -21,6 +21,7 @@ MODULES = (
     "taylor_series",
     "taylor_attitude",
     "taylor_error",
+    "taylor_rows",
     "taylor_march",
     "taylor",
 )

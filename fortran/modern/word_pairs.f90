@@ -2,7 +2,7 @@ module word_pairs
   !! Arithmetic with numbers of two words, to some 1e-31: what rounding takes off the first is in
   !! the second.
   use kinds, only: dp
-  use two_words, only: square_root, two_product, two_sum
+  use two_words, only: scaled, square_root, two_product, two_sum
   implicit none(type, external)
   private
 
@@ -103,8 +103,7 @@ contains
     type(pair_t), intent(in) :: x
     real(dp), intent(in) :: y
 
-    call two_product(x%high, y, found%high, found%low)
-    found%low = found%low + x%low*y
+    call scaled(x%high, x%low, y, found%high, found%low)
   end function multiple_of_pair
 
   pure type(pair_t) function quotient_of_pairs(x, y) result(found)

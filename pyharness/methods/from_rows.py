@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from pyharness.model.attitude import IDENTITY
+from pyharness.model.attitude import IDENTITY, Quaternion, product
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
@@ -13,12 +13,14 @@ _EARLY = 0.5 - math.sqrt(3.0) / 6.0
 _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return attitudes, shape (n, 4), beside rows of omega (n, 3) at times (n,) in order (s).
 
     From the start of the scene on, a commutator-free step of order 4 from row to row (Celledoni,
     Marthinsen and Owren 2003): two exponentials of omega at the Gauss points, which come from a
-    cubic through the rows and their slopes by Euler's equations.
+    cubic through the rows and their slopes by Euler's equations. NaN from where a turn is beyond
+    every number.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -31,11 +33,12 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
         _turn(span * (_LESS * first + _MORE * second)),
         strict=True,
     )
-    q = np.array(scene.attitude or IDENTITY)
+    q = scene.attitude or IDENTITY
     found = np.empty((len(time), 4))
     for n, (early, late) in enumerate(turns):
-        q = _times(_times(q, early), late)
-        q /= math.sqrt(q @ q)
+        q = product(product(q, early), late)
+        length = math.hypot(*q)
+        q = q[0] / length, q[1] / length, q[2] / length, q[3] / length
         found[n] = q
     return found
 
@@ -50,18 +53,8 @@ def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
     return found
 
 
-def _turn(angle: Array) -> Array:
+def _turn(angle: Array) -> list[Quaternion]:
     """Return the quaternions of rotation vectors."""
     half = 0.5 * np.linalg.norm(angle, axis=1)
-    return np.column_stack([np.cos(half), 0.5 * np.sinc(half / np.pi)[:, None] * angle])
-
-
-def _times(p: Array, q: Array) -> Array:
-    a, b, c, d = p
-    e, f, g, h = q
-    return np.array([
-        a * e - b * f - c * g - d * h,
-        a * f + b * e + c * h - d * g,
-        a * g - b * h + c * e + d * f,
-        a * h + b * g - c * f + d * e,
-    ])  # fmt: skip
+    parts = np.column_stack([np.cos(half), 0.5 * np.sinc(half / np.pi)[:, None] * angle])
+    return [(w, x, y, z) for w, x, y, z in parts.tolist()]

@@ -33,7 +33,6 @@ class Plan:
     closed_form: str | None  # sphere, symmetric or elliptic, where one solves the scene
     fallback: str | None  # the method that takes over where the one chosen finds that it can't
     velocity: bool  # is asked for
-    attitude: bool  # the same
     rows: bool  # are asked for
 
     @cached_property
@@ -73,7 +72,7 @@ def plan(
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
     form = form if method == "closed-form" else None
-    return Plan(scene, method, form, fallback, velocity, scene.attitude is not None, rows)
+    return Plan(scene, method, form, fallback, velocity, rows)
 
 
 def _decisions(chosen: Plan) -> Iterator[Decision]:
@@ -103,8 +102,7 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
         yield Decision(name, acts, f"{len(waves)} in the law" if acts else "none act")
     varies = "the law varies" if law.varies else "constant: read once"
     yield Decision("torque of time", law.varies, varies)
-    for part in ("velocity", "attitude"):
-        wanted = getattr(chosen, part)
+    for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
         yield Decision(part, wanted, "asked for" if wanted else "not asked for")
     wanted, why = chosen.rows, "rows asked for" if chosen.rows else "only the end"
     if wanted and closed:

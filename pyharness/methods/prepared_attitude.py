@@ -105,8 +105,14 @@ class AttitudeSolver:
         joint = np.empty((4, 2), order="F")
         joint[:, 0] = attitude
         work = np.array([self._effort, 0.0, -1.0, -1.0, 0.0])
-        rows, _, status, steps = extension().attitude_rows(
-            *self._normalized, start, [time], self._tolerance, attitudes=joint, effort=work
+        rows, _, status, steps = extension().taylor_rows(
+            *self._normalized,
+            start,
+            [time],
+            self._tolerance,
+            n_attitudes=1,
+            attitudes=joint,
+            effort=work,
         )
         self.steps = steps
         if ENDS[status] not in WITH_ALL_ROWS:

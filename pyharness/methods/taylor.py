@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyharness.methods.problem import known, normalized, trajectory_of
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
@@ -21,19 +22,14 @@ def taylor(
     of all: a second one is made where the first erred too much.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
-    attitudes = None
-    if scene.attitude is None:
-        rows, n_rows, status, steps = extension().taylor_rows(
-            *normalized(scene), scene.omega, times, tolerance, effort=work
-        )
-    else:
-        # What it starts from, and then a column for each time.
-        joint = np.empty((4, len(times) + 1), order="F")
-        joint[:, 0] = scene.attitude
-        rows, n_rows, status, steps = extension().attitude_rows(
-            *normalized(scene), scene.omega, times, tolerance, attitudes=joint, effort=work
-        )
-        attitudes = joint[:, 1:]
+    # The attitude at time 0, and then a column for each time.
+    n_attitudes = 0 if scene.attitude is None else len(times)
+    joint = np.empty((4, n_attitudes + 1), order="F")
+    joint[:, 0] = scene.attitude or IDENTITY
+    rows, n_rows, status, steps = extension().taylor_rows(
+        *normalized(scene), scene.omega, times, tolerance,
+        n_attitudes=n_attitudes, attitudes=joint, effort=work,
+    )  # fmt: skip
     if status == GAVE_UP:
         count = "1 step" if steps == 1 else f"{steps} steps"
         raise TimedError(
@@ -42,4 +38,5 @@ def taylor(
             times[n_rows],
         )
     error, growth = map(known, work[2:4])
+    attitudes = joint[:, 1:] if n_attitudes else None
     return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)

@@ -127,8 +127,11 @@ def _roots(slope: float, half: float) -> Rates:
 
 
 def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> SteadyRotation:
+    with np.errstate(over="ignore", invalid="ignore"):
+        matrix = jacobians(scene, np.array([omega]))[0]
     found = rates(scene.euler_coefficients, omega)
-    matrix = jacobians(scene, np.array([omega]))[0]
+    if not np.isfinite([*matrix.flat, *found]).all():
+        raise InputError("rotations: the rates of a steady rotation are beyond binary64")
     # They add up to 0. Where all are 0 and the matrix is not, a disturbance grows with t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
@@ -145,29 +148,43 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
     return SteadyRotation(place, omega, found, stable, flips, until)
 
 
-def _growing(scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float) -> float:
-    """Return when the products of a growing disturbance have come to a tenth of it (s)."""
+@np.errstate(all="ignore")
+def _growing(
+    scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float
+) -> float | None:
+    """Return when the products of a growing disturbance have come to a tenth of it (s).
+
+    None where that is beyond binary64.
+    """
     # The vector that `rate` belongs to is what the matrix, less the rate, takes to 0.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
     second = 0.0
     for twice, other in ((2.0 * rate, grows), (2.0 * rate.real, grows.conj())):
         products = np.roll(grows, -1) * np.roll(other, -2) + np.roll(grows, -2) * np.roll(other, -1)
         forced = 0.5 * np.array(scene.euler_coefficients) * products
-        answer = np.linalg.solve(twice * np.eye(3) - matrix, forced)
+        try:
+            answer = np.linalg.solve(twice * np.eye(3) - matrix, forced)
+        except np.linalg.LinAlgError:
+            return None
         second += 0.5 * float(np.linalg.norm(answer))
-    if second == 0.0:
-        return math.inf
+    if second == 0.0 or not math.isfinite(second):
+        return None if second else math.inf
     return max(0.0, math.log(OFF / second / (share * math.hypot(*omega))) / rate.real)
 
 
-def _phase(coefficients: Sequence[float], rate: float, share: float) -> float:
+def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
     """Return when the phase about a stable axis without torque is a tenth of a radian off (s).
 
     A tilt d from the axis, whose coefficient is the first, towards another one changes the rate by
-    d**2 / 4 times the first coefficient over that of the other.
+    d**2 / 4 times the first coefficient over that of the other. None where nothing turns about the
+    axis, and the spin alone drifts.
     """
     spun, *others = map(abs, coefficients)
-    shift = 0.25 * share**2 * spun * rate / min(others) if spun and rate else 0.0
+    if spun == 0.0:
+        return math.inf
+    if rate == 0.0:
+        return None
+    shift = 0.25 * share**2 * spun * rate / min(others)
     return OFF / shift if shift else math.inf
 
 
@@ -276,6 +293,8 @@ def _points(products: Sequence[float]) -> tuple[str, Places]:
     if sum(each < 0.0 for each in products) % 2:
         return "none: the square of a component would be below 0, for ABC M1 M2 M3 > 0", []
     roots = [math.sqrt(abs(each)) for each in products]
+    if not all(roots):
+        raise InputError("rotations: a steady rotation is beyond binary64")
     signs = [1.0, math.copysign(1.0, products[2]), math.copysign(1.0, products[1])]
     x, y, z = (signs[axis] * roots[axis - 2] * roots[axis - 1] / roots[axis] for axis in range(3))
     told = (

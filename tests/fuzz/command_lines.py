@@ -16,7 +16,7 @@ from tests.fuzz.strategies import mutated_word, number, scene_bytes, scene_text,
 
 # Verbs of which a valid command takes milliseconds. Any other, also one that is yet to come, gets
 # a mistake in every command line, and must find it.
-QUICK_VERBS = ("run", "plan", "defects", "doctor")
+QUICK_VERBS = ("run", "plan", "rotations", "defects", "doctor")
 
 # Files of every folder in which a command line is tried; what is not there is missing on purpose.
 GOOD, BAD, LONG_NAME = "good.toml", "bad.toml", "n" * 300
@@ -66,7 +66,9 @@ def command_line(random: Random) -> CommandLine:
         arguments.append(random.choice(("--no-such-option", "--format=no-such-format")))
     # A path of the machine's own is no place to write to by chance.
     harmless = [each for each in arguments if "/" not in each or each in _SPECIAL]
-    return CommandLine(tuple(harmless), content, mistaken and harmless[-1] == arguments[-1])
+    # Who asks for help gets it, whatever else is there.
+    mistaken = mistaken and harmless[-1] == arguments[-1] and "--help" not in harmless
+    return CommandLine(tuple(harmless), content, mistaken)
 
 
 def furnish(folder: Path, content: bytes) -> None:
@@ -81,7 +83,12 @@ def furnish(folder: Path, content: bytes) -> None:
 
 def _usual(random: Random, verb: str) -> list[str]:
     """Return the options without which a verb has nothing to do."""
-    usual = {"run": ["--scene", "--program"], "plan": ["--scene"], "compare": ["--case"]}
+    usual = {
+        "run": ["--scene", "--program"],
+        "plan": ["--scene"],
+        "rotations": ["--scene"],
+        "compare": ["--case"],
+    }
     options = usual.get(verb, [])
     if random.random() < 0.4:
         options = [each.replace("--scene", "--case") for each in options]

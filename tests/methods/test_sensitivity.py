@@ -151,7 +151,7 @@ def test_quick_tells_its_own_error(tolerance: float) -> None:
 def _grown(status: int, error: float, growth: float) -> Callable[..., Any]:
     """Return a series that ends with a status, and says what it found."""
 
-    def rows(*given: Any, effort: Any) -> Any:
+    def rows(*given: Any, effort: Any, **_: Any) -> Any:
         effort[2:4] = error, growth
         return np.ones((3, len(given[6]))), len(given[6]), status, 7
 

@@ -20,7 +20,7 @@ WAVES = TorqueLaw(
 )
 SCENES = {"case 5": case_scene(5), "waves": Scene("", (1.0, -2.0, 0.5), BODY, torque=WAVES)}
 # No size is small enough: no error is taken off.
-UNTAKEN = {"taylor_march": ("LINEAR = 0.1_dp", "LINEAR = -1.0_dp")}
+UNTAKEN = {"taylor_rows": ("LINEAR = 0.1_dp", "LINEAR = -1.0_dp")}
 CALM = 1e4  # growth
 pytestmark = [
     pytest.mark.external,

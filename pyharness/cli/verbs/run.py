@@ -72,6 +72,7 @@ def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) 
         raise InputError(
             f"--format {form} has no meaning with --method; allowed: {', '.join(shared.FORMATS)}"
         )
+    shared.refuse(options, f"--format {form}", ("attitude",))
     if form == "printer" and scene.moments is None:
         raise InputError(
             "--format printer: the page begins with the moments, and this scene has only "

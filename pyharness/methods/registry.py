@@ -2,7 +2,7 @@
 
 import importlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pyharness.methods.problem import rows_trajectory
@@ -47,7 +47,8 @@ def _reference(
 
     result = reference(scene, times, effort=effort)
     ended = "complete" if len(result.time) == len(times) else "overflow"
-    return rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
+    found = rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
+    return replace(found, attitude=result.attitude)
 
 
 def _no_rows(*given: object) -> Trajectory:
@@ -117,6 +118,7 @@ REGISTRY = {
             2.0**-52,
             _reference,
             any_scale=True,
+            attitude=True,
         ),
         Method(
             "closed-form",

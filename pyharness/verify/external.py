@@ -17,8 +17,9 @@ import numpy as np
 from pyharness.compare.candidates import called, listed, solved
 from pyharness.compare.checks import REFUSED, Check, bounded, may_hold, selected
 from pyharness.methods.plan import closed_form
-from pyharness.methods.registry import METHODS
+from pyharness.methods.registry import METHODS, REGISTRY
 from pyharness.methods.solve import finest
+from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene, TorqueLaw, Triple
@@ -63,7 +64,59 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
                 key=lambda value: abs(float(value.time)),
             )
             if any(may_hold(f"external/{problem.name}/{value.time}", only) for value in values):
-                yield from _side(problem, values, only)
+                bare = replace(problem, scene=replace(problem.scene, attitude=None))
+                yield from _side(bare, [each for each in values if any(each.omega)], only)
+                yield from _pointings(problem, [each for each in values if each.pointing], only)
+
+
+def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
+    """Hold every method that carries the attitude to the printed ones, as an angle (rad)."""
+    scene, times = problem.scene, [float(value.time) for value in values]
+    for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
+        ids = [f"external/{problem.name}/{each.time}/{method}/attitude" for each in values]
+        if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
+            continue
+        try:
+            tolerance = max(_TOLERANCES.get(method, 0.0), finest(method, scene, times[-1]))
+            run = solved(method, tolerance).rows(scene, times)
+        except InputError as refusal:
+            may = problem.path is not None and method not in _MAY_NOT_REFUSE
+            for id in filter(lambda id: selected(id, only), ids):
+                yield Check(id, may, None, None, _replay(problem, id), f"{REFUSED}{refusal}")
+            continue
+        rounding = _turns(scene, times)
+        for row, (id, value) in enumerate(zip(ids, values, strict=True)):
+            if not selected(id, only):
+                continue
+            again = _replay(problem, id)
+            if run.attitude is None or row >= len(run.attitude):
+                yield Check(id, False, None, None, again, f"ended before t = {times[row]:g} s")
+                continue
+            assert value.pointing is not None
+            wanted = np.array([value.pointing.attitude])
+            error = float(angle_between(run.attitude[row : row + 1], wanted)[0])
+            limit = value.pointing.accuracy + tolerance + float(rounding[row])
+            yield bounded(id, error, limit, again, "angle, rad")
+
+
+def _turns(scene: Scene, times: Sequence[float]) -> Array:
+    """Return by how much rounding the numbers of a scene turns the body (rad), as `_moves`.
+
+    Nothing where that can't be solved.
+    """
+    turned = np.full(len(times), 8.0 * _HALF_ULP)
+    run = solved("auto", METHODS["auto"].finest).rows
+    try:
+        here = run(scene, times)
+        others = [run(other, times).attitude for other in _moved(scene)]
+    except InputError:
+        return turned
+    for there in others:
+        if here.attitude is not None and there is not None and len(there) == len(times):
+            turned += angle_between(there, here.attitude) * (_ROUNDING / _STEP_ASIDE)
+    for row, time in enumerate(times[: len(here.omega)]):
+        turned[row] += float(np.linalg.norm(here.omega[row])) * abs(time) * _ROUNDING
+    return turned
 
 
 def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pyharness.model.attitude import IDENTITY, Quaternion, of_angles, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import check_keys, read_toml, scene_of
@@ -38,12 +39,21 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Pointing:
+    """An attitude as it is printed."""
+
+    attitude: Quaternion  # of length 1
+    accuracy: float  # how far it may be from the truth, rad
+
+
+@dataclass(frozen=True)
 class Value:
     """What is published for one time."""
 
     time: str  # time as given (s); exact
     # angular velocity in the unit of the problem, None where nothing is printed
     omega: tuple[Figure | None, ...]
+    pointing: Pointing | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +115,7 @@ def _read(path: str | Path, given: str | None) -> Problem:
 
 
 def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
-    check_keys(data, (*_TEXTS, "unit", *_SCENE, "value"), "top level")
+    check_keys(data, (*_TEXTS, "unit", "sequence", *_SCENE, "value"), "top level")
     if not re.fullmatch(r"[\w.-]+", name):
         raise InputError("the name of the file names its checks; allowed: letters, digits, - _ .")
     texts = {}
@@ -127,24 +137,29 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
         raise InputError("[[value]] is missing; give at least one, with time and omega")
     values: dict[float, Value] = {}
     for entry in entries:
-        value = _value(entry)
+        value = _value(entry, data.get("sequence"))
         if float(value.time) in values:
             raise InputError(f"[[value]] time {value.time} is given twice")
         values[float(value.time)] = value
+    found = tuple(values.values())
     return Problem(
         name=name,
         **texts,
         unit=unit,
-        scene=replace(scene, omega=(first, second, third)),
-        values=tuple(values.values()),
+        scene=replace(
+            scene,
+            omega=(first, second, third),
+            attitude=(scene.attitude or IDENTITY) if any(v.pointing for v in found) else None,
+        ),
+        values=found,
         path=given,
     )
 
 
-def _value(entry: object) -> Value:
+def _value(entry: object, sequence: object) -> Value:
     if not isinstance(entry, dict):
         raise InputError(f"[[value]] is {kind_of(entry)}; it must be a table")
-    check_keys(entry, ("time", "omega", "good_to"), "[[value]]")
+    check_keys(entry, ("time", "omega", "attitude", "angles_deg", "good_to"), "[[value]]")
     time = figure("[[value]] time", entry.get("time", "")).print
     if float(time) == 0.0:
         raise InputError("[[value]] time is 0: that is where it starts; give another")
@@ -152,12 +167,40 @@ def _value(entry: object) -> Value:
     good_to = number(f"{where}: good_to", entry.get("good_to", 0.0))
     if not (math.isfinite(good_to) and good_to >= 0.0):
         raise InputError(f"{where}: good_to is {good_to:g}; allowed: an error in the print's unit")
-    prints = entry.get("omega")
+    pointing = _pointing(where, entry, sequence, good_to)
+    prints = entry.get("omega", ["", "", ""] if pointing else None)
     if not isinstance(prints, list) or len(prints) != 3:
         raise InputError(f"{where}: omega must be a list of three texts, '' where none is printed")
     omega = tuple(
         None if text == "" else figure(f"{where}: omega", text, good_to) for text in prints
     )
-    if not any(omega):
+    if not any(omega) and pointing is None:
         raise InputError(f"{where}: omega has nothing printed; give at least one number")
-    return Value(time, omega)
+    return Value(time, omega, pointing)
+
+
+def _pointing(
+    where: str, entry: dict[str, Any], sequence: object, good_to: float
+) -> Pointing | None:
+    """Return the attitude of an entry, as a quaternion or as angles of the file's sequence."""
+    given = [key for key in ("attitude", "angles_deg") if key in entry]
+    if not given:
+        return None
+    if len(given) > 1:
+        raise InputError(f"{where}: give either attitude or angles_deg")
+    (key,) = given
+    count, prints = {"attitude": 4, "angles_deg": 3}[key], entry[key]
+    if not isinstance(prints, list) or len(prints) != count:
+        raise InputError(f"{where}: {key} must be a list of {count} texts")
+    # What a source grants its omega says nothing of its attitude, unless that stands alone.
+    alone = 0.0 if "omega" in entry else good_to
+    figures = [figure(f"{where}: {key}", text, alone) for text in prints]
+    values = [float(each.value) for each in figures]
+    accuracy = math.hypot(*(each.accuracy for each in figures))
+    if key == "attitude":
+        q, length = unit_quaternion(f"{where}: attitude", values)
+        return Pointing(q, 2.0 * accuracy / length)
+    return Pointing(
+        of_angles(f"{where}: angles_deg", values, sequence),
+        math.radians(sum(each.accuracy for each in figures)),
+    )

@@ -106,6 +106,19 @@ def test_methods_of_scipy_carry_it(method: str) -> None:
         assert bare.attitude is None
 
 
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_methods_of_scipy_keep_it_where_errors_turn_the_body_all_the_way(method: str) -> None:
+    spin = Scene("", (0.0, 0.0, 100.0), moments=(3.0, 3.0, 3.0), attitude=TURNED)
+    driven = draw("s2", 23)
+    for scene, time in ((spin, 8.0), (replace(driven.scene, attitude=TURNED), driven.time)):
+        fine = solve(scene, [time], "taylor", 1e-14, attitude=True).attitude
+        assert fine is not None
+        for tolerance in (1e-4, 1e-6):
+            found = solve(scene, [time], method, tolerance, attitude=True).attitude
+            assert found is not None
+            assert angle_between(found, fine)[0] <= 0.7 * tolerance
+
+
 def test_at_rest_scipy_leaves_it_as_it_is() -> None:
     scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), attitude=TURNED)
     for times in ([0.0], [1.0, 2.0]):

@@ -112,6 +112,10 @@ def _turned(attitude: Array, axes: Array, size: float) -> Array:
     return np.array(product((a, b, c, d), turn)).T  # type: ignore[arg-type]
 
 
+def unturned(found: Trajectory, size: float) -> Trajectory:
+    return replace(found, attitude=None) if size else found
+
+
 def longer(found: Trajectory, size: float) -> Trajectory:
     """Let quaternions be longer than 1."""
     assert found.attitude is not None
@@ -483,6 +487,10 @@ VERIFY = (
     near("external/detest-b5/20/quick", on(_ANSWERED, off), 1e-9),
     # The finest that LSODA claims to meet over 20 s.
     near("external/detest-b5/20/lsoda", on(_SOLVE, off), 1.6e-11),
+    # Nine digits of each of four components, of which an angle has twice as many.
+    near("external/nasa-brick-attitude/1/taylor/attitude", on(_SOLVE, turned_off), 4e-9),
+    exact("external/nasa-brick-attitude/1/taylor/attitude", refuses(_SOLVE)),
+    exact("external/nasa-brick-attitude/1/taylor/attitude", on(_SOLVE, unturned)),
     near("external/nasa-brick/30/taylor", on(_SOLVE, off), 2e-8 / 34.3),
     # A program's halved steps leave half a unit in the last place of each of 16 384.
     near("external/detest-b5/20/runge-kutta", on(_RUN, off), 2.0e-12),

@@ -10,8 +10,9 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from pyharness import InputError, Scene, Trajectory
+from pyharness import InputError, Scene, Trajectory, solve
 from pyharness.cli.main import main
 from pyharness.compare.checks import Check
 from pyharness.methods.registry import METHODS
@@ -294,3 +295,108 @@ def test_programs_in_steps_far_too_long_are_no_fault_of_a_file(
     assert check.note.startswith("refused: ")
     assert main(["verify", "--external", str(problem.path), "--only", check.id]) == 0
     assert capsys.readouterr().out.startswith("1 of 1 judge nothing: ")
+
+
+def _nasa_attitude(x: float, y: float, latitude: float, angles: Sequence[float]) -> Rotation:
+    """Return body to inertial axes: north, east and down of the start, which turn with the Earth.
+
+    `x` and `y` are the inertial position, `angles` yaw, pitch and roll from the local axes.
+    """
+    phi, turn = np.radians(latitude), np.arctan2(y, x)
+
+    def local(phi: float, turn: float) -> np.ndarray:
+        north = [-np.sin(phi) * np.cos(turn), -np.sin(phi) * np.sin(turn), np.cos(phi)]
+        east = [-np.sin(turn), np.cos(turn), 0.0]
+        down = [-np.cos(phi) * np.cos(turn), -np.cos(phi) * np.sin(turn), -np.sin(phi)]
+        return np.array([north, east, down]).T
+
+    axes = Rotation.from_matrix(local(0.0, 0.0).T @ local(phi, turn))
+    return axes * Rotation.from_euler("ZYX", angles, degrees=True)
+
+
+# Time, eiPosition_ft_X and _Y, latitude_deg, eulerAngle_deg_Yaw, _Pitch, _Roll of
+# nasa/simupy-flight, Atmos_02_sim_04.csv, the source of data/external/nasa-brick.toml.
+_NASA = (
+    ("1", 2.09556302722e7, 1528.10943884, 2.12636454625e-9,
+     (31.776473202, 18.689409988, 12.5899948471)),
+    ("2", 2.09555821123e7, 3056.21653642, 1.70109592541e-8,
+     (70.2258677851, 30.5106887852, 30.4648992127)),
+    ("3", 2.09555018457e7, 4584.31895147, 5.74122286361e-8,
+     (112.772149811, 29.8761193761, 47.8536430123)),
+    ("4", 2.09553894721e7, 6112.41434265, 1.36089045574e-7,
+     (150.274178232, 18.2316762214, 53.2136920977)),
+)  # fmt: skip
+
+
+def _with_attitudes(folder: Path, entries: Sequence[tuple[str, str]]) -> Problem:
+    """Return NASA's brick with attitudes printed for times."""
+    (brick,) = (each for each in problems() if each.name == "nasa-brick")
+    head = _GOOD.partition("[body]")[0].replace('"as printed"', '"as printed"\nunit = "deg/s"')
+    moments, omega = list(brick.scene.moments or ()), [10.0, 20.0, 30.0]
+    text = f"{head}sequence = '3-1-3'\n[body]\nmoments = {moments}\n[initial]\nomega = {omega}\n"
+    for time, entry in entries:
+        text += f'[[value]]\ntime = "{time}"\n{entry}\n'
+    return _read(folder, text, "brick.toml")
+
+
+def test_published_attitudes_of_the_brick_agree(tmp_path: Path) -> None:
+    (shipped,) = (each for each in problems() if each.name == "nasa-brick-attitude")
+    entries = []
+    for value, (time, x, y, latitude, angles) in zip(shipped.values, _NASA, strict=True):
+        q = _nasa_attitude(x, y, latitude, angles).as_quat(scalar_first=True)
+        assert value.time == time
+        assert value.pointing is not None
+        assert value.pointing.attitude == pytest.approx(q, abs=1e-11)
+        # The other sign is the same attitude.
+        printed = [f"{each:.9f}" for each in -q]
+        entries.append((time, f"attitude = {printed}"))
+    checks = list(external_checks([_with_attitudes(tmp_path, entries)]))
+    assert len(checks) == 4 * 8
+    assert all(check.passed for check in checks)
+    assert all(check.id.endswith("/attitude") for check in checks)
+    assert max(check.value or 0.0 for check in checks) < 4e-9
+    assert max(check.limit or 0.0 for check in checks) < 1e-7
+    # The Earth's turn counts: without it nothing would agree.
+    bare = Rotation.from_euler("ZYX", _NASA[3][4], degrees=True).as_quat(scalar_first=True)
+    entry = f"attitude = {[f'{each:.9f}' for each in bare]}"
+    assert not any(
+        check.passed for check in external_checks([_with_attitudes(tmp_path, [("4", entry)])])
+    )
+
+
+def test_attitudes_may_be_angles_and_stand_beside_omega(tmp_path: Path) -> None:
+    scene = _with_attitudes(tmp_path, [("1", "attitude = ['1', '0', '0', '0']")]).scene
+    found = solve(scene, [2.0], "reference", attitude=True)
+    told = found.rotation().as_euler("ZXZ", degrees=True)[0]
+    omega = [f"{np.degrees(w):.8f}" for w in found.omega[0]]
+    for off, passes in ((0.0, True), (1e-5, False)):
+        angles = [f"{told[0] + off:.6f}", *(f"{each:.6f}" for each in told[1:])]
+        entry = f"omega = {omega}\nangles_deg = {angles}"
+        checks = list(external_checks([_with_attitudes(tmp_path, [("2", entry)])]))
+        turned = [check for check in checks if check.id.endswith("/attitude")]
+        assert len(turned) == 8
+        assert {check.passed for check in turned} == {passes}
+        assert all(check.passed for check in checks if check not in turned)
+        assert len(checks) > 20
+
+
+@pytest.mark.parametrize(
+    ("entry", "told"),
+    [
+        ("attitude = ['1', '0', '0']", "attitude must be a list of 4 texts"),
+        ("attitude = [1, 0, 0, 0]", "allowed: the digits as text"),
+        ("attitude = ['0', '0', '0', '0']", "all four are 0"),
+        ("angles_deg = ['1', '2']", "angles_deg must be a list of 3 texts"),
+        ("attitude = ['1', '0', '0', '0']\nangles_deg = ['1', '2', '3']", "either attitude or"),
+    ],
+)
+def test_attitudes_are_read_strictly(entry: str, told: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=re.escape(told)):
+        _with_attitudes(tmp_path, [("1", entry)])
+
+
+def test_angles_need_a_sequence_that_is_known(tmp_path: Path) -> None:
+    text = _GOOD + "angles_deg = ['1', '2', '3']\n"
+    for sequence in ("", "sequence = '3-3-1'\n"):
+        with pytest.raises(InputError, match="sequence"):
+            _read(tmp_path, text.replace("[body]", f"{sequence}[body]"))

@@ -27,8 +27,8 @@ RightHandSide = Callable[[float, Sequence[float]], list[float]]
 # grows. Measured on random scenes other than those that check it, with half as much again.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
-# The same for each radian that the body turns, where its attitude is wanted: an error of omega turns
-# it all the way. Measured likewise, and on steady spins.
+# Likewise for each radian that the body turns, where its attitude is wanted: an error of omega
+# turns it all the way.
 _SUM_A_TURN = {"DOP853": 5.5, "RK45": 2.5, "Radau": 0.5, "LSODA": 55.0}
 # Growth beyond which a tolerance is left to be multiplied by it, as it is by every method's.
 _SENSITIVE = 1e3

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.methods.problem import known, normalized, trajectory_of
+from pyharness.methods.problem import known, series_kernel, trajectory_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
@@ -26,8 +26,9 @@ def taylor(
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
-    rows, n_rows, status, steps = extension().taylor_rows(
-        *normalized(scene), scene.omega, times, tolerance,
+    kernel, given = series_kernel(scene)
+    rows, n_rows, status, steps = getattr(extension(), kernel)(
+        *given, scene.omega, times, tolerance,
         n_attitudes=n_attitudes, attitudes=joint, effort=work,
     )  # fmt: skip
     if status == GAVE_UP:

@@ -87,10 +87,10 @@ def solve(
         raise InputError(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
+    check_torque(scene, method, attitude)
     if attitude and not chosen.attitude:
         able = ", ".join(each.name for each in METHODS.values() if each.attitude)
         raise InputError(f"method {method} carries no attitude; allowed: {able}")
-    check_torque(scene, method, attitude)
     # Who does not ask for it pays nothing.
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:

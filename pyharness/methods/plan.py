@@ -66,7 +66,9 @@ def plan(
     check_torque(scene, method, attitude=True)
     fallback = None
     if method == "auto":
-        few_digits = not scene.torque.in_space and tolerance >= (_WAVES_DIGITS if scene.torque.varies else FEW_DIGITS)
+        few_digits = not scene.torque.in_space and tolerance >= (
+            _WAVES_DIGITS if scene.torque.varies else FEW_DIGITS
+        )
         # Runge-Kutta gives the end alone.
         method = "closed-form" if form else EITHER if few_digits and not rows else "taylor"
         # A disturbance of the middle axis may be too faint for a closed form, not for a series.

@@ -49,9 +49,7 @@ def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
     return "taylor_rows", normalized(scene)
 
 
-def _over(
-    scene: Scene, law: TorqueLaw, moments: Array
-) -> tuple[Array, Array, Array, Array, Array]:
+def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, Array, Array, Array]:
     # A wave without amplitude has no effect, and would cost its sine and cosine.
     sines, cosines = (
         columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)

@@ -63,8 +63,8 @@ def solve(
     ------
     InputError
         For an unknown method, one that can't take the scene or carry its attitude, a torque about
-        the axes of space without attitude, times out of order, a tolerance that the method can't meet, or one that takes more work than `effort`
-        allows.
+        the axes of space without attitude, times out of order, a tolerance that the method can't
+        meet, or one that takes more work than `effort` allows.
 
     Examples
     --------

@@ -260,7 +260,7 @@ class Scene:
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
         """Return f(t, omega) of equations 16-18: rad/s2, three plain floats."""
         a, b, c = self.euler_coefficients
-        if self.torque.varies:
+        if self.body_torque.varies:
 
             def varying(time: float, omega: Sequence[float]) -> list[float]:
                 x, y, z = omega

@@ -37,7 +37,9 @@ def shifted(scene: Scene, omega: Array, by: float, attitude: Quaternion | None =
     """
     law = scene.torque
     if law.in_space and attitude is None:
-        raise InputError("a torque about the axes of space: begun later, it takes the attitude then")
+        raise InputError(
+            "a torque about the axes of space: begun later, it takes the attitude then"
+        )
     sines: list[Wave] = []
     cosines: list[Wave] = []
 

@@ -2,7 +2,7 @@
 
 import importlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pyharness.methods.problem import rows_trajectory
@@ -48,7 +48,8 @@ def _reference(
 
     result = reference(scene, times, effort=effort)
     ended = "complete" if len(result.time) == len(times) else "overflow"
-    return rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
+    found = rows_trajectory(result.time.tolist(), result.omega, 0, len(times), ended)
+    return replace(found, attitude=result.attitude)
 
 
 def _no_rows(*given: object) -> Trajectory:
@@ -68,7 +69,9 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
 
 def _scipy(scipy: str, title: str, source: str) -> Method:
     source = f"scipy.integrate.solve_ivp; {source}"
-    return Method(scipy.lower(), title, source, FINEST[scipy], scipy_method(scipy), scipy=scipy)
+    return Method(
+        scipy.lower(), title, source, FINEST[scipy], scipy_method(scipy), attitude=True, scipy=scipy
+    )
 
 
 def _gauss(stages: int) -> Method:
@@ -120,6 +123,7 @@ REGISTRY = {
             2.0**-52,
             _reference,
             any_scale=True,
+            attitude=True,
         ),
         Method(
             "closed-form",

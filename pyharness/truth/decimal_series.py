@@ -1,4 +1,4 @@
-"""The Taylor series of equations 13-15 in decimal arithmetic, of exact coefficients."""
+"""The Taylor series of equations 13-15, and of what hangs on them, in decimal arithmetic."""
 
 from collections.abc import Sequence
 from decimal import Decimal
@@ -31,19 +31,25 @@ def taylor_series(
     tolerance: Decimal,
     effort: float | None,
 ) -> list[Row]:
-    """Return omega (and velocity) at `times` by Taylor steps; fewer rows where it blows up.
+    """Return omega (and velocity, and attitude) at `times`; fewer rows where it blows up.
 
-    `coefficients` are A, B, C of the scene; `tolerance` is relative to omega, of each step.
+    The attitude is that of a scene which has one, of the length that it has there. `coefficients`
+    are A, B, C of the scene; `tolerance` is of each step, relative to omega, and to the attitude.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
+    moving = len(state)
+    state += [Decimal(x) for x in scene.attitude or ()]
     begin = Decimal(0)
     rows: list[Row] = []
     step = 0
     while True:
         series = equations.expand(begin, state, order)
         rest = abs(times[-1] - begin)
-        length = _step(series, tolerance, rest).copy_sign(times[-1])
+        length = _step(series[:moving], tolerance, rest)
+        if scene.attitude is not None:
+            length = min(length, _step(series[moving:], tolerance, rest, 4))
+        length = length.copy_sign(times[-1])
         if begin + length == begin and rest:
             return rows
         limit.check(step, begin, length, rest)
@@ -106,13 +112,13 @@ class _Limit:
         )
 
 
-def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal) -> Decimal:
-    """Return the step for which the last two terms of every series are small beside omega.
+def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
+    """Return the step for which the last two terms are small beside the leading unknowns.
 
     Of a body at rest, beside what the first terms make of it until then.
     """
     order = len(coefficients[0]) - 1
-    begun = next((j for j in range(order - 1) if _size(coefficients, j, 3)), None)
+    begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
     length = rest
     for k in (order - 1, order):
         size = _size(coefficients, k)
@@ -121,7 +127,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal) -> Decimal
                 # The root needs few digits; the exponent range is Decimal's.
                 ((tolerance * before / size).ln() / (k - j)).exp()
                 for j in range(begun, 1 if begun == 0 else begun + 4)
-                if (before := _size(coefficients, j, 3))
+                if (before := _size(coefficients, j, leading))
             ]
             length = min(length, max(lengths))
     return length
@@ -140,13 +146,16 @@ def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
 
 
 class _Equations:
-    """Equations 13-15, and dV/dt = F/m - omega x V, as recurrences of Taylor coefficients."""
+    """Equations 13-15 as recurrences of Taylor coefficients.
+
+    Beside them dV/dt = F/m - omega x V and dq/dt = q (0, omega)/2, where they are asked for.
+    """
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
         self._abc = coefficients
         self._torque = scene.body_torque
         self._moments = [Decimal(i) for i in scene.moments or (1, 1, 1)]
-        self._velocity = velocity
+        self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [
             Decimal(f) / Decimal(m) for f, m in zip(scene.forces, scene.masses, strict=True)
         ]
@@ -168,6 +177,8 @@ class _Equations:
                     rate = _product(series[3 + j], backward[m])
                     rate -= _product(series[3 + m], backward[j])
                     rates.append(rate + (self._acceleration[i] if k == 0 else 0))
+            if self._attitude:
+                rates += _turning(series[-4:], backward[:3])
             for each, rate in zip(series, rates, strict=True):
                 each.append(rate / (k + 1))
         return series
@@ -195,6 +206,17 @@ class _Equations:
             [term / moment for term in terms]
             for terms, moment in zip(series, self._moments, strict=True)
         ]
+
+
+def _turning(q: list[Row], omega: list[Row]) -> Row:
+    """Return half of Hamilton's product with (0, omega), each a Cauchy product."""
+    (a, b, c, d), (x, y, z) = q, omega
+    return [
+        (-_product(b, x) - _product(c, y) - _product(d, z)) / 2,
+        (_product(a, x) + _product(c, z) - _product(d, y)) / 2,
+        (_product(a, y) + _product(d, x) - _product(b, z)) / 2,
+        (_product(a, z) + _product(b, y) - _product(c, x)) / 2,
+    ]
 
 
 def _product(x: Row, reversed_y: Row) -> Decimal:

@@ -8,7 +8,7 @@ judges: exact coefficients, other arithmetic, other steps.
 import decimal
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 import numpy as np
@@ -38,6 +38,13 @@ class Reference:
     # shape (n, 3); what rounding took from omega (rad/s): `omega` and it together have twice the
     # digits.
     remainder: Array | None = None
+    attitude: Array | None = None  # shape (n, 4), of length 1; where the scene has one
+    angle_estimate: float = 0.0  # estimated error of any attitude before rounding (rad)
+
+    @property
+    def angle_error(self) -> float:
+        """Bound of the error of any attitude (rad): the estimate, and what rounding turns."""
+        return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
@@ -59,8 +66,9 @@ def reference(
     digits than binary64 has, or, to be `precise`, to 1e-25 before rounding where the motion itself
     allows it. Its error is estimated by the largest difference of two series of different order
     and step. `effort` is a factor on some ten seconds of work, beyond which the pace of the
-    first steps ends the rest; without it 100 000 steps are taken. InputError where the times do
-    not lead away from 0, or the series needs too many steps.
+    first steps ends the rest; without it 100 000 steps are taken. A scene with an attitude gives
+    attitudes, always by the series. InputError where the times do not lead away from 0, or the
+    series needs too many steps.
     """
     away = [abs(t) for t in times]
     one_side = min(times) >= 0.0 or max(times) <= 0.0
@@ -71,7 +79,7 @@ def reference(
         context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
         exact = [Decimal(t) for t in times]
         known = known_solution(scene, exact)
-        if known is not None and not velocity:
+        if known is not None and not velocity and scene.attitude is None:
             largest = max(abs(x) for row in known for x in (*row, *map(Decimal, scene.omega)))
             estimate = min(Decimal(1), largest).scaleb(3 - DIGITS)
             return _rounded(times, known, None, "known solution", estimate)
@@ -81,13 +89,18 @@ def reference(
         second = taylor_series(scene, coefficients, exact, velocity, *fine, effort)
         rows = min(len(first), len(second))
         omega = [row[:3] for row in second[:rows]]
-        estimate = _largest_difference(first[:rows], omega)
-        speed = [row[3:] for row in second[:rows]] if velocity else None
+        estimate = _largest_difference([row[:3] for row in first[:rows]], omega)
+        speed = [row[3:6] for row in second[:rows]] if velocity else None
         source = f"Taylor series in {DIGITS}-digit arithmetic"
         if known is not None:
             estimate = max(estimate, _largest_difference(known[:rows], omega))
             omega, source = known[:rows], "known solution"
-        return _rounded(times[:rows], omega, speed, source, estimate)
+        found = _rounded(times[:rows], omega, speed, source, estimate)
+        if scene.attitude is None:
+            return found
+        turned, coarser = ([_unit(row[-4:]) for row in each[:rows]] for each in (second, first))
+        angle = float(4 * _largest_difference(coarser, turned))
+        return replace(found, attitude=_array(turned, 4), angle_estimate=angle)
 
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
@@ -168,6 +181,15 @@ def exact_coefficients(scene: Scene) -> Row:
     return [(i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3]
 
 
+def _unit(row: Row) -> Row:
+    length = sum((x * x for x in row), Decimal(0)).sqrt()
+    return [x / length for x in row]
+
+
+def _array(rows: Sequence[Row], width: int = 3) -> Array:
+    return np.array([[float(x) for x in row] for row in rows]).reshape(-1, width)
+
+
 def _largest_difference(first: Sequence[Row], second: Sequence[Row]) -> Decimal:
     pairs = zip(itertools.chain(*first), itertools.chain(*second), strict=True)
     return max((abs(x - y) for x, y in pairs), default=Decimal(0))
@@ -180,14 +202,11 @@ def _rounded(
     source: str,
     estimate: Decimal,
 ) -> Reference:
-    def array(rows: Sequence[Row]) -> Array:
-        return np.array([[float(x) for x in row] for row in rows]).reshape(-1, 3)
-
     return Reference(
         time=np.array(times, dtype=float),
-        omega=array(omega),
-        velocity=None if velocity is None else array(velocity),
+        omega=_array(omega),
+        velocity=None if velocity is None else _array(velocity),
         source=source,
         estimate=float(estimate),
-        remainder=array([[x - Decimal(float(x)) for x in row] for row in omega]),
+        remainder=_array([[x - Decimal(float(x)) for x in row] for row in omega]),
     )

@@ -1,8 +1,8 @@
 module space_torque
   !! Torque about the axes of space: a joint Taylor series of omega and the attitude q,
   !! omega' = (A w2 w3, ...) + (R(q)**T N(t))/I, q' = q (0, omega)/2. A term holds the power of the
-  !! step in it. Two marches, the second to a finer local tolerance: what they differ by is the error
-  !! of the first, and the second's rows are handed over.
+  !! step in it. Two marches, the second to a finer local tolerance: what they differ by is the
+  !! error of the first, and the second's rows are handed over.
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -90,7 +90,8 @@ contains
       return
     end if
     status = GAVE_UP
-    allocate (before(3, n_times), before_q(4, n_times), stat=failed)
+    allocate (before(3, n_times), stat=failed)
+    if (failed == 0) allocate (before_q(4, n_times), stat=failed)
     if (failed /= 0) return
     call plan(problem, ratios, omega, tolerance, times(n_times), share, h)
     cost = 1.0_dp + A_WAVE*real(problem%n_sines + problem%n_cosines, dp)

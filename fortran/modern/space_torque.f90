@@ -118,8 +118,8 @@ contains
       next = FINER*share
       if (marches > 1) next = min(next, SAFETY*share_before*(tolerance/error))
       last = now
-      before = rows
-      before_q = attitudes(:, 1:)
+      before(:, :) = rows
+      before_q(:, :) = attitudes(:, 1:)
       share_before = share
       share = max(LEAST_SHARE, next)
     end do

@@ -57,7 +57,8 @@ def solve(
     -------
     Trajectory
         One row per time, in the order of `times`; fewer where the solution overflows: those between
-        0 and the overflow, on either side. Steps and evaluations are of both sides together.
+        0 and the overflow, on either side. Steps and evaluations are of both sides together. Under
+        a torque about the axes of space `error` is what two marches differ by, `growth` None.
 
     Raises
     ------

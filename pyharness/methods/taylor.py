@@ -19,7 +19,9 @@ def taylor(
     """Solve a scene by Taylor series, each counted as one evaluation.
 
     With the attitude, where the scene has one. Steps are those of the last march, evaluations those
-    of all: a second one is made where the first erred too much.
+    of all: a second one is made where the first erred too much. Under a torque about the axes of
+    space there are always two, the second to a finer local tolerance: what they differ by is the
+    error, that of the first, and the growth is not known.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The attitude at time 0, and then a column for each time.

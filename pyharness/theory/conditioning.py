@@ -48,6 +48,10 @@ class Conditioning:
         # What is no number allows nothing.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
+    def angle(self, time: float) -> float:
+        """Return the error of an attitude at `time` (s) if omega errs as much all the way (rad)."""
+        return self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
+
 
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Follow the linearised flow along the solution from 0 to `time` (s).

@@ -8,6 +8,7 @@ from itertools import chain
 
 from pyharness.compare.checks import Check
 from pyharness.model.errors import InputError
+from pyharness.verify.attitudes import attitudes, random_attitudes
 from pyharness.verify.decks import decks
 from pyharness.verify.external import external_checks
 from pyharness.verify.external_file import problems
@@ -44,11 +45,15 @@ KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
     # Modern methods against the reference, within the tolerance that they were given.
     "methods": methods,
     "prepared": prepared,
+    # Where the body points, against the reference: cases, prepared solvers, random scenes.
+    "attitudes": attitudes,
     # Corrected programs against `solve_ivp`, fixed-step methods against the reference: the power
     # with which the error falls as the step is halved.
     "orders": orders,
     # All of these in scenes drawn from a seed, half of them nasty.
-    "random": lambda chosen: chain(random_programs(chosen), random_methods(chosen)),
+    "random": lambda chosen: chain(
+        random_programs(chosen), random_methods(chosen), random_attitudes(chosen)
+    ),
     # Published figures that nobody here computed.
     "external": _external,
     # Trajectories as they were recorded.

@@ -17,6 +17,9 @@ from pyharness.methods.closed_form import known_solution
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
+from pyharness.stress.trials.separatrix import quarter
+from pyharness.truth.elliptic import torque_free
+from pyharness.truth.free_attitude import free_attitude
 from tests.attitude_errors import KINDS, Motion, draw, errors, largest_error
 from tests.exact_attitude import exact, joint
 
@@ -256,3 +259,18 @@ def test_errors_are_found() -> None:
     assert largest_error(found, wanted) < 1.2e-16
     found[2] += 1e-13
     assert largest_error(found, wanted) > 9e-14
+
+
+@pytest.mark.parametrize("power", [1, 4, 7, 9, 14, 15])
+def test_flips_beside_the_separatrix_are_where_they_are(power: int) -> None:
+    """The start of a flip is 35 of its radians away: a phase of one word would miss it by 1e-14."""
+    omega = (10.0**-power, 1.0, 0.0)
+    scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=(0.5, -0.1, 0.7, 0.5))
+    time = quarter(10.0**-power)
+    for far in (time, 9.0 * time):
+        found = known_solution(scene, [far], 1.0)
+        assert found.attitude is not None
+        wanted = [float(x) for x in free_attitude(scene, far)]
+        assert found.attitude[0] == pytest.approx(wanted, abs=8e-16)
+        wanted = [float(x) for x in torque_free(scene, far)]
+        assert found.omega[0] == pytest.approx(wanted, abs=8e-16)

@@ -18,6 +18,7 @@ import numpy as np
 
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
+from pyharness.model.attitude import product
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
@@ -44,6 +45,9 @@ _END = "pyharness.compare.candidates.Candidate.end"
 _NEAR_SEPARATRIX = "pyharness.stress.trials.separatrix.run_method"
 _HELD = "pyharness.stress.hold.run_method"
 _TURNED = "pyharness.stress.trials.invariance"
+_ATTITUDES = "pyharness.verify.attitudes.solve"
+_TURNING = "pyharness.stress.trials.attitude.solve"
+_PREPARED = "pyharness.methods.prepared_attitude.AttitudeSolver.__call__"
 _REGIONS = "pyharness.stress.trials.regions"
 _STEPS = "pyharness.stress.trials.step_size"
 _MATRICES = "pyharness.stress.trials.matrices"
@@ -90,6 +94,30 @@ def off(found: Any, size: float) -> Any:
     return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
 
 
+def turned_off(found: Any, size: float, along: bool = False) -> Any:
+    """Turn every attitude by so many radians, across the angular momentum or along it."""
+    if isinstance(found, tuple):
+        omega, attitude = found
+        return omega, _turned(attitude[None, :], np.array([[0.48, 0.64, -0.6]]), size)[0]
+    axes = found.angular_momentum()
+    axes = axes if along else np.cross(axes, [1.0, 2.0, 3.0])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    return replace(found, attitude=_turned(found.attitude, axes, size))
+
+
+def _turned(attitude: Array, axes: Array, size: float) -> Array:
+    x, y, z = math.sin(0.5 * size) * axes.T
+    a, b, c, d = attitude.T
+    turn = np.full(len(attitude), math.cos(0.5 * size)), x, y, z
+    return np.array(product((a, b, c, d), turn)).T  # type: ignore[arg-type]
+
+
+def longer(found: Trajectory, size: float) -> Trajectory:
+    """Let quaternions be longer than 1."""
+    assert found.attitude is not None
+    return replace(found, attitude=found.attitude * (1.0 + size))
+
+
 def last_off(found: Trajectory, size: float) -> Trajectory:
     """As `off`, in the last row alone."""
     return replace(found, omega=np.vstack([found.omega[:-1], off(found.omega[-1:], size)]))
@@ -102,6 +130,11 @@ def bit_off(found: Any, size: float, name: str = "omega") -> Any:
     changed = found.copy()
     changed[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
     return changed
+
+
+def degrees_off(found: Array, size: float) -> Array:
+    """Let the first angle be off by so many radians."""
+    return found + np.array([math.degrees(size), 0.0, 0.0])
 
 
 def counted_off(name: str) -> Callable[[Any, float], Any]:
@@ -271,10 +304,12 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Plant) ->
 
 
 def form_for_all(
-    size: float, scene: Scene, times: Sequence[float], name: str, *rest: Any
+    size: float, scene: Scene, times: Sequence[float], name: str, *rest: Any, **named: Any
 ) -> Trajectory:
     """Solve by a closed form, or what stands for it where there is none."""
-    return solved(0.0, scene, times) if size else solve(scene, times, name, *rest)
+    if size:
+        return solve(scene, times, "taylor", 1e-15, **named)
+    return solve(scene, times, name, *rest, **named)
 
 
 def other_library() -> AbstractContextManager[Any]:
@@ -408,6 +443,19 @@ VERIFY = (
         for name in ("auto", "taylor", "quick", "closed-form")
         for end in (3, -1)
     ),
+    # The tolerance of an angle, in radians.
+    *(
+        near(f"attitudes/{name}/case-{_with_form(name)}/1.0e-06", on(_ATTITUDES, turned_off), 1e-6)
+        for name in ("auto", "taylor", "closed-form", "dop853", "lsoda")
+    ),
+    exact("attitudes/taylor/case-5/1.0e-06", refuses(_ATTITUDES)),
+    exact("attitudes/closed-form/case-5/1.0e-06",
+          made_by(_ATTITUDES, form_for_all)),
+    exact("attitudes/taylor/case-5/1.0e-06", on(_ATTITUDES, ended)),
+    near("attitudes/prepared-taylor/case-5/-1/1.0e-06", on(_PREPARED, turned_off), 1e-6),
+    near("attitudes/prepared-auto/case-4/3/1.0e-06", on(_PREPARED, turned_off), 1e-6),
+    near("random/0/attitude-taylor", on(_ATTITUDES, turned_off), 2.65e-7),
+    near("random/0/attitude-prepared", on(_PREPARED, turned_off), 2.65e-7),
     exact("prepared/quick/case-5/1/1.0e-06", on(_ANSWERED, partial(ended, why="gave up"))),
     *(
         exact(f"prepared/{name}/case-5/bits", on(_ANSWERED, bit_off), ULP)
@@ -550,6 +598,29 @@ STRESS = (
     near("invariance/taylor/back/free/1e-06", on(_FREE, off, call=2), 8.6e-6),
     # Four pieces, each amplified by those that follow, against one.
     near("invariance/taylor/split/free/1e-06", on(_FREE, off, call=5), 1.8e-5),
+    # 40 roundings, at any time; of the angular momentum those of omega too, 16 times the largest
+    # over the norm.
+    near("attitude/closed-form/plate/1e-14/angle", on(_TURNING, turned_off), 40.0 * U),
+    near("attitude/closed-form/revolutions-1000000/tumbling/angle",
+         on(_TURNING, turned_off), 40.0 * U),
+    near("attitude/closed-form/plate/1e-14/length", on(_TURNING, longer), 8.0 * U),
+    near("attitude/closed-form/plate/1e-14/momentum", on(_TURNING, turned_off), 78.0 * U),
+    near("attitude/taylor/plate/1e-06/angle", on(_TURNING, turned_off), 1e-6),
+    near("attitude/dop853/needle/1e-06/angle", on(_TURNING, turned_off), 1e-6),
+    exact("attitude/taylor/plate/1e-06/angle", refuses(_TURNING)),
+    # 2 E T/L is 37 rad here, and 8 roundings of it and of a turn beside those of the attitude.
+    near("attitude/closed-form/montgomery/random-0",
+         on(_TURNING, partial(turned_off, along=True)), 3.7e-14),
+    # Two attitudes.
+    near("attitude/closed-form/cyclic/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
+    near("attitude/closed-form/half-turn/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
+    near("attitude/closed-form/space/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
+    # What the way there errs in omega, 16 roundings that the way may amplify, turns the way back.
+    near("attitude/closed-form/back/random-0", on(_TURNING, turned_off, call=2), 3.9e-12),
+    near("attitude/angles/3-1-3/1", on("pyharness.stress.trials.attitude.angles", degrees_off),
+         64.0 * U),
+    near("attitude/angles/3-2-1/pole", on("pyharness.stress.trials.attitude.angles", degrees_off),
+         64.0 * U),
     exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
     exact("matrices/two-term/1e-02/bits", linear(bit_off), ULP),
     # 3n roundings of a sum; carried by the inverse.

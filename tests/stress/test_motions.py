@@ -36,6 +36,7 @@ def test_the_axial_top_is_the_reference() -> None:
         "torque/closed-form,torque/runge-kutta/axial-1e6",
         "length/closed-form,length/dop853,length/two-term/case-4/corrected",
         "invariance/taylor,invariance/gauss-4,invariance/runge-kutta,invariance/quick",
+        "attitude/closed-form/montgomery,attitude/auto/needle,attitude/taylor/space,attitude/angles",
         "threads/taylor,threads/prepared-auto,threads/refusals,threads/two-term",
     ],
 )

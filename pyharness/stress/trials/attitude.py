@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from pyharness.model.turned_scenes import turned
 from pyharness.stress.hold import LINEAR, MIDDLING, in_steps
 from pyharness.stress.run import Attempt, Trial, bounded, described, in_turn, replay
 from pyharness.stress.trials import separatrix
-from pyharness.theory.conditioning import ROUNDING, conditioning
+from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.theory.promises import may_refuse
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
@@ -81,16 +81,44 @@ TURNS = {
 }
 
 
+@dataclass(frozen=True)
+class Known:
+    """A scene and a time (s), and what is known of it, each computed once where it is asked for."""
+
+    scene: Scene
+    time: float
+
+    @cached_property
+    def truth(self) -> Array:
+        """The attitude."""
+        return np.array([float(x) for x in free_attitude(self.scene, self.time)])
+
+    @cached_property
+    def flow(self) -> Conditioning:
+        """What the flow makes of small errors until then."""
+        return conditioning(self.scene, self.time)
+
+    def limit(self, name: str, tolerance: float) -> float:
+        """Return the largest error of an angle that a method may have (rad)."""
+        if name in _FORMS:
+            return _VALUE
+        growth = self.flow.amplification
+        kept = tolerance * (growth if growth > _LIVELY else 1.0)
+        return kept + self.flow.angle(self.time) + _VALUE
+
+
 def _attempts() -> Iterator[Attempt]:
     for circumstance, scene, time in circumstances():
+        known = Known(scene, time)
         for name in (*_FORMS, *_SERIES):
             for tolerance in _TOLERANCES.get(name, (METHODS["closed-form"].finest,)):
-                make = partial(_held, scene, time, name, tolerance)
+                make = partial(_held, known, name, tolerance)
                 yield Attempt(f"{name}/{circumstance}/{tolerance:.0e}", make, scene)
     for motion, scene in _MOTIONS.items():
         turn = 2.0 * math.pi / max(map(abs, scene.omega))
         for k in range(2, 13):
-            make = partial(_held, scene, 10.0 ** (0.5 * k) * turn, "closed-form", 1e-14)
+            known = Known(scene, 10.0 ** (0.5 * k) * turn)
+            make = partial(_held, known, "closed-form", METHODS["closed-form"].finest)
             yield Attempt(f"closed-form/revolutions-{10.0 ** (0.5 * k):.0f}/{motion}", make, scene)
     for number in range(_BODIES):
         scene = _random_scene(number)
@@ -138,8 +166,9 @@ def _random_scene(number: int) -> Scene:
     return Scene(f"random-{number}", (x, y, z), moments=moments, attitude=attitude)
 
 
-def _held(scene: Scene, time: float, name: str, tolerance: float, id: str) -> Iterator[Check]:
+def _held(known: Known, name: str, tolerance: float, id: str) -> Iterator[Check]:
     """Hold a method's angle to the truth, and what the motion conserves to the same limit."""
+    scene, time = known.scene, known.time
     try:
         found = solve(scene, [time], name, tolerance, attitude=True)
     except InputError as refusal:
@@ -147,10 +176,9 @@ def _held(scene: Scene, time: float, name: str, tolerance: float, id: str) -> It
         yield Check(f"{id}/angle", may, None, None, replay(id), f"{REFUSED}{refusal}")
         return
     assert found.attitude is not None
-    wanted = np.array([[float(x) for x in free_attitude(scene, time)]])
-    limit = _limit(scene, time, name, tolerance)
+    limit = known.limit(name, tolerance)
     # Not the angle alone: signs are continuous.
-    apart = 2.0 * float(np.linalg.norm(found.attitude - wanted))
+    apart = 2.0 * float(np.linalg.norm(found.attitude[0] - known.truth))
     if limit > LINEAR:
         yield described(f"{id}/angle", apart, "the flow leaves no two digits")
     else:
@@ -162,17 +190,6 @@ def _held(scene: Scene, time: float, name: str, tolerance: float, id: str) -> It
         # turning takes two products.
         limit = _VALUE + _omega_limit(scene)
         yield bounded(f"{id}/momentum", _momentum_drift(scene, found), limit)
-
-
-def _limit(scene: Scene, time: float, name: str, tolerance: float) -> float:
-    """Return the largest error of an angle that a method may have (rad)."""
-    if name in _FORMS:
-        return _VALUE
-    flow = conditioning(scene, time)
-    kept = tolerance * (flow.amplification if flow.amplification > _LIVELY else 1.0)
-    # An error of omega turns the attitude all the way.
-    radians = math.sqrt(3.0) * flow.largest * abs(time)
-    return kept + flow.rounding * (1.0 + radians) + _VALUE
 
 
 def _omega_limit(scene: Scene) -> float:
@@ -250,7 +267,7 @@ def _turned(scene: Scene, name: str, turn: Turn, id: str) -> Iterator[Check]:
     assert plain is not None
     assert other is not None
     apart = 2.0 * float(np.linalg.norm(turn.back(other) - plain))
-    yield bounded(id, apart, 2.0 * _limit(scene, time, name, tolerance) + 8.0 * ROUNDING)
+    yield bounded(id, apart, 2.0 * Known(scene, time).limit(name, tolerance) + 8.0 * ROUNDING)
 
 
 def _back(scene: Scene, name: str, id: str) -> Iterator[Check]:
@@ -263,11 +280,11 @@ def _back(scene: Scene, name: str, id: str) -> Iterator[Check]:
     start = replace(scene, omega=(x, y, z), attitude=(a, b, c, d))
     again = solve(start, [-time], name, tolerance, attitude=True).attitude
     assert again is not None
-    flow = conditioning(start, -time)
+    forth, back = Known(scene, time), Known(start, -time)
     # What the way there errs in omega turns the way back.
-    errs = conditioning(scene, time).limit(tolerance if name == "taylor" else 16.0 * ROUNDING)
-    turns = errs * flow.amplification * math.sqrt(3.0) * flow.largest * time
-    limit = _limit(scene, time, name, tolerance) + _limit(start, -time, name, tolerance) + turns
+    errs = forth.flow.limit(tolerance if name == "taylor" else 16.0 * ROUNDING)
+    turns = errs * back.flow.amplification * math.sqrt(3.0) * back.flow.largest * time
+    limit = forth.limit(name, tolerance) + back.limit(name, tolerance) + turns
     yield bounded(id, float(angle_between(again, np.array([scene.attitude]))[0]), limit)
 
 

@@ -1,0 +1,50 @@
+"""The truth of the attitude without torque, against series of 200 bits that share nothing."""
+
+import random
+from decimal import Decimal
+
+import mpmath
+import pytest
+
+from pyharness import Scene
+from pyharness.model.scene import Triple
+from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
+from tests.attitude_errors import KINDS, draw
+from tests.exact_attitude import DIGITS, exact
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_attitude_agrees_however_far(kind: str) -> None:
+    source = random.Random(f"truth {kind}")
+    for longest in (1.0, 6.0):
+        moments, omega, attitude, time = draw(source, kind, longest)
+        start = attitude[0], attitude[1], attitude[2], attitude[3]
+        scene = Scene("", tuple(omega), moments=tuple(moments), attitude=start)  # type: ignore[arg-type]
+        found = free_attitude(scene, time)
+        assert scene.attitude is not None
+        _, wanted = exact(moments, omega, scene.attitude, time)
+        with mpmath.workdps(DIGITS):
+            pairs = zip(found, wanted, strict=True)
+            assert max(abs(mpmath.mpf(str(x)) - y) for x, y in pairs) < mpmath.mpf("1e-30")
+
+
+@pytest.mark.parametrize(
+    ("omega", "steady", "endless"),
+    [
+        ((0.0, 1.0, 0.0), True, False),
+        ((0.0, 0.0, 0.0), True, True),
+        ((1e-3, 1.0, 1e-3), False, True),
+        ((1e-3, 1.0, -2e-3), False, False),
+    ],
+)
+def test_separatrix_and_rest_are_told(omega: Triple, steady: bool, endless: bool) -> None:
+    scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=(1.0, 0.0, 0.0, 0.0))
+    assert is_steady(scene) == steady
+    assert (period_of(scene) is None) == (endless or steady)
+    if steady:
+        assert free_attitude(scene, 0.0) == [1, 0, 0, 0]
+    elif not endless:
+        # Beyond a period as within it: the sign goes on.
+        period = period_of(scene) or Decimal(0)
+        near, far = (free_attitude(scene, float(period) * part) for part in (0.999999, 1.000001))
+        assert sum(abs(x - y) for x, y in zip(near, far, strict=True)) < Decimal("1e-3")

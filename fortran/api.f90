@@ -103,6 +103,43 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
                     n_attitudes, attitudes, n_rows, status, steps, effort(2), effort(3:5))
 end subroutine taylor_rows
 
+subroutine space_torque_rows(coefficients, ratios, m_constant, m_rate, n_sines, sines, n_cosines, &
+                             cosines, omega0, n_times, times, tolerance, n_attitudes, attitudes, &
+                             effort, rows, n_rows, status, steps)
+  ! Taylor series under a torque about the axes of space: omega and attitude at times that lead away
+  ! from 0 on one side.
+  !f2py threadsafe
+  use problem, only: problem_t
+  use space_torque, only: space_torque_solve
+  implicit none
+  real(8), intent(in) :: coefficients(3)        ! A, B, C
+  real(8), intent(in) :: ratios(3)              ! the largest moment over each
+  real(8), intent(in) :: m_constant(3)          ! torque over the largest moment, 1/s2
+  real(8), intent(in) :: m_rate(3)              ! 1/s3
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in) :: omega0(3)              ! rad/s
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times)         ! s
+  real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|, and in rad
+  !f2py integer(4), intent(in), check(n_attitudes == n_times) :: n_attitudes
+  integer(4), intent(in) :: n_attitudes         ! n_times
+  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! the first is that at time 0
+  !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
+  real(8), intent(inout) :: effort(5) ! factor on the limits; out: due; error, growth, all steps
+  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
+  integer(4), intent(out) :: n_rows
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up, 6 sensitive
+  integer(8), intent(out) :: steps
+
+  call space_torque_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
+                                    cosines), &
+                          ratios, omega0, tolerance, effort(1), n_times, times, rows, attitudes, &
+                          n_rows, status, steps, effort(2), effort(3:5))
+end subroutine space_torque_rows
+
 subroutine choose_instructions(highest, taken)
   ! For tests: the kernels of one instruction set. 0 plain, 1 AVX2, 2 AVX-512, or the best below.
   use levels, only: choose_level

@@ -27,13 +27,24 @@ def _blocks() -> list[tuple[Path, str, str]]:
 
 
 @pytest.mark.parametrize(("path", "command", "output"), _blocks())
-def test_output_is_current(path: Path, command: str, output: str, printed: Printed) -> None:
+def test_output_is_current(
+    path: Path, command: str, output: str, printed: Printed, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """`python -m tests.test_docs` writes the blocks anew."""
+    monkeypatch.chdir(ROOT)
     assert printed(command.removeprefix("pyharness ")) == output, f"{path.name}: {command}"
 
 
 def test_there_are_commands_to_check() -> None:
     assert len([path for path, _, _ in _blocks() if path.name == "findings.md"]) >= 8
+
+
+def test_scene_files_are_as_shown() -> None:
+    shown = "".join(path.read_text() for path in DOCS)
+    files = list((ROOT / "docs").glob("*.toml"))
+    assert files
+    for path in files:
+        assert f"```toml\n{path.read_text()}```" in shown, path.name
 
 
 def test_links_and_pictures_are_there() -> None:

@@ -88,7 +88,7 @@ def rates(
     """Return the right-hand sides as text; A, B, C are the scene's where none are given."""
     x, y, z = state
     moments = scene.moments or (1.0, 1.0, 1.0)
-    law = scene.torque
+    law = scene.body_torque
     found = []
     for axis, product in enumerate((f"{y} * {z}", f"{x} * {z}", f"{x} * {y}")):
         terms = []

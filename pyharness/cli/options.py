@@ -128,10 +128,13 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
     return only
 
 
-def chosen_scene(options: argparse.Namespace, any_axes: bool = False) -> Scene:
+def chosen_scene(
+    options: argparse.Namespace, any_axes: bool = False, any_torque: bool = False
+) -> Scene:
     """Return the scene asked for; warn where no body has its moments.
 
-    InputError for a full inertia matrix, but with `any_axes`.
+    InputError for a full inertia matrix, but with `any_axes`, and for a torque about the axes of
+    space, but with `any_torque`.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -152,7 +155,7 @@ def chosen_scene(options: argparse.Namespace, any_axes: bool = False) -> Scene:
         changes["steps"] = whole(options.steps, "--steps")
     if abs(scene.attitude_length - 1.0) > NEAR_ONE:
         warn(f"the attitude has the length {scene.attitude_length:.6g}; divided by it")
-    scene = checked_scene(replace(scene, **changes), any_axes)
+    scene = checked_scene(replace(scene, **changes), any_axes, any_torque)
     if scene.is_impossible:
         warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
     return scene

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from pyharness.methods.registry import REGISTRY
+from pyharness.methods.registry import REGISTRY, check_torque
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 
@@ -61,10 +61,14 @@ def plan(
     if not finest <= tolerance <= 1.0:
         place = " for quick" if method == "quick" else ""
         raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
-    form = closed_form(checked_scene(scene))
+    form = closed_form(checked_scene(scene, any_torque=True))
+    # The plan has the attitude where the torque needs it.
+    check_torque(scene, method, attitude=True)
     fallback = None
     if method == "auto":
-        few_digits = tolerance >= (_WAVES_DIGITS if scene.torque.varies else FEW_DIGITS)
+        few_digits = not scene.torque.in_space and tolerance >= (
+            _WAVES_DIGITS if scene.torque.varies else FEW_DIGITS
+        )
         # Runge-Kutta gives the end alone.
         method = "closed-form" if form else EITHER if few_digits and not rows else "taylor"
         # A disturbance of the middle axis may be too faint for a closed form, not for a series.
@@ -103,7 +107,10 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     varies = "the law varies" if law.varies else "constant: read once"
     yield Decision("torque of time", law.varies, varies)
     for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
-        yield Decision(part, wanted, "asked for" if wanted else "not asked for")
+        if part == "attitude" and law.in_space:
+            yield Decision(part, True, "the torque is fixed in space")
+        else:
+            yield Decision(part, wanted, "asked for" if wanted else "not asked for")
     wanted, why = chosen.rows, "rows asked for" if chosen.rows else "only the end"
     if wanted and closed:
         wanted, why = False, "closed form"
@@ -115,6 +122,8 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
 
 def closed_form(scene: Scene) -> str | None:
     """Name the closed form that solves a scene, None where there is none."""
+    if scene.torque.in_space:
+        return None
     a, b, c = scene.euler_coefficients
     if a == b == c == 0.0 and (scene.attitude is None or scene.torque.is_zero):
         return "sphere"
@@ -131,4 +140,6 @@ def closed_form(scene: Scene) -> str | None:
 def _why_no_form(scene: Scene) -> str:
     if scene.torque.is_zero:
         return "its coefficients let it grow without bound"
+    if scene.torque.in_space:
+        return "its torque is fixed in space"
     return "it has torque and is no sphere"

@@ -12,7 +12,7 @@ import numpy as np
 
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
 from pyharness.methods.problem import known, normalized, remainders
-from pyharness.methods.registry import GAUSS
+from pyharness.methods.registry import GAUSS, check_torque
 from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, motion_growth
 from pyharness.model.codes import Methods, Places
 from pyharness.model.effort import checked_effort
@@ -231,7 +231,7 @@ def prepare(
     effort : float
         Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
     attitude : bool
-        Whether calls give the attitude too.
+        Whether calls give the attitude too; a torque about the axes of space needs it.
 
     Raises
     ------
@@ -249,11 +249,12 @@ def prepare(
     >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
     array([-0.958924,  0.283662, 10.      ])
     """
-    checked_scene(scene)
+    checked_scene(scene, any_torque=True)
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     tolerance = tolerance_of(tolerance, FINEST)
     effort = checked_effort(effort)
+    check_torque(scene, method, attitude)
     if attitude:
         from pyharness.methods.prepared_attitude import prepared_attitude
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.methods.plan import Plan, plan
-from pyharness.methods.problem import known, normalized
+from pyharness.methods.problem import known, series_kernel
 from pyharness.methods.registry import REGISTRY
 from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive
 from pyharness.model.attitude import IDENTITY, Quaternion, unit_quaternion
@@ -43,7 +43,7 @@ class AttitudeSolver:
         # Start and time of a closed form, which says how good it is when it is asked.
         self._asked: tuple[Triple, float] | None = None
         self._tolerance, self._effort = tolerance, effort
-        self._normalized = normalized(chosen.scene)
+        self._kernel, self._given = series_kernel(chosen.scene)
 
     @property
     def status(self) -> str:
@@ -105,8 +105,8 @@ class AttitudeSolver:
         joint = np.empty((4, 2), order="F")
         joint[:, 0] = attitude
         work = np.array([self._effort, 0.0, -1.0, -1.0, 0.0])
-        rows, _, status, steps = extension().taylor_rows(
-            *self._normalized,
+        rows, _, status, steps = getattr(extension(), self._kernel)(
+            *self._given,
             start,
             [time],
             self._tolerance,

@@ -9,8 +9,13 @@ import numpy as np
 
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, columns
-from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory
+
+_NOT_FINITE = (
+    "A, B, C or torque over moment is not finite; take moments nearer to each other, or smaller "
+    "torques"
+)
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
@@ -19,8 +24,32 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     A, B, C; torque over moment (1/s2) and its rate (1/s3); sines and cosines, each of shape (4, n):
     columns of amplitude (1/s2) and frequency (rad/s). InputError where one is no number.
     """
-    law = scene.torque
-    moments = np.array(scene.moments or (1.0, 1.0, 1.0))
+    return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
+
+
+def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
+    """Return what the kernel of a torque about the axes of space takes; of a scene with moments.
+
+    A, B, C; the largest moment over each; torque over the largest moment, as in `normalized`.
+    """
+    moments = np.array(scene.moments)
+    largest = moments.max()
+    coefficients, *torque = _over(scene, scene.torque, np.full(3, largest))
+    with np.errstate(over="ignore"):
+        ratios = largest / moments
+    if not np.isfinite(ratios).all():
+        raise InputError(_NOT_FINITE)
+    return coefficients, ratios, *torque
+
+
+def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
+    """Return the name of the kernel that solves a scene by series, and what it takes of it."""
+    if scene.torque.in_space:
+        return "space_torque_rows", normalized_in_space(scene)
+    return "taylor_rows", normalized(scene)
+
+
+def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, Array, Array, Array]:
     # A wave without amplitude has no effect, and would cost its sine and cosine.
     sines, cosines = (
         columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)
@@ -31,10 +60,7 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
         constant, rate = np.array(law.constant) / moments, np.array(law.rate) / moments
     found = np.array(scene.euler_coefficients), constant, rate, sines, cosines
     if not all(np.isfinite(each).all() for each in found):
-        raise InputError(
-            "A, B, C or torque over moment is not finite; take moments nearer to each other, or "
-            "smaller torques"
-        )
+        raise InputError(_NOT_FINITE)
     return found
 
 

@@ -32,6 +32,7 @@ class Method:
     evaluations: int = 0
     any_scale: bool = False  # brings the scene near 1 itself, or forms no products in binary64
     attitude: bool = False  # carries it beside omega, where the scene has one
+    space_torque: bool = False  # with it, takes a torque about the axes of space
     scipy: str = ""  # the name that SciPy has for it; empty where it is ours
 
     @property
@@ -100,6 +101,7 @@ REGISTRY = {
             1e-15,
             _from("solve", "by_plan"),
             attitude=True,
+            space_torque=True,
         ),
         _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),
         _scipy("RK45", "Runge-Kutta 5(4)", "Dormand and Prince 1980"),
@@ -112,6 +114,7 @@ REGISTRY = {
             1e-15,
             _from("taylor", "taylor"),
             attitude=True,
+            space_torque=True,
         ),
         Method(
             "reference",
@@ -152,3 +155,19 @@ FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
 # With the names that SciPy has for them.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
+
+
+def check_torque(scene: Scene, method: str, attitude: bool) -> None:
+    """Refuse a torque about the axes of space where the method, or no attitude, can't take it."""
+    if not scene.torque.in_space:
+        return
+    if not REGISTRY[method].space_torque:
+        able = ", ".join(each.name for each in REGISTRY.values() if each.space_torque)
+        raise InputError(
+            f"method {method} takes no torque about the axes of space; allowed: {able}"
+        )
+    if not attitude:
+        raise InputError(
+            "a torque about the axes of space needs the attitude; give attitude=True, or "
+            "--attitude FORM"
+        )

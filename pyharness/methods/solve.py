@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.methods.plan import plan
-from pyharness.methods.registry import METHODS, SCIPY_METHODS, Method
+from pyharness.methods.registry import METHODS, SCIPY_METHODS, Method, check_torque
 from pyharness.methods.scipy_ivp import finest_tolerance
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
@@ -50,20 +50,22 @@ def solve(
         Factor on the work after which the method gives up: 1 is some ten seconds.
     attitude : bool
         Whether the attitude is wanted too, from that of the scene, or from the axes of space where
-        it has none. The tolerance then holds for its angle (rad) as well.
+        it has none. The tolerance then holds for its angle (rad) as well. A torque about the axes
+        of space needs it.
 
     Returns
     -------
     Trajectory
         One row per time, in the order of `times`; fewer where the solution overflows: those between
-        0 and the overflow, on either side. Steps and evaluations are of both sides together.
+        0 and the overflow, on either side. Steps and evaluations are of both sides together. Under
+        a torque about the axes of space `error` is what two marches differ by, `growth` None.
 
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene or carry its attitude, times out of
-        order, a tolerance that the method can't meet, or one that takes more work than `effort`
-        allows.
+        For an unknown method, one that can't take the scene or carry its attitude, a torque about
+        the axes of space without attitude, times out of order, a tolerance that the method can't
+        meet, or one that takes more work than `effort` allows.
 
     Examples
     --------
@@ -72,7 +74,7 @@ def solve(
     array([[3.5, 3.5, 3.5],
            [6. , 6. , 6. ]])
     """
-    checked_scene(scene, any_axes=True)
+    checked_scene(scene, any_axes=True, any_torque=True)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
@@ -86,6 +88,7 @@ def solve(
         raise InputError(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
+    check_torque(scene, method, attitude)
     if attitude and not chosen.attitude:
         able = ", ".join(each.name for each in METHODS.values() if each.attitude)
         raise InputError(f"method {method} carries no attitude; allowed: {able}")

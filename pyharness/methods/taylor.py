@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.methods.problem import known, normalized, trajectory_of
+from pyharness.methods.problem import known, series_kernel, trajectory_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
@@ -19,15 +19,18 @@ def taylor(
     """Solve a scene by Taylor series, each counted as one evaluation.
 
     With the attitude, where the scene has one. Steps are those of the last march, evaluations those
-    of all: a second one is made where the first erred too much.
+    of all: a second one is made where the first erred too much. Under a torque about the axes of
+    space there are always two, the second to a finer local tolerance: what they differ by is the
+    error, that of the first, and the growth is not known.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The attitude at time 0, and then a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
-    rows, n_rows, status, steps = extension().taylor_rows(
-        *normalized(scene), scene.omega, times, tolerance,
+    kernel, given = series_kernel(scene)
+    rows, n_rows, status, steps = getattr(extension(), kernel)(
+        *given, scene.omega, times, tolerance,
         n_attitudes=n_attitudes, attitudes=joint, effort=work,
     )  # fmt: skip
     if status == GAVE_UP:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pyharness.model.attitude import product
+from pyharness.model.attitude import IDENTITY, product
 from pyharness.model.inertia import principal_axes
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, Trajectory
@@ -14,8 +14,8 @@ from pyharness.model.turned_scenes import turned
 def principal(scene: Scene) -> tuple[Scene, Array]:
     """Return a scene about principal axes, and those, columns of a (3, 3) array.
 
-    Its attitude is that of the principal axes. A scene without a full inertia matrix is returned as
-    it is.
+    Its attitude is that of the principal axes; a torque about the axes of space stays as it is. A
+    scene without a full inertia matrix is returned as it is.
     """
     if scene.inertia is None:
         return scene, np.eye(3)
@@ -26,6 +26,8 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         return first, second, third
 
     attitude = scene.attitude
+    if attitude is None and scene.torque.in_space:
+        attitude = IDENTITY
     if attitude is not None:
         attitude = product(attitude, _quaternion(axes))
     bare = replace(scene, inertia=None, moments=moments, attitude=attitude)

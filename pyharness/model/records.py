@@ -26,6 +26,7 @@ def scene_record(scene: Scene) -> dict[str, Any]:
             "rate": list(scene.torque.rate),
             "sines": [_wave(wave) for wave in scene.torque.sines],
             "cosines": [_wave(wave) for wave in scene.torque.cosines],
+            **({} if scene.torque.frame == "body" else {"frame": scene.torque.frame}),
         },
         "run": {"step_size": scene.step_size, "steps": scene.steps},
     }

@@ -59,6 +59,9 @@ def factor_near_one(scene: Scene, time: float) -> float:
     largest = max(map(abs, scene.omega))
     law = scene.torque
     moments = scene.moments or (1.0, 1.0, 1.0)
+    if law.in_space:
+        # Any axis of the body may come to lie along it.
+        moments = (min(moments),) * 3
     for axis, moment in enumerate(moments):
         # A slow sine never comes to its amplitude.
         waves = sum(abs(a[axis]) * min(1.0, abs(f * time)) for a, f in law.sines)

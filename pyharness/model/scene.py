@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, SupportsIndex
 
 from pyharness.model.attitude import Quaternion, unit_quaternion
-from pyharness.model.errors import InputError, kind_of, printable
+from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.facts import facts
 from pyharness.model.inertia import Matrix, checked_inertia, principal_axes
 from pyharness.model.values import (
@@ -36,25 +36,32 @@ FULL_INERTIA = (
     "the scene has a full inertia matrix, and this takes principal axes; allowed: moments, or the "
     "scene of pyharness.principal"
 )
+FRAMES = ("body", "space")
+SPACE_TORQUE = (
+    "the torque is about the axes of space, and this takes one about those of the body; allowed: "
+    "methods auto and taylor, with the attitude"
+)
 
 
 @dataclass(frozen=True)
 class TorqueLaw:
     """N(t) = constant + rate t + sum of amplitude sin(frequency t) + the same with cos.
 
-    N m for a body of moments; 1/s2, torque over moment, for one of coefficients. Three numbers may
-    be a list, a tuple or an array; the fields are plain tuples of floats.
+    N m for a body of moments; 1/s2, torque over moment, for one of coefficients. `frame` says whose
+    axes its components are about: those of the "body", or of "space", where it stays as the body
+    turns. Three numbers may be a list, a tuple or an array; the fields are plain tuples of floats.
 
     Raises
     ------
     InputError
-        For what is not three finite numbers, or no wave.
+        For what is not three finite numbers, or no wave, or an unknown frame.
     """
 
     constant: Triple = (0.0, 0.0, 0.0)
     rate: Triple = (0.0, 0.0, 0.0)
     sines: tuple[Wave, ...] = ()
     cosines: tuple[Wave, ...] = ()
+    frame: str = "body"
 
     if TYPE_CHECKING:
 
@@ -64,6 +71,7 @@ class TorqueLaw:
             rate: Numbers = ...,
             sines: Waves = ...,
             cosines: Waves = ...,
+            frame: str = "body",
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -72,6 +80,8 @@ class TorqueLaw:
             object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
         for name in ("sines", "cosines"):
             object.__setattr__(self, name, _waves(f"[torque] {name}", getattr(self, name)))
+        if not isinstance(self.frame, str) or self.frame not in FRAMES:
+            raise unknown("frame", self.frame, FRAMES, "[torque] frame")
 
     @property
     def varies(self) -> bool:
@@ -83,6 +93,11 @@ class TorqueLaw:
     def is_zero(self) -> bool:
         """Whether N is zero at all times."""
         return not (self.varies or any(self.constant))
+
+    @property
+    def in_space(self) -> bool:
+        """Whether there is a torque about the axes of space, so that the body's attitude counts."""
+        return self.frame == "space" and not self.is_zero
 
     def at(self, time: float) -> Triple:
         """Return N at `time` (s), the terms added in the order of the definition."""
@@ -174,6 +189,12 @@ class Scene:
             self._set("attitude_length", length)
         if not isinstance(self.torque, TorqueLaw):
             raise InputError(f"[torque] is {kind_of(self.torque)}; it must be a TorqueLaw")
+        if self.torque.in_space and self.coefficients is not None:
+            # Torque over moment would be about axes that turn.
+            raise InputError(
+                "[torque] frame is space, and the body is given by coefficients; allowed: moments "
+                "or inertia"
+            )
         self._set("step_size", number("[run] step_size", self.step_size))
         if not (math.isfinite(self.step_size) and self.step_size > 0.0):
             raise InputError(
@@ -215,13 +236,23 @@ class Scene:
         low, middle, high = sorted(self.moments or principal_axes(self.inertia or ())[0])
         return high > low + middle
 
+    @property
+    def body_torque(self) -> TorqueLaw:
+        """The torque law about the axes of the body; InputError where it is about those of space.
+
+        Whoever makes a motion of the law reads it here.
+        """
+        if self.torque.in_space:
+            raise InputError(SPACE_TORQUE)
+        return self.torque
+
     def times(self) -> list[float]:
         """Return the true times of the results, n h for n = 1 ... steps (s)."""
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
         """Return M = N / I at `time` (1/s2)."""
-        first, second, third = self.torque.at(time)
+        first, second, third = self.body_torque.at(time)
         if self.moments is None:
             return first, second, third
         return first / self.moments[0], second / self.moments[1], third / self.moments[2]
@@ -229,7 +260,7 @@ class Scene:
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
         """Return f(t, omega) of equations 16-18: rad/s2, three plain floats."""
         a, b, c = self.euler_coefficients
-        if self.torque.varies:
+        if self.body_torque.varies:
 
             def varying(time: float, omega: Sequence[float]) -> list[float]:
                 x, y, z = omega
@@ -260,12 +291,14 @@ def _size(steps: int, limit: int) -> str:
     return f"{steps}{size if steps > limit else ''}"
 
 
-def checked_scene(scene: object, any_axes: bool = False) -> Scene:
+def checked_scene(scene: object, any_axes: bool = False, any_torque: bool = False) -> Scene:
     """Return a scene; InputError where it is none, or its axes are not the body's principal ones.
 
-    `any_axes`: it may have a full inertia matrix.
+    `any_axes`: it may have a full inertia matrix; `any_torque`: one about the axes of space.
     """
     if isinstance(scene, Scene):
+        if scene.torque.in_space and not any_torque:
+            raise InputError(SPACE_TORQUE)
         if scene.inertia is not None and not any_axes:
             raise InputError(FULL_INERTIA)
         return scene

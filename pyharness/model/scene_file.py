@@ -17,7 +17,7 @@ _LARGEST_FILE = 1_000_000
 _TABLES = {
     "body": ("moments", "coefficients", "inertia"),
     "initial": ("omega", "attitude", "angles_deg", "sequence"),
-    "torque": ("constant", "rate", "sines", "cosines"),
+    "torque": ("constant", "rate", "sines", "cosines", "frame"),
     "run": ("step_size", "steps"),
 }
 _WAVES = ("sines", "cosines")
@@ -101,6 +101,8 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     if scene.attitude is not None:
         lines.append(f"attitude = {list(scene.attitude)}")
     lines += ["[torque]", f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
+    if law.frame != "body":
+        lines.append(f'frame = "{law.frame}"')
     for name, waves in (("sines", law.sines), ("cosines", law.cosines)):
         each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
         lines.append(f"{name} = [{', '.join(each)}]")

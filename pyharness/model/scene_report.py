@@ -18,6 +18,8 @@ def heading(scene: Scene) -> list[str]:
         body = f"A, B, C = {_tuple(scene.euler_coefficients)}"
     unit = "N m" if scene.coefficients is None else "1/s2"
     torque = f"N = {_law(scene)} {unit}" if not scene.torque.is_zero else "no torque"
+    if scene.torque.in_space:
+        torque += " about the axes of space"
     lines = [
         f"Case {scene.case}: {scene.name}" if scene.case else scene.name,
         f"{body}; {torque}; omega(0) = {_tuple(scene.omega)} rad/s; "

@@ -4,28 +4,42 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from pyharness.model.attitude import Quaternion
+from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
 from pyharness.model.trajectory import Array
 
 
 def turned(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
-    """Return the scene with every vector turned, the body too where it takes part."""
+    """Return the scene with every vector of the body turned, the body too where it takes part.
+
+    A torque about the axes of space stays; the attitude is the caller's.
+    """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
         return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
 
     law = scene.torque
+    if not law.in_space:
+        law = TorqueLaw(turn(law.constant), turn(law.rate), waves(law.sines), waves(law.cosines))
     return replace(
         scene,
         omega=turn(scene.omega),
         moments=turn(scene.moments) if body and scene.moments else scene.moments,
-        torque=TorqueLaw(turn(law.constant), turn(law.rate), waves(law.sines), waves(law.cosines)),
+        torque=law,
     )
 
 
-def shifted(scene: Scene, omega: Array, by: float) -> Scene:
-    """Return the problem that begins at the time `by` (s) with `omega`."""
+def shifted(scene: Scene, omega: Array, by: float, attitude: Quaternion | None = None) -> Scene:
+    """Return the problem that begins at the time `by` (s) with `omega` and `attitude`.
+
+    InputError where a torque about the axes of space takes an attitude and none is given.
+    """
     law = scene.torque
+    if law.in_space and attitude is None:
+        raise InputError(
+            "a torque about the axes of space: begun later, it takes the attitude then"
+        )
     sines: list[Wave] = []
     cosines: list[Wave] = []
 
@@ -44,5 +58,6 @@ def shifted(scene: Scene, omega: Array, by: float) -> Scene:
     return replace(
         scene,
         omega=(first, second, third),
-        torque=TorqueLaw(constant, r, tuple(sines), tuple(cosines)),
+        torque=TorqueLaw(constant, r, tuple(sines), tuple(cosines), law.frame),
+        attitude=scene.attitude if attitude is None else attitude,
     )

@@ -46,6 +46,7 @@ def program_arguments(
     if first is None and listing.has("initial-torque"):
         conjectures = listing.conjectures - {"initial-torque"}
         listing = replace(listing, conjectures=conjectures)
+    law = scene.body_torque
     return (
         PROGRAMS.index(listing.program) + 1,
         listing.flags,
@@ -54,12 +55,12 @@ def program_arguments(
         scene.omega,
         scene.masses,
         scene.forces,
-        scene.torque.constant,
-        scene.torque.rate,
+        law.constant,
+        law.rate,
         first or (0.0, 0.0, 0.0),
-        scene.torque.varies,
-        columns(scene.torque.sines),
-        columns(scene.torque.cosines),
+        law.varies,
+        columns(law.sines),
+        columns(law.cosines),
         scene.step_size,
         scene.steps,
         lipschitz,

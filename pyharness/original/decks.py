@@ -210,7 +210,7 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
     if scene.case is None or scene.moments is None:
         raise InputError("a deck holds one of the cases of Table 1; allowed: --case 1 to 7")
     first = facts("cards/alterations")["case"][program]
-    torque = scene.torque.constant
+    torque = scene.body_torque.constant
     for each in facts("printer")["initial_torque"]:
         if each["case"] == scene.case:
             torque = tuple(each["torque"])

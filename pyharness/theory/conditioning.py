@@ -142,7 +142,7 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     products = np.abs(scene.euler_coefficients) * np.abs(
         np.roll(omega, -1, 1) * np.roll(omega, -2, 1)
     )
-    law = scene.torque
+    law = scene.body_torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
     torque = np.abs(law.constant) + np.abs(law.rate) * np.abs(times)[:, None]
     for amplitude, frequency in law.sines + law.cosines:

@@ -73,7 +73,7 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
 
     InputError where the torque varies, or a rotation is beyond binary64.
     """
-    if scene.torque.varies:
+    if scene.body_torque.varies:
         raise InputError(
             "rotations: the torque varies with time, so that no rotation is steady; "
             "allowed: a constant torque, or none"

@@ -18,7 +18,7 @@ DIGITS = 50
 
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     """Return omega of a body with I1 = I2, its torque along axis 3; InputError for any other."""
-    law, moments = scene.torque, scene.moments
+    law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
     if moments is None or moments[0] != moments[1] or any(v[0] or v[1] for v in vectors):
         raise InputError("axial top: allowed are I1 = I2 and torque along axis 3 alone")

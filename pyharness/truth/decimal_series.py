@@ -153,7 +153,7 @@ class _Equations:
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
         self._abc = coefficients
-        self._torque = scene.torque
+        self._torque = scene.body_torque
         self._moments = [Decimal(i) for i in scene.moments or (1, 1, 1)]
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [

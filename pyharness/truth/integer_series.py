@@ -66,7 +66,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
     """Return the largest omega that the start or the torque alone would give."""
-    law = scene.torque
+    law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
         push = abs(Fraction(law.constant[axis])) + abs(Fraction(law.rate[axis])) * span
@@ -167,7 +167,7 @@ class _Equations:
     """Equations 13-15 in units of the time asked for and of omega, as recurrences of terms."""
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
-        law = scene.torque
+        law = scene.body_torque
         moments, products = exact_body(scene)
         push = [span / (moment * unit) for moment in moments]
         self._products = [_fixed(x * span * unit) for x in products]

@@ -115,7 +115,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
     """Return those of the largest number on the way to a known solution, or some more."""
-    law = scene.torque
+    law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega
     sizes = [omega, rate * time]
@@ -154,7 +154,7 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 def _sphere(scene: Scene, t: Decimal) -> Row:
     """Return omega(0) and the integral of the normalized torque."""
-    torque = scene.torque
+    torque = scene.body_torque
     row = []
     for axis in range(3):
         moment = Decimal(1) if scene.moments is None else Decimal(scene.moments[axis])

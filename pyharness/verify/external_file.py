@@ -14,7 +14,7 @@ from typing import Any
 
 from pyharness.model.attitude import IDENTITY, Quaternion, of_angles, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import check_keys, read_toml, scene_of
 from pyharness.model.values import number
 
@@ -130,7 +130,8 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
     for table in ("body", "initial"):
         if table not in data:
             raise InputError(f"[{table}] is missing")
-    scene = scene_of({key: data[key] for key in _SCENE if key in data}, texts["title"])
+    found = scene_of({key: data[key] for key in _SCENE if key in data}, texts["title"])
+    scene = checked_scene(found)
     first, second, third = (w * UNITS[unit] for w in scene.omega)
     entries = data.get("value")
     if not isinstance(entries, list) or not entries:

@@ -35,6 +35,7 @@ def _waves(count: int) -> tuple[Wave, ...]:
 
 DRIVEN = replace(FREE, torque=TorqueLaw(sines=_waves(3)))
 CROWDED = replace(FREE, torque=TorqueLaw(sines=_waves(15_000)))
+IN_SPACE = replace(PUSHED, torque=TorqueLaw((1.0, 2.0, 3.0), frame="space"))
 SPHERE = replace(CROWDED, moments=(40.0, 40.0, 40.0))
 BUSY = replace(FREE, torque=TorqueLaw(cosines=_waves(300)), step_size=1e-6, steps=1_000_000)
 TIMES = [0.001 * n for n in range(1, 50_000)]
@@ -57,6 +58,7 @@ def _linear() -> object:
 LONG: dict[str, Callable[[], object]] = {
     "taylor": _method(PUSHED, "taylor", 1e5),
     "taylor-waves": _method(CROWDED, "taylor", 1e5),
+    "space-torque": lambda: solve(IN_SPACE, [1e5], effort=1e6, attitude=True),
     "quick": _prepared(FREE, "quick", 1e6, 1e-6),
     "quick-waves": _prepared(DRIVEN, "quick", 1e6, 1e-6),
     "prepared-series": _prepared(CROWDED, "auto", 1e6, 1e-12),

@@ -7,8 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene, read_scene
+from pyharness import InputError, Scene, TorqueLaw, case_scene, principal, read_scene
+from pyharness.model.attitude import matrices
+from pyharness.model.records import scene_record
+from pyharness.model.same_motion import scaled
 from pyharness.model.scene import most_steps
+from pyharness.model.scene_file import scene_text
+from pyharness.model.scene_report import heading
+from pyharness.model.turned_scenes import shifted, turned
 
 GOOD = """
 name = "spinning brick"
@@ -53,6 +59,57 @@ def test_only_body_and_initial_are_required(tmp_path: Path) -> None:
     assert (scene.step_size, scene.steps) == (0.01, 100)
     assert scene.torque.is_zero
     assert scene.euler_coefficients == (1.0, 2.0, 3.0)
+
+
+def test_torque_about_the_axes_of_space_is_read_written_and_told(tmp_path: Path) -> None:
+    scene = _read(tmp_path, GOOD.replace("[torque]", '[torque]\nframe = "space"'))
+    assert scene.torque == TorqueLaw(
+        (1, 2, 3), (0, 0, 1), [((1, 0, 0), 100)], [((0, 1, 0), 100)], "space"
+    )
+    assert scene.torque.in_space
+    assert _read(tmp_path, scene_text(scene)) == scene
+    assert scene_record(scene)["torque"]["frame"] == "space"
+    assert "N m about the axes of space; omega(0)" in heading(scene)[1]
+    body = _read(tmp_path, GOOD.replace("[torque]", '[torque]\nframe = "body"'))
+    assert body == _read(tmp_path, GOOD)
+    assert body.body_torque is body.torque
+    assert "frame" not in scene_text(body)
+    assert "frame" not in scene_record(body)["torque"]
+    assert "space" not in heading(body)[1]
+    rest = replace(scene, torque=TorqueLaw(frame="space"))
+    assert "no torque; omega(0)" in heading(rest)[1]
+
+
+def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> None:
+    law = TorqueLaw((1, 2, 3), (0, 0, 1), [((1, 0, 0), 3)], [((0, 1, 0), 4)], "space")
+    scene = Scene("", (1, 2, 3), (4, 5, 6), torque=law, attitude=(0, 1, 0, 0))
+    other = turned(scene, lambda v: (v[1], v[2], v[0]), body=True)
+    assert other == replace(scene, omega=(2, 3, 1), moments=(5, 6, 4))
+    full = Scene("", (1, 2, 3), inertia=((4, 1, 0), (1, 5, 0), (0, 0, 6)), torque=law)
+    about_principal, axes = principal(full)
+    assert about_principal.torque == law
+    # Without a word it starts in the axes of space: its principal axes do not.
+    assert about_principal.attitude is not None
+    assert matrices(np.array([about_principal.attitude]))[0] == pytest.approx(axes)
+    faster = scaled(scene, 4.0).torque
+    assert (faster.frame, faster.constant) == ("space", (16, 32, 48))
+    later = shifted(scene, np.ones(3), 0.5, (0.0, 0.0, 1.0, 0.0))
+    assert later.torque.at(0.25) == pytest.approx(law.at(0.75))
+    assert (later.torque.frame, later.attitude) == ("space", (0.0, 0.0, 1.0, 0.0))
+    with pytest.raises(InputError, match="begun later, it takes the attitude then"):
+        shifted(scene, np.ones(3), 0.5)
+
+
+def test_torque_about_unknown_axes_is_refused(tmp_path: Path) -> None:
+    text = GOOD.replace("[torque]", '[torque]\nframe = "spaec"')
+    told = r"\[torque\] frame: unknown frame 'spaec'; did you mean 'space'\? allowed: body, space"
+    with pytest.raises(InputError, match=told):
+        _read(tmp_path, text)
+    with pytest.raises(InputError, match="frame is a whole number; allowed: body, space"):
+        _read(tmp_path, text.replace('"spaec"', "3"))
+    coefficients = text.replace("spaec", "space").replace("moments", "coefficients")
+    with pytest.raises(InputError, match="frame is space, and the body is given by coefficients"):
+        _read(tmp_path, coefficients)
 
 
 BODY = "[body]\nmoments=[3,2,1]\n"

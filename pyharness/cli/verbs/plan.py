@@ -19,7 +19,7 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Show the decisions for a scene."""
-    scene = shared.chosen_scene(options)
+    scene = shared.chosen_scene(options, any_torque=True)
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))
     tolerance = shared.positive(options.tolerance, "--tolerance", 1e-12)

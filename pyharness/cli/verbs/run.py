@@ -34,7 +34,8 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Run and show; 1 where a result is sensitive and that is not to be passed over."""
-    scene = shared.chosen_scene(options, any_axes=options.method is not None)
+    by_method = options.method is not None
+    scene = shared.chosen_scene(options, any_axes=by_method, any_torque=by_method)
     if (options.program is None) == (options.method is None):
         from pyharness.methods.registry import METHODS
 

@@ -188,7 +188,7 @@ def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
 
 def _torque(scene: Scene, times: Array) -> Array:
     """Return the normalized torque at many times, shape (..., 3); one for all if constant."""
-    law = scene.torque
+    law = scene.body_torque
     torque = np.array(law.constant)
     if law.varies:
         t = times[..., None]

@@ -311,12 +311,12 @@ def _angles(sequence: str, off: float, id: str) -> Iterator[Check]:
 
 def _product(q: Array, by: Quaternion) -> Array:
     a, b, c, d = q.T
-    return np.array(product((a, b, c, d), by)).T  # type: ignore[arg-type]
+    return np.array(product((a, b, c, d), by)).T
 
 
 def _from_left(by: Quaternion, q: Array) -> Array:
     a, b, c, d = q.T
-    return np.array(product(by, (a, b, c, d))).T  # type: ignore[arg-type]
+    return np.array(product(by, (a, b, c, d))).T
 
 
 TRIAL = Trial(

@@ -1,0 +1,384 @@
+"""Torque about the axes of space: against other integrators, and what it does to the momentum."""
+
+import pickle
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from pyharness import (
+    InputError,
+    Scene,
+    TorqueLaw,
+    case_scene,
+    compare_programs,
+    prepare,
+    run_program,
+    solve,
+)
+from pyharness.compare.random_scenes import draw
+from pyharness.methods.plan import plan
+from pyharness.methods.prepared import PREPARED
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import METHODS
+from pyharness.methods.sensitivity import motion_growth
+from pyharness.model.attitude import IDENTITY, angle_between
+from pyharness.model.inertia import principal_axes
+from pyharness.model.listing import corrected
+from pyharness.model.trajectory import Array, turned_to_space
+from pyharness.theory.conditioning import along
+from pyharness.theory.rotations import steady_rotations
+from pyharness.truth.integer_series import integer_series
+from pyharness.truth.reference import reference
+
+TURNED = (0.5, -0.1, 0.7, 0.5)
+BODY = (40.0, 30.0, 20.0)
+WAVES = TorqueLaw(
+    (1.0, -2.0, 3.0),
+    (0.5, 1.0, -2.0),
+    [((5.0, 2.0, 0.0), 3.0), ((0.0, 4.0, 8.0), -11.0)],
+    [((-3.0, 6.0, 2.0), 1.7)],
+    frame="space",
+)
+SCENES = {
+    "constant": Scene("", (0, 1, 1), BODY, torque=TorqueLaw((3, 0, 10), frame="space")),
+    "ramp": Scene("", (0, 0, 0), BODY, torque=TorqueLaw(rate=(3, -9, 10), frame="space")),
+    "waves": Scene("", (0.3, -1, 2), BODY, torque=WAVES, attitude=TURNED),
+    "top": Scene("", (0.3, -1, 2), (30, 30, 20), torque=WAVES, attitude=TURNED),
+    "sphere": Scene("", (0.3, -1, 2), (30, 30, 30), torque=WAVES, attitude=TURNED),
+    "full": Scene(
+        "", (0.3, -1, 2), torque=WAVES, inertia=((40, 3, 0), (3, 30, 1), (0, 1, 20)),
+        attitude=TURNED,
+    ),
+    "full, axes of space": Scene(
+        "", (0.3, -1, 2), torque=WAVES, inertia=((40, 3, 0), (3, 30, 1), (0, 1, 20))
+    ),
+}  # fmt: skip
+PUSHED = SCENES["constant"]
+
+
+def matrix(scene: Scene) -> Array:
+    """Return the matrix of inertia."""
+    return np.array(scene.inertia) if scene.inertia is not None else np.diag(scene.moments or ())
+
+
+def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
+    """Return omega and attitude by DOP853 on seven unknowns, with SciPy's own rotations."""
+    inertia = matrix(scene)
+
+    def rates(t: float, y: Array) -> Array:
+        omega, q = y[:3], y[3:]
+        push = Rotation.from_quat(q, scalar_first=True).inv().apply(scene.torque.at(t))
+        turned = np.linalg.solve(inertia, push - np.cross(omega, inertia @ omega))
+        rest = q[0] * omega + np.cross(q[1:], omega)
+        return np.concatenate([turned, [-0.5 * q[1:] @ omega], 0.5 * rest])
+
+    start = [*scene.omega, *(scene.attitude or IDENTITY)]
+    found = solve_ivp(rates, (0.0, times[-1]), start, "DOP853", times, rtol=3e-14, atol=1e-14).y.T
+    return found[:, :3], found[:, 3:]
+
+
+def momentum(scene: Scene, times: Array) -> Array:
+    """Return the momentum in space, which the torque alone changes, at times (s)."""
+    start = matrix(scene) @ np.array(scene.omega)
+    law, t = scene.torque, times[:, None]
+    attitude = np.array([scene.attitude or IDENTITY])
+    found = turned_to_space(attitude, start[None]) + t * law.constant + t * t / 2.0 * law.rate
+    for amplitude, frequency in law.sines:
+        found = found + 2.0 * np.sin(frequency * t / 2.0) ** 2 / frequency * amplitude
+    for amplitude, frequency in law.cosines:
+        found = found + np.sin(frequency * t) / frequency * amplitude
+    return np.asarray(found)
+
+
+@pytest.mark.parametrize("time", [3.0, -3.0])
+@pytest.mark.parametrize("name", SCENES)
+def test_series_agrees_with_seven_unknowns(name: str, time: float) -> None:
+    times = [0.1 * time, 0.5 * time, time]
+    found = solve(SCENES[name], times, "taylor", 1e-12, attitude=True)
+    assert found.attitude is not None
+    omega, attitude = by_scipy(SCENES[name], times)
+    assert np.abs(found.omega - omega).max() < 2e-12 * np.abs(omega).max()
+    # The signs too: they are continuous.
+    assert np.abs(found.attitude - attitude).max() < 2e-12
+    assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_momentum_in_space_is_what_torque_made_of_it(name: str) -> None:
+    times = np.linspace(-8.0, 8.0, 33)
+    found = solve(SCENES[name], times.tolist(), tolerance=1e-13, attitude=True)
+    true = momentum(SCENES[name], times)
+    assert np.abs(found.angular_momentum("space") - true).max() < 1e-13 * np.abs(true).max()
+
+
+def test_momentum_on_random_scenes() -> None:
+    ways = []
+    for number in range(0, 200, 2):
+        drawn = draw("space torque", number)
+        scene = drawn.scene
+        if scene.moments is None or scene.torque.is_zero:
+            continue
+        scene = replace(scene, torque=replace(scene.torque, frame="space"), attitude=TURNED)
+        found = solve(scene, [drawn.time], tolerance=1e-13, attitude=True)
+        true = momentum(scene, np.array([drawn.time]))
+        # A wave's angle may be rounded.
+        error = np.abs(found.angular_momentum("space") - true).max()
+        largest = max(np.abs(true).max(), np.abs(momentum(scene, np.zeros(1))).max())
+        ways.append(error / largest)
+    assert len(ways) > 50
+    assert max(ways) < 1e-12
+
+
+def test_energy_is_the_work_of_the_torque() -> None:
+    scene = SCENES["waves"]
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    times = 1.0 + nodes
+    found = solve(scene, [0.0, *times, 2.0], tolerance=1e-13, attitude=True)
+    assert found.attitude is not None
+    omega = turned_to_space(found.attitude, found.omega)[1:-1]
+    torque = np.array([scene.torque.at(t) for t in times])
+    energy = found.energy()
+    assert energy[-1] - energy[0] == pytest.approx(weights @ (torque * omega).sum(1), rel=1e-12)
+
+
+def test_sphere_turns_in_space_as_its_momentum_does() -> None:
+    times = np.linspace(0.5, 20.0, 20)
+    found = solve(SCENES["sphere"], times.tolist(), tolerance=1e-13, attitude=True)
+    assert found.attitude is not None
+    omega = turned_to_space(found.attitude, found.omega)
+    assert omega == pytest.approx(momentum(SCENES["sphere"], times) / 30.0, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_torque_along_the_axis_of_a_spin_is_one_of_the_body(axis: int) -> None:
+    along = np.eye(3)[axis]
+    law = TorqueLaw(3.0 * along, along, [(2.0 * along, 3.0)])
+    scene = Scene("", 2.0 * along, BODY, torque=law)
+    body = solve(scene, [1.0, 3.0], tolerance=1e-13, attitude=True)
+    space = solve(
+        replace(scene, torque=replace(law, frame="space")), [1.0, 3.0], tolerance=1e-13,
+        attitude=True,
+    )  # fmt: skip
+    assert body.attitude is not None
+    assert space.attitude is not None
+    # About the middle axis what rounding leaves grows.
+    assert space.omega == pytest.approx(body.omega, rel=1e-12, abs=1e-12)
+    assert angle_between(space.attitude, body.attitude).max() < 1e-12
+
+
+def test_another_axis_of_space_is_another_motion() -> None:
+    body = replace(PUSHED, torque=replace(PUSHED.torque, frame="body"))
+    found = [solve(each, [2.0], attitude=True).omega for each in (PUSHED, body)]
+    assert np.abs(found[0] - found[1]).max() > 0.1
+
+
+def test_tolerance_holds_on_random_scenes() -> None:
+    held = 0
+    ratios = []
+    for number in range(1500):
+        drawn = draw("attitude", number)
+        if drawn.scene.moments is None or drawn.scene.torque.is_zero:
+            continue
+        law = replace(drawn.scene.torque, frame="space")
+        scene, times = replace(drawn.scene, torque=law), [0.4 * drawn.time, drawn.time]
+        try:
+            true = solve(scene, times, "taylor", 1e-15, attitude=True)
+        except InputError:
+            assert drawn.scene.name == "extreme"
+            continue
+        if not true.has_all_rows:
+            assert drawn.scene.name == "extreme"
+            continue
+        held += 1
+        assert true.attitude is not None
+        largest = max(np.abs(true.omega).max(), max(map(abs, scene.omega)))
+        for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
+            found = solve(scene, times, "auto", tolerance, attitude=True)
+            assert found.attitude is not None
+            error = max(
+                np.abs(found.omega - true.omega).max() / largest,
+                angle_between(found.attitude, true.attitude).max(),
+            )
+            # Between two marches as fine as can be there is what rounding has become.
+            assert error <= tolerance + 10.0 * (true.error or 0.0), (number, tolerance)
+            ratios.append(error / ((found.error or 0.0) + (true.error or 0.0)))
+    assert held > 900
+    # Two marches may err alike, here far below the tolerance.
+    assert max(ratios) < 10.0
+    assert sorted(ratios)[len(ratios) * 99 // 100] < 1.0
+    assert sorted(ratios)[len(ratios) // 2] < 0.2
+
+
+def test_tolerance_is_no_finer_than_asked_for() -> None:
+    evaluations = [
+        solve(SCENES["waves"], [10.0], "taylor", tolerance, attitude=True).evaluations
+        for tolerance in (1e-3, 1e-6, 1e-9, 1e-12)
+    ]
+    steps = [
+        solve(SCENES["waves"], [10.0], "taylor", tolerance, attitude=True).steps
+        for tolerance in (1e-3, 1e-6, 1e-9, 1e-12)
+    ]
+    assert max(steps) < 120
+    # Two marches do, or three.
+    assert max(e / s for e, s in zip(evaluations, steps, strict=True)) < 3.5
+
+
+def test_rows_are_those_of_a_solution_each() -> None:
+    scene = SCENES["waves"]
+    times = np.linspace(-2.0, 2.0, 401)
+    found = solve(scene, times.tolist(), tolerance=1e-13, attitude=True)
+    assert found.attitude is not None
+    for row in (0, 37, 200, 211, 400):
+        one = solve(scene, [times[row]], tolerance=1e-13, attitude=True)
+        assert one.attitude is not None
+        assert found.omega[row] == pytest.approx(one.omega[0], abs=1e-12)
+        assert found.attitude[row] == pytest.approx(one.attitude[0], abs=1e-12)
+    assert (np.einsum("ni,ni->n", found.attitude[1:], found.attitude[:-1]) > 0.99).all()
+    coarse = solve(scene, times.tolist(), tolerance=1e-3, attitude=True)
+    assert coarse.attitude is not None
+    assert np.abs(np.linalg.norm(coarse.attitude, axis=1) - 1.0).max() < 4e-16
+    backward = solve(scene, times[::-1].tolist(), tolerance=1e-13, attitude=True)
+    assert (backward.omega[::-1] == found.omega).all()
+
+
+def test_no_torque_in_space_is_none() -> None:
+    free = case_scene(4)
+    assert free.torque.is_zero
+    for law in (TorqueLaw(frame="space"), TorqueLaw(sines=[((0, 0, 0), 5.0)], frame="space")):
+        same = replace(free, torque=law)
+        assert not law.in_space
+        assert (solve(same, [1.0]).omega == solve(free, [1.0]).omega).all()
+        assert plan(same).method == "closed-form"
+        assert prepare(same)(free.omega, 1.0) == pytest.approx(prepare(free)(free.omega, 1.0))
+
+
+@pytest.mark.parametrize("factor", [2.0**-500, 2.0**-400, 2.0**400, 2.0**500])
+def test_motion_far_from_one_is_the_same(factor: float) -> None:
+    push = factor * factor * np.array(PUSHED.torque.constant)
+    omega = factor * np.array(PUSHED.omega)
+    scene = Scene("", omega, BODY, torque=TorqueLaw(push, frame="space"))
+    wanted, found = solve(PUSHED, [2.0], attitude=True), solve(scene, [2.0 / factor], attitude=True)
+    assert (found.omega / factor == wanted.omega).all()
+    assert found.attitude == pytest.approx(wanted.attitude, abs=1e-15)
+
+
+def test_rest_is_left_by_a_torque_however_small() -> None:
+    law = TorqueLaw((3e-200, 0.0, 1e-201), frame="space")
+    found = solve(replace(PUSHED, omega=(0, 0, 0), torque=law), [1e100], attitude=True)
+    near = solve(
+        replace(PUSHED, omega=(0, 0, 0), torque=TorqueLaw((3.0, 0.0, 0.1), frame="space")), [1.0],
+        attitude=True,
+    )  # fmt: skip
+    assert found.omega * 1e100 == pytest.approx(near.omega, rel=1e-11)
+
+
+def test_what_rounding_has_become_is_told() -> None:
+    found = solve(PUSHED, [1000.0], attitude=True)
+    assert found.ended == "sensitive"
+    assert found.error is not None
+    assert found.error > 1e-12
+    assert found.growth is None
+    fine = solve(PUSHED, [2.0], attitude=True)
+    assert (fine.ended, fine.growth) == ("complete", None)
+
+
+def test_giving_up_says_what_would_do() -> None:
+    with pytest.raises(InputError, match=r"taylor gave up before t = 1000 s .*--effort"):
+        solve(PUSHED, [1.0, 1000.0], attitude=True, effort=1e-3)
+    with pytest.raises(InputError, match="after 1 step; "):
+        solve(PUSHED, [1e9], attitude=True)
+    # The speed grows with time, and so do the steps of a second.
+    with pytest.raises(InputError, match=r"--effort") as refused:
+        solve(PUSHED, [1000.0], attitude=True, effort=1e-2)
+    advised = float(str(refused.value).split("--effort ")[1].split(" ")[0])
+    assert 0.03 < advised < 1.0
+    assert solve(PUSHED, [1000.0], attitude=True, effort=advised).has_all_rows
+
+
+def test_prepared_solver_agrees_with_solve() -> None:
+    scene = SCENES["waves"]
+    solver = prepare(scene, attitude=True)
+    for each in (solver, pickle.loads(pickle.dumps(solver))):
+        omega, attitude = each((0.1, 0.2, 3.0), -2.0, (1.0, 0.0, 1.0, 0.0))
+        start = replace(scene, omega=(0.1, 0.2, 3.0), attitude=(1.0, 0.0, 1.0, 0.0))
+        found = solve(start, [-2.0], attitude=True)
+        assert found.attitude is not None
+        assert (omega == found.omega[0]).all()
+        assert (attitude == found.attitude[0]).all()
+        assert (each.status, each.error, each.growth) == ("complete", found.error, None)
+        assert each.steps == found.steps
+    omega, attitude = solver((0.1, 0.2, 3.0), 1e9)
+    assert solver.status == "gave up"
+    assert np.isnan([*omega, *attitude]).all()
+
+
+def test_plan_says_that_the_attitude_is_needed_and_why() -> None:
+    chosen = plan(PUSHED, tolerance=1e-3)
+    assert (chosen.method, chosen.closed_form, chosen.fallback) == ("taylor", None, None)
+    told = {each.part: (each.kept, each.why) for each in chosen.decisions}
+    assert told["attitude"] == (True, "the torque is fixed in space")
+    assert told["integration"] == (True, "its torque is fixed in space")
+    assert plan(SCENES["sphere"]).method == "taylor"
+
+
+REFUSED = "about the axes of space, and this takes one about those of the body"
+ELSEWHERE: dict[str, Callable[[Scene], object]] = {
+    "program": lambda scene: run_program(scene, corrected("two-term")),
+    "twin": lambda scene: run_program(scene, corrected("runge-kutta"), "python"),
+    "comparison": compare_programs,
+    "reference": lambda scene: reference(scene, [1.0]),
+    "integer series": lambda scene: integer_series(scene, [1.0]),
+    "rotations": lambda scene: steady_rotations(scene, 1e-9),
+    "right-hand side": lambda scene: scene.right_hand_side(),
+    "torque over moment": lambda scene: scene.normalized_torque(0.0),
+    "kernels": normalized,
+    "conditioning": lambda scene: along(scene, np.zeros(2), np.ones((2, 3))),
+    "growth": lambda scene: motion_growth(scene, 1.0),
+}
+
+
+@pytest.mark.parametrize("what", ELSEWHERE)
+@pytest.mark.parametrize("name", ["constant", "waves", "sphere"])
+def test_what_takes_torque_about_the_body_refuses(what: str, name: str) -> None:
+    with pytest.raises(InputError, match=REFUSED):
+        ELSEWHERE[what](SCENES[name])
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name not in ("auto", "taylor")])
+def test_other_methods_refuse(method: str) -> None:
+    for attitude in (True, False):
+        with pytest.raises(InputError, match=r"takes no torque .*; allowed: auto, taylor$"):
+            solve(PUSHED, [1.0], method, METHODS[method].finest, attitude=attitude)
+
+
+@pytest.mark.parametrize("method", [name for name in PREPARED if name not in ("auto", "taylor")])
+def test_other_solvers_refuse(method: str) -> None:
+    for attitude in (True, False):
+        with pytest.raises(InputError, match=r"takes no torque .*; allowed: auto, taylor$"):
+            prepare(PUSHED, method, attitude=attitude)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+def test_attitude_must_be_asked_for(method: str) -> None:
+    with pytest.raises(InputError, match="needs the attitude; give attitude=True"):
+        solve(PUSHED, [1.0], method)
+    with pytest.raises(InputError, match="needs the attitude; give attitude=True"):
+        prepare(replace(PUSHED, attitude=TURNED), method)
+
+
+def test_full_inertia_takes_the_torque_as_it_is() -> None:
+    """The same body about its principal axes, with its attitude, moves alike in space."""
+    scene = SCENES["full, axes of space"]
+    moments, axes = principal_axes(scene.inertia or ())
+    x, y, z, w = Rotation.from_matrix(axes).as_quat()
+    start = axes.T @ np.array(scene.omega)
+    other = replace(scene, inertia=None, moments=moments, omega=start, attitude=(w, x, y, z))
+    found, wanted = (solve(each, [2.0], tolerance=1e-13, attitude=True) for each in (scene, other))
+    assert found.angular_momentum("space") == pytest.approx(
+        wanted.angular_momentum("space"), rel=1e-12
+    )
+    assert found.omega[0] == pytest.approx(axes @ wanted.omega[0], abs=1e-12)

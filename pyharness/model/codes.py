@@ -41,4 +41,5 @@ class Places:
     RATE = 11  # three, 1/s3
     EFFORT = 14  # factor on the limits
     COEFFICIENTS_LOW = 15  # three: what rounding took off, for the closed form
-    WAVES = 18  # four for each sine, then for each cosine
+    MOMENTS = 18  # three: of the closed form with attitude
+    WAVES = 21  # four for each sine, then for each cosine

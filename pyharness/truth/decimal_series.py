@@ -112,9 +112,7 @@ class _Limit:
         )
 
 
-def _step(
-    coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3
-) -> Decimal:
+def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
     """Return the step for which the last two terms are small beside the leading unknowns.
 
     Of a body at rest, beside what the first terms make of it until then.

@@ -1,0 +1,33 @@
+"""A scene packed for the kernels of prepared solvers."""
+
+import numpy as np
+
+from pyharness.methods.problem import normalized, remainders
+from pyharness.model.codes import Places
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+_FEW_WAVES = 16  # that take less time than releasing the GIL does
+
+
+def is_brief(packed: Array) -> bool:
+    """Whether a closed form of it takes less time than others' getting a turn."""
+    return packed.size < Places.WAVES + 4 * _FEW_WAVES
+
+
+def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
+    """Return what a prepared kernel is given in every call: see `Places`."""
+    coefficients, constant, rate, sines, cosines = normalized(scene)
+    packed = np.zeros(Places.WAVES)
+    packed[Places.METHOD] = code
+    packed[Places.TOLERANCE] = tolerance
+    packed[Places.STEP] = scene.step_size
+    packed[Places.N_SINES] = sines.shape[1]
+    packed[Places.N_COSINES] = cosines.shape[1]
+    packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
+    packed[Places.CONSTANT : Places.RATE] = constant
+    packed[Places.RATE : Places.EFFORT] = rate
+    packed[Places.EFFORT] = effort
+    packed[Places.COEFFICIENTS_LOW : Places.MOMENTS] = remainders(scene)
+    packed[Places.MOMENTS : Places.WAVES] = scene.moments or (1.0, 1.0, 1.0)
+    return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])

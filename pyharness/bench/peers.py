@@ -1,7 +1,7 @@
 """Other people's integrators in `bench`, each used as its documentation says to be fast."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 
 from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Contender, Maker, refuse_rounding
-from pyharness.compare.candidates import End, Ready, not_finite, plain
+from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.model.scene import Scene
 from pyharness.truth.reference import exact_coefficients
 
@@ -24,7 +24,7 @@ def peers() -> list[Contender]:
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> Contender:
         settings = finest if name == "heyoka" else TOLERANCES
-        return Contender(name, "tolerance", prepare, settings, package=package)
+        return Contender(name, "tolerance", prepare, settings, package=package, attitude=True)
 
     def fixed(name: str, order: int) -> Contender:
         prepare = partial(compiled.numba_fixed, name)
@@ -55,12 +55,12 @@ def _heyoka(scene: Scene) -> Maker:
 
     equations = _heyoka_equations(scene)
     integrators: dict[float, Any] = {}
-    omega0 = np.array(scene.omega)
+    start = np.array(_start(scene))
 
     def make(horizon: float, setting: float) -> Ready:
         if setting not in integrators:
             integrators[setting] = heyoka.taylor_adaptive(
-                equations, list(scene.omega), tol=setting, compact_mode=False
+                equations, start.tolist(), tol=setting, compact_mode=False
             )
         integrator = integrators[setting]
         state = integrator.state
@@ -68,11 +68,11 @@ def _heyoka(scene: Scene) -> Maker:
 
         def run() -> Any:
             integrator.time = 0.0
-            state[:] = omega0
+            state[:] = start
             return integrator.propagate_until(horizon)
 
         def read(result: Any) -> End:
-            return End(plain(state)) if result[0] == reached else not_finite(str(result[0]))
+            return compiled.end_of(state) if result[0] == reached else not_finite(str(result[0]))
 
         return Ready(run, read)
 
@@ -82,32 +82,61 @@ def _heyoka(scene: Scene) -> Maker:
 def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
     import heyoka
 
-    state = heyoka.make_vars("x", "y", "z")
+    unknowns = compiled.state_names(scene)
+    state = heyoka.make_vars(*unknowns)
     names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
-    names |= dict(zip("xyz", state, strict=True))
+    names |= dict(zip(unknowns, state, strict=True))
     coefficients = [float(each) for each in exact_coefficients(scene)]
-    rates = [eval(rate, names) for rate in compiled.rates(scene, "t", "xyz", coefficients)]
+    rates = [eval(rate, names) for rate in compiled.rates(scene, "t", unknowns, coefficients)]
     return [(x, heyoka.expression(rate)) for x, rate in zip(state, rates, strict=True)]
+
+
+def _start(scene: Scene) -> tuple[float, ...]:
+    return scene.omega + (scene.attitude or ())
+
+
+def _right_hand_side(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
+    """Return that of `_start`, in plain floats."""
+    slope = scene.right_hand_side()
+    if scene.attitude is None:
+        return slope
+
+    def both(time: float, state: Sequence[float]) -> list[float]:
+        x, y, z, a, b, c, d = state
+        return [
+            *slope(time, (x, y, z)),
+            -0.5 * (b * x + c * y + d * z),
+            0.5 * (a * x + c * z - d * y),
+            0.5 * (a * y + d * x - b * z),
+            0.5 * (a * z + b * y - c * x),
+        ]
+
+    return both
+
+
+def _absolute(scene: Scene) -> Any:
+    """Return what a relative tolerance is to be multiplied by: sizes of the unknowns."""
+    largest = max(map(abs, scene.omega)) or 1.0
+    return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
     """Integrate from end to end: no dense output, plain floats in the right-hand side."""
     from scipy.integrate import solve_ivp
 
-    largest = max(map(abs, scene.omega)) or 1.0
+    slope, start, size = _right_hand_side(scene), _start(scene), _absolute(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("solve_ivp", setting)
         run = partial(
-            solve_ivp, scene.right_hand_side(), (0.0, horizon), scene.omega, method=name,
-            rtol=setting, atol=setting * largest,
+            solve_ivp, slope, (0.0, horizon), start, method=name, rtol=setting, atol=setting * size,
         )  # fmt: skip
         return Ready(run, read)
 
     def read(result: Any) -> End:
         if not result.success:
             return not_finite(str(result.message))
-        return End(plain(result.y[:, -1]), evaluations=int(result.nfev))
+        return compiled.end_of(result.y[:, -1], int(result.nfev))
 
     return make
 
@@ -115,13 +144,13 @@ def _solve_ivp(name: str, scene: Scene) -> Maker:
 def _odeint(scene: Scene) -> Maker:
     from scipy.integrate import ODEintWarning, odeint
 
-    largest = max(map(abs, scene.omega)) or 1.0
+    slope, start, size = _right_hand_side(scene), _start(scene), _absolute(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("LSODA", setting)
         run = partial(
-            odeint, scene.right_hand_side(), scene.omega, np.array([0.0, horizon]),
-            rtol=setting, atol=setting * largest, tfirst=True, mxstep=compiled.MOST_STEPS,
+            odeint, slope, start, np.array([0.0, horizon]), rtol=setting, atol=setting * size,
+            tfirst=True, mxstep=compiled.MOST_STEPS,
         )  # fmt: skip
 
         def read(rows: Any) -> End:
@@ -131,7 +160,7 @@ def _odeint(scene: Scene) -> Maker:
                 _, told = run(full_output=True)
             if "successful" not in told["message"]:
                 return not_finite(told["message"])
-            return End(plain(rows[-1]), evaluations=int(told["nfe"][-1]))
+            return compiled.end_of(rows[-1], int(told["nfe"][-1]))
 
         return Ready(run, read)
 

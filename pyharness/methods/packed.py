@@ -7,13 +7,6 @@ from pyharness.model.codes import Places
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-_FEW_WAVES = 16  # that take less time than releasing the GIL does
-
-
-def is_brief(packed: Array) -> bool:
-    """Whether a closed form of it takes less time than others' getting a turn."""
-    return packed.size < Places.WAVES + 4 * _FEW_WAVES
-
 
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     """Return what a prepared kernel is given in every call: see `Places`."""

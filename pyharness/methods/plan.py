@@ -116,10 +116,12 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
 def closed_form(scene: Scene) -> str | None:
     """Name the closed form that solves a scene, None where there is none."""
     a, b, c = scene.euler_coefficients
-    if a == b == c == 0.0 and (scene.attitude is None or scene.torque.is_zero):
-        return "sphere"
     # A body that is given by coefficients has no angular momentum to turn about.
-    if not scene.torque.is_zero or (scene.attitude is not None and scene.moments is None):
+    if scene.attitude is not None and (not scene.torque.is_zero or scene.moments is None):
+        return None
+    if a == b == c == 0.0:
+        return "sphere"
+    if not scene.torque.is_zero:
         return None
     if 0.0 in (a, b, c):
         # Two coefficients of opposite sign turn; of one sign, or one alone, they run away.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, Self, overload
 import numpy as np
 
 from pyharness.methods.last_call import LastCall
-from pyharness.methods.packed import is_brief, packed_scene
+from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
 from pyharness.model.codes import Methods, Places
 from pyharness.model.effort import checked_effort
@@ -51,6 +51,8 @@ _CODES = {
 }
 PREPARED = ("auto", *(name for name in _CODES if name not in ("sphere", EITHER)))
 
+_FEW_WAVES = 16  # that take less time than releasing the GIL does
+
 
 class Solver(LastCall, BoundKernel):
     """A scene prepared for one method.
@@ -81,7 +83,7 @@ class Solver(LastCall, BoundKernel):
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
         brief = None
-        if chosen.closed_form and is_brief(packed):
+        if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
             # Where there is a fallback, it is no part of that.
             brief = packed.copy()
             brief[Places.METHOD] = _CODES.get(chosen.closed_form, Methods.CLOSED_FORM)

@@ -5,7 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Self
 
 from pyharness.methods.last_call import LastCall
-from pyharness.methods.packed import is_brief, packed_scene
+from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import Plan, plan
 from pyharness.methods.registry import REGISTRY
 from pyharness.model.attitude import IDENTITY, Quaternion, unit_quaternion
@@ -50,7 +50,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
             code = Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else Methods.CLOSED_FORM
         kernel = extension().solve_packed_attitude
         packed, brief = packed_scene(scene, code, tolerance, effort), None
-        if chosen.closed_form and is_brief(packed):
+        if chosen.closed_form:  # without torque, so that it has no wave
             brief = packed.copy()
             brief[Places.METHOD] = Methods.CLOSED_FORM
         solver = super().__new__(cls, kernel, packed, partial(_check, attitude), brief, attitude)

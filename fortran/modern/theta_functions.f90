@@ -3,12 +3,12 @@ module theta_functions
   !! far from the separatrix in sines of v = pi u/(2 K), near to it in exponentials of
   !! x = pi u/(4 K').
   use kinds, only: dp
-  use two_words, only: sine_cosine, two_product
+  use two_words, only: scaled, sine_cosine, two_product, two_sum
   implicit none(type, external)
   private
 
   integer, parameter :: TRIGONOMETRIC = 1
-  integer, parameter :: HYPERBOLIC = 2
+  integer, parameter, public :: HYPERBOLIC = 2
   integer, parameter :: ENDLESS = 3          ! the separatrix: no period, and the phase is x
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
@@ -27,7 +27,7 @@ module theta_functions
     real(dp) :: powers(4)       !! of q or Q
     real(dp) :: even(2), odd(2) !! weights of sn and cn
     real(dp) :: c(0:4), s(0:4)  !! weights of C and S
-    real(dp) :: ratio           !! x over v
+    real(dp) :: ratio(2)        !! x over v in two words, where HYPERBOLIC; the caller's
     real(dp) :: drift
   end type theta_t
 
@@ -67,7 +67,6 @@ contains
       theta%kind = HYPERBOLIC
       square = 0.5_dp*comodulus**2/((1.0_dp + k)*(1.0_dp + sqrt(k))**2)
       square = square*(1.0_dp + square**4*(2.0_dp + 15.0_dp*square**4))
-      theta%ratio = -log(square)/(2.0_dp*PI)
       call take_exponentials(pole, k, square, theta)
     end if
   end subroutine theta_series
@@ -238,7 +237,7 @@ contains
     type(theta_t), intent(in) :: theta
     real(dp), intent(in) :: phase, phase_low
     real(dp), intent(out) :: f(3), c, s, part
-    real(dp) :: x, x_low, turns, product, rest
+    real(dp) :: x, x_low, turns, product, rest, v, v_low
     real(dp) :: sense                    ! of sn and cn after so many half periods
     real(dp) :: g, g2, g4                ! exp(-2 |x|), its square and so on
     real(dp) :: h, h2, h4                ! Q exp(2 |x|), which is 1 at the most
@@ -252,11 +251,12 @@ contains
     if (theta%kind == HYPERBOLIC) then
       turns = anint(x/PI)
       call two_product(turns, PI, product, rest)
-      x = (x - product) + (x_low - rest - turns*PI_LOW)
+      call two_sum(x - product, x_low - rest - turns*PI_LOW, v, v_low)
       if (modulo(turns, 2.0_dp) > 0.5_dp) sense = -1.0_dp
-      part = x*theta%drift
-      x = x*theta%ratio
-      x_low = 0.0_dp
+      part = v*theta%drift
+      ! Far from its middle a flip is as long as the logarithm of its distance.
+      call scaled(theta%ratio(1), theta%ratio(2), v, x, x_low)
+      x_low = x_low + theta%ratio(1)*v_low
     end if
     q = theta%nome
     q2 = theta%powers(1)

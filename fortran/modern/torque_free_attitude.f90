@@ -9,7 +9,7 @@ module torque_free_attitude
   use kinds, only: dp
   use nearness, only: bring_near_one, LARGE
   use statuses, only: COMPLETE, INTERRUPTED, REFUSED
-  use theta_functions, only: start_of_phase, theta_series
+  use theta_functions, only: HYPERBOLIC, start_of_phase, theta_series
   use torque_free_turn, only: evaluate, into_orbit, orbit_t, product_of_quaternions, turned
   use word_pairs, only: difference_of, longer_product, operator(*), operator(+), operator(-), &
                         operator(/), pair_t, product_of, root
@@ -20,6 +20,7 @@ module torque_free_attitude
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
   real(dp), parameter :: CANCELLED = 1e-4_dp  ! what is left where two words are too few
+  real(dp), parameter :: FLAT = 1e-10_dp      ! a difference whose square no longer counts
   real(dp), parameter :: LAST = 1e-17_dp      ! a term after which the means differ by less
   real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
 
@@ -213,6 +214,9 @@ contains
     end if
     slope = orbit%frequency%high*inertia%high/scales(1)%high
     call theta_series(pole, k, comodulus, orbit%theta)
+    if (orbit%theta%kind == HYPERBOLIC) then
+      call take_ratio(scales(1), root(d12*e1), orbit%frequency*inertia, orbit%theta%ratio)
+    end if
     orbit%start = pair_t(0.0_dp, 0.0_dp)
     if (e1%high > FAINT*e3%high) then
       call start_of_phase(orbit%theta, k, comodulus, slope, w(1)/largest(1), &
@@ -272,6 +276,25 @@ contains
       orbit%half_rate = part/(momentum*(4.0_dp*moment(3)))
     end if
   end subroutine take_rates
+
+  pure subroutine take_ratio(larger, smaller, other, ratio)
+    !! K/(2 K') by the arithmetic-geometric mean of 1 and k, over `other`, that of 1 and k'.
+    type(pair_t), intent(in) :: larger, smaller, other
+    real(dp), intent(out) :: ratio(2)
+    type(pair_t) :: a, g, mean
+    integer :: n
+
+    a = larger
+    g = smaller
+    do n = 1, MOST_LEVELS
+      mean = (a + g)*0.5_dp
+      if (abs(a%high - g%high) <= FLAT*a%high) exit
+      g = root(a*g)
+      a = mean
+    end do
+    mean = mean*0.5_dp/other
+    ratio = [mean%high, mean%low]
+  end subroutine take_ratio
 
   pure subroutine take_before(orbit)
     !! So that q is the given one at time 0.

@@ -1,13 +1,14 @@
 """The two notions of agreement, kept apart: error against the truth, and bits between languages."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.model.attitude import angle_between
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array, Trajectory, turned_to_space
 from pyharness.truth.reference import Reference
 
 
@@ -22,6 +23,14 @@ class Accuracy:
     energy: float | None
     momentum: float | None
     error: Array  # largest error of any component of omega at each result (rad/s)
+    turned: Array | None = None  # error of the attitude at each result (rad); where it is known
+    # Largest drift of the angular momentum in space, relative to the start; None as of energy.
+    momentum_in_space: float | None = None
+
+    @property
+    def angle(self) -> float | None:
+        """Largest error of the attitude (rad); None where there is none."""
+        return None if self.turned is None else float(self.turned.max(initial=0.0))
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
@@ -38,7 +47,13 @@ def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy
             inertia = np.array(scene.moments)
             energy = _drift(scene, trajectory, inertia)
             momentum = _drift(scene, trajectory, inertia * inertia)
-    return Accuracy((first, second, third), speed, energy, momentum, errors.max(axis=1, initial=0))
+        found = Accuracy(
+            (first, second, third), speed, energy, momentum, errors.max(axis=1, initial=0)
+        )
+        if trajectory.attitude is None or truth.attitude is None:
+            return found
+        turned = angle_between(trajectory.attitude[:n], truth.attitude[:n])
+        return replace(found, turned=turned, momentum_in_space=_drift_in_space(scene, trajectory))
 
 
 def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
@@ -46,6 +61,18 @@ def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
     if start == 0.0:
         return 0.0
     return float(np.abs(np.square(trajectory.omega) @ weights / start - 1.0).max(initial=0.0))
+
+
+def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
+    if scene.moments is None or not scene.torque.is_zero:
+        return None
+    before = np.array(scene.moments) * scene.omega
+    (start,) = turned_to_space(np.array([scene.attitude]), before[None, :])
+    size = float(np.linalg.norm(start))
+    if size == 0.0:
+        return 0.0
+    momentum = replace(trajectory, moments=scene.moments).angular_momentum("space")
+    return float(np.linalg.norm(momentum - start, axis=1).max(initial=0.0)) / size
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:

@@ -70,10 +70,11 @@ class Candidate:
 
 
 def solved(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a method of the registry, as `solve` runs it."""
+    """Return a method of the registry, as `solve` runs it; an attitude of the scene is wanted."""
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
-        return solve(scene, scene.times() if times is None else times, name, tolerance, effort)
+        times = scene.times() if times is None else times
+        return solve(scene, times, name, tolerance, effort, scene.attitude is not None)
 
     def ready(scene: Scene, time: float) -> Ready:
         return Ready(partial(solve, scene, [time], name, tolerance, effort), _last)

@@ -8,15 +8,17 @@ import itertools
 import math
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
 from pyharness.compare.candidates import listed, solved
 from pyharness.compare.orders import Order, measured_order
 from pyharness.compare.timing import seconds as timed
+from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.methods.sensitivity import is_sensitive, motion_growth
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
@@ -111,6 +113,7 @@ def compare_programs(
     may_stop: bool = True,
     tolerance: float = 1e-8,
     effort: float = 1.0,
+    attitude: bool = False,
 ) -> Comparison:
     """Compare programs and methods on one scene.
 
@@ -129,6 +132,9 @@ def compare_programs(
         What `solve_ivp` is asked for, relative to the largest component of omega.
     effort : float
         Factor on the work of each of them after which it gives up.
+    attitude : bool
+        Whether attitudes are compared too, from that of the scene, or from the axes of space where
+        it has none; beside the rows of a program by a step of order 4 from row to row.
 
     Returns
     -------
@@ -146,6 +152,7 @@ def compare_programs(
     for listing, implementation in itertools.product(listings, IMPLEMENTATIONS):
         check_steps(scene, listing.program, implementation, effort)
     checked_scene(scene)
+    scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:
@@ -156,6 +163,8 @@ def compare_programs(
         judged = not (listing.defects or listing.readings or listing.conjectures)
         program = PROGRAM_REGISTRY[listing.program]
         order = measured_order(scene, program, listing, truth) if judged else None
+        if attitude:
+            run = replace(run, attitude=attitude_from_rows(scene, run.time, run.omega))
         (seconds,) = timed([partial(compiled.rows, scene)], _TIMING_SECONDS, _TIMING_BATCHES)
         good, found = accuracy(scene, run, truth), tuple(differences(run, other))
         per_step = seconds / max(run.steps, 1)

@@ -34,11 +34,14 @@ def comparison_picture(comparison: Comparison) -> Picture:
 
     names = list(dict.fromkeys(each.listing.program for each in comparison.programs))
     figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
-    axes = figure.subplots(4, len(names), sharex=True, sharey="row", squeeze=False)
     truth = comparison.reference
+    # Below the error of omega that of the attitude, where it was asked for.
+    bounds = [truth.error] if truth.attitude is None else [truth.error, truth.angle_error]
+    shape = 3 + len(bounds), len(names)
+    axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
     for column, name in enumerate(names):
         axes[0, column].set_title(name)
-        axes[3, column].set_xlabel("time (s)")
+        axes[-1, column].set_xlabel("time (s)")
         for row in range(3):
             _line(axes[row, column], truth.time, truth.omega[:, row], "reference")
         for each in comparison.programs:
@@ -47,22 +50,25 @@ def comparison_picture(comparison: Comparison) -> Picture:
             run, label = each.trajectory, each.listing.label
             for row in range(3):
                 _line(axes[row, column], run.time, run.omega[:, row], label)
-            error = each.accuracy.error
-            shown = np.isfinite(error) & (error > 0.0)
-            _line(axes[3, column], run.time[: len(error)][shown], error[shown], label)
+            for row, error in enumerate((each.accuracy.error, each.accuracy.turned), 3):
+                if error is not None:
+                    shown = np.isfinite(error) & (error > 0.0)
+                    _line(axes[row, column], run.time[: len(error)][shown], error[shown], label)
     ended = [each for each in comparison.programs if each.trajectory.ended != "complete"]
     for row in range(3):
         axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         _frame(axes[row, 0], truth.omega[:, row])
         for each in ended:
             mark_end(axes[row, names.index(each.listing.program)], each.trajectory, row)
-    axes[3, 0].set_yscale("log")
-    axes[3, 0].set_ylabel("error of any $\\omega$ (rad/s)")
-    for column in range(len(names)):
-        axes[3, column].axhline(truth.error, color="black", linewidth=0.8)
-        axes[3, column].grid(visible=True, linewidth=0.3)
-    bottom, top = axes[3, 0].get_ylim()
-    axes[3, 0].set_ylim(max(bottom, 1e-17), min(top, 1e4))
+    labels = ("error of any $\\omega$ (rad/s)", "error of attitude (rad)")
+    for row, (bound, label) in enumerate(zip(bounds, labels, strict=False), 3):
+        axes[row, 0].set_yscale("log")
+        axes[row, 0].set_ylabel(label)
+        for column in range(len(names)):
+            axes[row, column].axhline(bound, color="black", linewidth=0.8)
+            axes[row, column].grid(visible=True, linewidth=0.3)
+        bottom, top = axes[row, 0].get_ylim()
+        axes[row, 0].set_ylim(max(bottom, 1e-17), min(top, 1e4))
     axes[0, 0].legend(loc="best", handlelength=4)
     note = "x: the program stopped or overflowed; at the edge: out of view" if ended else ""
     title = (f"{heading(comparison.scene)[0]}; thin line: error of the reference", note)
@@ -70,17 +76,24 @@ def comparison_picture(comparison: Comparison) -> Picture:
 
 
 def _numbers(comparison: Comparison) -> Table:
-    truth = comparison.reference
+    truth, names = comparison.reference, "method listing time omega1 omega2 omega3 error"
+    bounds = [truth.error]
+    if truth.attitude is not None:
+        names += " angle_error"
+        bounds.append(truth.angle_error)
     rows = [
-        ["reference", "", t, *omega, truth.error]
+        ["reference", "", t, *omega, *bounds]
         for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
     ]
     for each in comparison.programs:
         run, name = each.trajectory, [each.listing.program, each.listing.label]
-        errors = each.accuracy.error.tolist()
-        for t, omega, error in zip(run.time.tolist(), run.omega.tolist(), errors, strict=False):
-            rows.append([*name, t, *omega, error])
-    return numbers("method listing time omega1 omega2 omega3 error", rows)
+        errors = each.accuracy.error[:, None]
+        if each.accuracy.turned is not None:
+            errors = np.column_stack([errors, each.accuracy.turned])
+        n = len(errors)
+        found = np.column_stack([run.time[:n], run.omega[:n], errors])
+        rows += [[*name, *row] for row in found.tolist()]
+    return numbers(names, rows)
 
 
 def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> None:

@@ -25,6 +25,7 @@ from pyharness.model.scene_report import heading, sensitive
 from pyharness.model.trajectory import Trajectory
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
+_OF_THE_TRUTH = ("source", "estimate", "error")
 _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
@@ -47,6 +48,12 @@ def comparison_report(comparison: Comparison) -> Report:
             f"growth of a small difference {short(comparison.growth)}: "
             f"rounding leaves {comparison.digits:.1f} digits"
         )
+    attitudes = _attitudes(comparison)
+    if attitudes:
+        legend += (
+            " angle: largest error of the attitude (rad); beside a program's rows by a step of "
+            "order 4. L in space: largest drift of the angular momentum over its size."
+        )
     failures = [f"failed: {x.method}: {x.failure}" for x in comparison.methods if x.failure]
     told, programs, methods = verdict(comparison), _programs(comparison), _methods(comparison)
 
@@ -57,10 +64,16 @@ def comparison_report(comparison: Comparison) -> Report:
 
     return Report(
         "compare",
-        text=[[*scene, reference, *motion], [programs], [methods], [legend, *failures, *told]],
+        text=[
+            [*scene, reference, *motion],
+            [programs],
+            [methods],
+            *attitudes,
+            [legend, *failures, *told],
+        ],
         record=lambda: _record(comparison),
         data=_data(comparison),
-        page=[scene, [programs], [methods], told],
+        page=[scene, [programs], [methods], *attitudes, told],
         pictures={"omega": draw},
     )
 
@@ -117,12 +130,33 @@ def _methods(comparison: Comparison) -> Table:
     return Table(columns, rows)
 
 
+def _attitudes(comparison: Comparison) -> list[list[Table]]:
+    """Return the table of attitudes, where they were asked for."""
+    if comparison.reference.attitude is None:
+        return []
+    columns = (
+        *words("attitude listing"), Column("angle", short, unit="rad"), Column("L in space", short),
+    )  # fmt: skip
+    rows: list[list[Any]] = []
+    for each in comparison.programs:
+        good = each.accuracy
+        row = [each.listing.program, each.listing.label]
+        rows.append([*row, good.angle, good.momentum_in_space])
+    for method in comparison.methods:
+        if method.accuracy is not None:
+            found = method.accuracy
+            rows.append([method.method, None, found.angle, found.momentum_in_space])
+    return [[Table(columns, rows)]]
+
+
 def _data(comparison: Comparison) -> Table:
     """Return programs and methods in one table."""
     names = (
         "method listing active steps ended stop_variable stop_quotient error_w1 error_w2 error_w3 "
         "error_v energy_drift momentum_drift ulps order order_state evaluations seconds"
     )
+    if comparison.reference.attitude is not None:
+        names += " angle_error momentum_in_space"
     rows: list[dict[str, Any]] = []
     for each in map(_program, comparison.programs):
         listing, stop = each["listing"], each["stop"] or {}
@@ -164,7 +198,8 @@ def _record(comparison: Comparison) -> dict[str, Any]:
     return {
         "scene": scene_record(comparison.scene),
         "lipschitz": comparison.lipschitz,
-        "reference": {name: getattr(truth, name) for name in ("source", "estimate", "error")},
+        "reference": {name: getattr(truth, name) for name in _OF_THE_TRUTH}
+        | ({} if truth.attitude is None else {"angle_error": truth.angle_error}),
         "programs": list(map(_program, comparison.programs)),
         "methods": list(map(_method, comparison.methods)),
         "growth": comparison.growth,
@@ -209,4 +244,6 @@ def _run(run: Trajectory, accuracy: Accuracy) -> dict[str, Any]:
         "velocity_error": accuracy.velocity,
         "energy_drift": accuracy.energy,
         "momentum_drift": accuracy.momentum,
+        "angle_error": accuracy.angle,
+        "momentum_in_space": accuracy.momentum_in_space,
     }

@@ -68,7 +68,9 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
 
 def _scipy(scipy: str, title: str, source: str) -> Method:
     source = f"scipy.integrate.solve_ivp; {source}"
-    return Method(scipy.lower(), title, source, FINEST[scipy], scipy_method(scipy), scipy=scipy)
+    return Method(
+        scipy.lower(), title, source, FINEST[scipy], scipy_method(scipy), attitude=True, scipy=scipy
+    )
 
 
 def _gauss(stages: int) -> Method:

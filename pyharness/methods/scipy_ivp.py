@@ -7,7 +7,8 @@ how far the motion goes, over which errors of steps add up; and how it multiplie
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,9 @@ from pyharness.methods.problem import rows_trajectory
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Array, Trajectory
+
+RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 # What errors of steps add up to until the end, in those of one step, at the most: so much in a
 # motion of a few radians, and so much more for each radian times the factor by which a difference
@@ -83,14 +86,15 @@ def scipy_method(name: str) -> Integrator:
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
     ) -> Trajectory:
         if times[-1] == 0.0:
-            return rows_trajectory(times, np.array([scene.omega]), 0, 0, "complete")
+            return _rows_of(times, np.array([_start(scene)]), 0, 0, "complete")
         run = _Run(scene, times[-1], name, effort)
         try:
             ahead = run.ahead()
             if ahead.largest == 0.0:
                 # At rest, and nothing that would move it.
-                rest = np.zeros((len(times), 3))
-                return rows_trajectory(times, rest, run.evaluations, len(times), "complete")
+                rest = np.tile(_start(scene), (len(times), 1))
+                return _rows_of(times, rest, run.evaluations, len(times), "complete")
+            run.carry_attitude()
             total = steps_sum(name, ahead.radians, ahead.growth)
             finest = _FINEST_STEP * total
             if tolerance < finest * (1.0 - 1e-9):
@@ -108,7 +112,8 @@ def scipy_method(name: str) -> Integrator:
             waves_that_count = (f for push, f in _pushes(scene) if push * abs(times[-1]) > allowed)
             fastest = max(waves_that_count, default=0.0)
             longest = _WAVE_STEP / fastest if fastest > 0.0 else math.inf
-            result = run.solved(name, step, allowed, times, longest)
+            sizes = [allowed] * 3 + [step] * (len(run.start) - 3)
+            result = run.solved(name, step, sizes, times, longest)
             low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
             if result.status == 1 and low <= 0.0 <= high:
                 # It is not on its way to infinity: it turns, and no one can tell how far.
@@ -118,16 +123,48 @@ def scipy_method(name: str) -> Integrator:
                     float(result.t_events[0][0]) * run.unit,
                 )
         except _NoNumberError:
-            return rows_trajectory([], np.empty((0, 3)), run.evaluations, len(times), "overflow")
-        rows = result.y.T if len(result.t) else np.empty((0, 3))
+            nothing = np.empty((0, len(run.start)))
+            return _rows_of([], nothing, run.evaluations, len(times), "overflow")
+        rows = result.y.T if len(result.t) else np.empty((0, len(run.start)))
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
         ended = "complete" if count == len(times) else "overflow"
         # The result does not carry the steps taken; right-hand sides are what is counted, those of
         # the coarse run too.
-        return rows_trajectory(times[:count], rows[:count], run.evaluations, len(times), ended)
+        return _rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
 
     return solve
+
+
+def _start(scene: Scene) -> tuple[float, ...]:
+    return (*scene.omega, *(scene.attitude or ()))
+
+
+def _turning(slopes: RightHandSide) -> RightHandSide:
+    """Return the right-hand side of omega, and with it q (0, omega)/2."""
+
+    def both(time: float, state: Sequence[float]) -> list[float]:
+        x, y, z, a, b, c, d = state
+        return [
+            *slopes(time, (x, y, z)),
+            -0.5 * (b * x + c * y + d * z),
+            0.5 * (a * x + c * z - d * y),
+            0.5 * (a * y + d * x - b * z),
+            0.5 * (a * z + b * y - c * x),
+        ]
+
+    return both
+
+
+def _rows_of(
+    times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
+) -> Trajectory:
+    """Return a trajectory of rows of omega, or of omega and attitude."""
+    found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
+    if rows.shape[1] == 3:
+        return found
+    attitude = rows[:, 3:]
+    return replace(found, attitude=attitude / np.linalg.norm(attitude, axis=1, keepdims=True))
 
 
 class _NoNumberError(Exception):
@@ -144,16 +181,23 @@ class _Run:
         # A power of 2 in which a span is no tiny number; 1 for most.
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
         self.rate = max(map(abs, scene.euler_coefficients))
+        self.start: tuple[float, ...] = scene.omega
         self.slopes = scene.right_hand_side()
         self.most = int(effort * _MOST_EVALUATIONS * 8 / (8 + waves(scene)))
         if name == "Radau":
             self.most //= _RADAU_SHARE
 
+    def carry_attitude(self) -> None:
+        """Go on with seven unknowns, where the scene has an attitude; a coarse run needs none."""
+        if self.scene.attitude is not None:
+            self.start = _start(self.scene)
+            self.slopes = _turning(self.slopes)
+
     def solved(
         self,
         name: str,
         relative: float,
-        absolute: float,
+        absolute: float | Sequence[float],
         times: Sequence[float] | None = None,
         longest: float = math.inf,
     ) -> Any:
@@ -161,7 +205,7 @@ class _Run:
         from scipy.integrate import solve_ivp
 
         def phase_left(time: float, omega: Sequence[float]) -> float:
-            return _LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, omega))
+            return _LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, omega[:3]))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
         # LSODA warns of what the rows that are missing say already.
@@ -170,7 +214,7 @@ class _Run:
                 return solve_ivp(
                     self._counted,
                     (0.0, self.end / self.unit),
-                    self.scene.omega,
+                    self.start,
                     method=name,
                     t_eval=None if times is None else [time / self.unit for time in times],
                     dense_output=times is None,
@@ -232,6 +276,9 @@ class _Run:
         sizes = np.abs(omega).max(axis=1)
         largest = max(largest, float(sizes.max()))
         radians = self.rate * length * float(np.mean(sizes)) + _turned(self.scene, length, largest)
+        if self.scene.attitude is not None:
+            # Each radian of the body's turn takes steps of its own, and errors of omega turn it.
+            radians += length * float(np.mean(sizes))
         with np.errstate(all="ignore"):
             flow = propagators(self.scene, times * self.unit, omega)
         return _Ahead(largest, radians, growth(np.nan_to_num(flow)))

@@ -13,7 +13,7 @@ from pyharness.model.scene import Scene
 # Each trial is a module of pyharness.stress.trials, loaded when it is called for.
 TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),
-    *("regions", "invariance", "matrices", "threads"),
+    *("regions", "invariance", "attitude", "matrices", "threads"),
 )
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (original, corrected))
 

@@ -9,7 +9,7 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
     """Return sin and cos of any angle, by halving it and the addition theorem."""
     with decimal.localcontext() as context:
         context.prec += 12 + max(0, angle.adjusted())
-        angle = angle.remainder_near(2 * _pi(context.prec))
+        angle = angle.remainder_near(2 * pi(context.prec))
         halvings = 8
         x = angle / 2**halvings
         square = x * x
@@ -33,7 +33,7 @@ def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
 
 
 @cache
-def _pi(digits: int) -> Decimal:
+def pi(digits: int) -> Decimal:
     """Return pi by Machin's formula."""
     with decimal.localcontext(prec=digits + 5):
         return 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)

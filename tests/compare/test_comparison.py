@@ -18,8 +18,9 @@ from pyharness.compare.picture import comparison_picture
 from pyharness.compare.report import comparison_report, verdict
 from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.methods.report import trajectory_report
+from pyharness.model.attitude import product
 from pyharness.model.listing import corrected, original
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Trajectory, turned_to_space
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import reference
 from pyharness.views.json import json_text
@@ -136,6 +137,61 @@ def test_accuracy_against_known_numbers() -> None:
     for drift, weights in ((along.energy, moments), (along.momentum, moments**2)):
         parts = weights * np.square(truth.omega[-1])
         assert drift == pytest.approx(0.0201 * parts[2] / parts.sum(), rel=1e-3)
+
+
+def test_error_of_attitudes_is_an_angle() -> None:
+    scene = replace(case_scene(4), steps=2, attitude=(0.5, -0.1, 0.7, 0.5))
+    truth = reference(scene, scene.times())
+    assert truth.attitude is not None
+    # A turn about an axis of space, and signs, which play no part.
+    turn = (math.cos(5e-4), 0.0, math.sin(5e-4), 0.0)
+    turned = np.array([truth.attitude[0], [-x for x in product(turn, tuple(truth.attitude[1]))]])
+    found = accuracy(scene, replace(_trajectory(truth.omega), attitude=turned), truth)
+    assert found.turned is not None
+    assert found.turned == pytest.approx([0.0, 1e-3], abs=1e-15, rel=1e-9)
+    assert found.angle == found.turned[1]
+    # The angular momentum turns as the body does, as far as it lies across the axis.
+    start = turned_to_space(np.array([scene.attitude]), np.array([[0.0, 30.0, 200.0]]))[0]
+    across = math.hypot(start[0], start[2]) / float(np.linalg.norm(start))
+    assert found.momentum_in_space == pytest.approx(1e-3 * across, rel=1e-6)
+    pushed = accuracy(case_scene(5), _trajectory(truth.omega), truth)
+    assert pushed.angle is pushed.momentum_in_space is None
+
+
+def test_compare_shows_attitudes_where_they_are_asked_for() -> None:
+    found = compare_programs(case_scene(4), attitude=True)
+    corrected_ones = {
+        each.listing.program: each.accuracy.angle
+        for each in found.programs
+        if each.listing.label == "corrected"
+    }
+    assert 1e-5 < corrected_ones["two-term"] < 1e-3  # type: ignore[operator]
+    assert 1e-9 < corrected_ones["runge-kutta"] < 1e-7  # type: ignore[operator]
+    for method in found.methods:
+        assert method.accuracy is not None
+        assert 0.0 < method.accuracy.angle < found.tolerance  # type: ignore[operator]
+        assert 0.0 < method.accuracy.momentum_in_space < found.tolerance  # type: ignore[operator]
+    text = _text(found)
+    assert max(map(len, text.splitlines())) <= 100
+    record = json.loads(render(comparison_report(found), "json"))
+    rows = list(csv.DictReader(io.StringIO(render(comparison_report(found), "csv"))))
+    told = [*record["programs"], *record["methods"]]
+    for each, row in zip(told, rows, strict=True):
+        assert float(row["angle_error"]) == each["angle_error"]
+        assert float(row["momentum_in_space"]) == each["momentum_in_space"]
+    assert record["reference"]["angle_error"] < 1e-15
+    picture = comparison_picture(found)
+    assert len(picture.figure.axes) == 15
+    assert picture.numbers.columns[-1].head == "angle_error"
+
+
+def test_compare_asks_for_no_attitude_by_itself(case_2: room.Comparison) -> None:
+    assert case_2.reference.attitude is None
+    turned = compare_programs(replace(case_scene(2), attitude=(0.0, 1.0, 0.0, 0.0)))
+    assert turned.scene.attitude is None
+    record = json.loads(render(comparison_report(case_2), "json"))
+    assert {each["angle_error"] for each in record["programs"]} == {None}
+    assert "angle" not in _text(case_2)
 
 
 def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,6 +23,7 @@ from pyharness import (
 from pyharness.compare.random_scenes import draw
 from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.plan import plan
+from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.trajectory import Array, turned_to_space
 
@@ -89,6 +90,32 @@ def test_tolerance_holds_for_the_angle(number: int) -> None:
         assert angle_between(found.attitude, fine.attitude).max() <= limit
         largest = max(np.abs(fine.omega).max(), max(map(abs, scene.omega)))
         assert np.abs(found.omega - fine.omega).max() <= limit * largest
+
+
+@pytest.mark.parametrize("method", SCIPY_METHODS)
+def test_methods_of_scipy_carry_it(method: str) -> None:
+    for number in range(0, 12):
+        drawn = draw("scipy", number)
+        scene = replace(drawn.scene, attitude=TURNED)
+        times = [0.4 * drawn.time, drawn.time]
+        fine = solve(scene, times, "taylor", 1e-14, attitude=True)
+        if not fine.growth < 1e3:  # type: ignore[operator]
+            continue
+        found = solve(scene, times, method, 1e-5, attitude=True)
+        assert found.attitude is not None
+        assert fine.attitude is not None
+        assert 0.0 < angle_between(found.attitude, fine.attitude).max() <= 1e-5
+        assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
+        bare = solve(scene, times, method, 1e-5)
+        assert bare.attitude is None
+
+
+def test_at_rest_scipy_leaves_it_as_it_is() -> None:
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), attitude=TURNED)
+    for times in ([0.0], [1.0, 2.0]):
+        found = solve(scene, times, "dop853", 1e-9, attitude=True).attitude
+        assert found is not None
+        assert found == pytest.approx(np.tile(scene.attitude or (), (len(times), 1)), abs=1e-16)
 
 
 def test_series_agrees_on_random_scenes_too() -> None:

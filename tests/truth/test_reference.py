@@ -2,6 +2,7 @@
 
 import decimal
 import math
+from dataclasses import replace
 from decimal import Decimal
 
 import mpmath
@@ -15,6 +16,7 @@ from pyharness.truth import reference as room
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import reference
+from tests.exact_attitude import exact
 
 
 def _whole(found: room.Reference, row: int) -> list[mpmath.mpf]:
@@ -196,3 +198,31 @@ def test_velocity_of_a_steady_spin_goes_round_as_it_must() -> None:
         size = 7.0 / 5.0 / 2.0
         wanted = (size * math.sin(2.0 * time), size * (math.cos(2.0 * time) - 1.0), 0.0)
         assert row == pytest.approx(wanted, abs=1e-15)
+
+
+@pytest.mark.parametrize("case", [2, 3, 4])
+@pytest.mark.parametrize("time", [7.0, -7.0])
+def test_attitude_is_that_of_the_series_in_whole_numbers(case: int, time: float) -> None:
+    scene = replace(case_scene(case), attitude=(0.5, -0.1, 0.7, 0.5))
+    assert scene.moments is not None
+    assert scene.attitude is not None
+    found = reference(scene, [0.5 * time, time])
+    assert found.attitude is not None
+    _, wanted = exact(scene.moments, scene.omega, scene.attitude, time)
+    assert found.attitude[1] == pytest.approx([float(x) for x in wanted], abs=2e-16)
+    assert 0.0 < found.angle_estimate < 1e-18
+    # Omega is as it was, and known where it was known.
+    bare = reference(case_scene(case), [0.5 * time, time])
+    assert (found.omega == bare.omega).all()
+    assert found.source == bare.source
+
+
+def test_attitude_of_a_body_that_is_pushed_about_one_axis() -> None:
+    """omega3 = t**2 / 4 + t / 2 from rest: the angle is its integral; a start the other way up."""
+    law = TorqueLaw((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 2.0), torque=law)
+    found = reference(replace(scene, attitude=(0.0, 0.0, 0.0, 1.0)), [1.0, 2.0]).attitude
+    assert found is not None
+    for time, row in zip((1.0, 2.0), found, strict=True):
+        half = 0.5 * (time**3 / 12.0 + time**2 / 4.0)
+        assert row == pytest.approx([-math.sin(half), 0.0, 0.0, math.cos(half)], abs=2e-16)

@@ -16,6 +16,7 @@ OPTIONS = {
     **shared.LISTING,
     "--program P": "this program only",
     "--tolerance E": "asked of solve_ivp (default 1e-8)",
+    "--attitude": "the attitude too: its error as an angle",
     "--ablate": "every subset of the defects, sorted by effect",
     **shared.STRICT,
     **shared.EFFORT,
@@ -45,7 +46,9 @@ def run(options: argparse.Namespace) -> int:
     )
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
-    found = compare_programs(scene, listings, lipschitz, not options.no_stop, tolerance, effort)
+    found = compare_programs(
+        scene, listings, lipschitz, not options.no_stop, tolerance, effort, options.attitude
+    )
     shared.show(comparison_report(found), options)
     return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
 
@@ -59,6 +62,7 @@ def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) 
         "lipschitz",
         "no_stop",
         "tolerance",
+        "attitude",
         "plot",
         "strict",
     )

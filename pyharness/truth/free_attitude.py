@@ -1,0 +1,113 @@
+"""Attitude of a torque-free body in decimal arithmetic, however far: the trials' truth.
+
+A period of omega turns the body about the angular momentum, by the same angle each time. So one
+period of the series of omega and attitude tells all the others. It shares no code with the method
+that it judges: no elliptic function but for the length of the period, and no theta function.
+"""
+
+import decimal
+from decimal import Decimal
+from fractions import Fraction
+
+from pyharness.model.scene import Scene
+from pyharness.truth.decimal_functions import pi, sine_cosine
+from pyharness.truth.decimal_series import Row, taylor_series
+from pyharness.truth.reference import exact_coefficients
+
+# Thirty digits are left after 1e6 periods.
+_DIGITS = 50
+_ORDER, _TOLERANCE = 44, Decimal("1e-44")
+
+
+def free_attitude(scene: Scene, time: float) -> Row:
+    """Return the unit quaternion of a scene without torque at `time` (s), of the same sign as q(0).
+
+    The scene has moments and an attitude. Beside the separatrix a period is long, and on it the
+    whole way is followed; InputError where that takes too many steps.
+    """
+    assert scene.attitude is not None
+    with decimal.localcontext() as context:
+        context.prec = _DIGITS
+        context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
+        begin = _unit([Decimal(x) for x in scene.attitude])
+        end = Decimal(time)
+        if is_steady(scene):
+            omega = [Decimal(w) for w in scene.omega]
+            speed = sum((w * w for w in omega), Decimal(0)).sqrt()
+            sine, cosine = sine_cosine(speed * end / 2)
+            across = [w * sine / speed for w in omega] if speed else omega
+            return product(begin, [cosine, *across])
+        period = period_of(scene)
+        if period is None or abs(end) <= period:
+            return _followed(scene, [end])[0]
+        whole, rest = divmod(abs(end), period)
+        period, rest = period.copy_sign(end), rest.copy_sign(end)
+        after_rest, after_period = _followed(scene, [rest, period])
+        # In space: what a period does to the attitude at any time.
+        turn = product(after_period, conjugate(begin))
+        return _unit(product(_power(turn, int(whole)), after_rest))
+
+
+def period_of(scene: Scene) -> Decimal | None:
+    """Return the period of omega (s), to the digits of the arithmetic; None on the separatrix."""
+    i, w = [Fraction(x) for x in scene.moments or ()], [Fraction(x) for x in scene.omega]
+    low, middle, high = sorted(range(3), key=lambda axis: i[axis])
+    energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
+    lower, upper, both = i[middle] - i[low], i[high] - i[middle], i[high] - i[low]
+    gap = energies[low] * lower - energies[high] * upper
+    if not gap:
+        return None
+    # Whose direction stays, and the squares of the largest terms about either side.
+    stays = energies[low] * both + energies[middle] * upper
+    turns = energies[high] * both + energies[middle] * lower
+    larger = lower * stays if gap > 0 else upper * turns
+    mean, other = (_root(larger / (i[0] * i[1] * i[2])), _root(both * abs(gap) / larger))
+    least, most = other, Decimal(1)
+    while most - least > most.scaleb(3 - decimal.getcontext().prec):
+        most, least = (most + least) / 2, (most * least).sqrt()
+    return 2 * pi(decimal.getcontext().prec) / (mean * most)
+
+
+def is_steady(scene: Scene) -> bool:
+    """Whether omega of a scene without torque does not change."""
+    i, w = [Fraction(x) for x in scene.moments or ()], [Fraction(x) for x in scene.omega]
+    return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
+
+
+def product(p: Row, q: Row) -> Row:
+    """Return Hamilton's product."""
+    (a, b, c, d), (e, f, g, h) = p, q
+    return [
+        a * e - b * f - c * g - d * h,
+        a * f + b * e + c * h - d * g,
+        a * g - b * h + c * e + d * f,
+        a * h + b * g - c * f + d * e,
+    ]
+
+
+def conjugate(q: Row) -> Row:
+    """Return the turn back."""
+    return [q[0], -q[1], -q[2], -q[3]]
+
+
+def _followed(scene: Scene, times: Row) -> list[Row]:
+    rows = taylor_series(scene, exact_coefficients(scene), times, False, _ORDER, _TOLERANCE, None)
+    return [_unit(row[3:]) for row in rows]
+
+
+def _power(turn: Row, count: int) -> Row:
+    found = [Decimal(1), Decimal(0), Decimal(0), Decimal(0)]
+    while count:
+        if count % 2:
+            found = product(found, turn)
+        turn, count = product(turn, turn), count // 2
+    return found
+
+
+def _unit(q: Row) -> Row:
+    length = sum((x * x for x in q), Decimal(0)).sqrt()
+    return [x / length for x in q]
+
+
+def _root(x: Fraction) -> Decimal:
+    return (Decimal(x.numerator) / x.denominator).sqrt()

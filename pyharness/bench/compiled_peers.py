@@ -12,6 +12,7 @@ import numpy as np
 
 from pyharness.bench.contenders import Maker, refuse_rounding
 from pyharness.compare.candidates import End, Ready, not_finite, plain
+from pyharness.methods.scipy_ivp import state_of
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
@@ -55,7 +56,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
     solver = getattr(package, name)
     function = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=False)))
     counting = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=True)))
-    start, size = np.array(scene.omega + (scene.attitude or ())), max(map(abs, scene.omega)) or 1.0
+    start, size = np.array(state_of(scene)), max(map(abs, scene.omega)) or 1.0
     # It takes one for all unknowns.
     size = size if scene.attitude is None else min(1.0, size)
 

@@ -182,12 +182,12 @@ def error_of(end: End, truth: Reference) -> float | None:
     error = relative_error(end.omega, truth)
     if error is None or truth.attitude is None:
         return error
-    if end.attitude is None or not np.isfinite(end.attitude).all():
+    if end.attitude is None or not np.isfinite(end.attitude).all() or not end.attitude.any():
         return None
-    length = float(np.linalg.norm(end.attitude))
-    if not length > 0.0:
-        return None
-    return max(error, float(angle_between(end.attitude[None] / length, truth.attitude)[0]))
+    # Whatever its length, which integrators do not keep; scaled first, for its square is a number.
+    attitude = end.attitude / np.abs(end.attitude).max()
+    attitude /= np.linalg.norm(attitude)
+    return max(error, float(angle_between(attitude[None], truth.attitude)[0]))
 
 
 def relative_error(omega: Array, truth: Reference) -> float | None:

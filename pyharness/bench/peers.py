@@ -1,7 +1,7 @@
 """Other people's integrators in `bench`, each used as its documentation says to be fast."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Contender, Maker, refuse_rounding
 from pyharness.compare.candidates import End, Ready, not_finite
+from pyharness.methods.scipy_ivp import RightHandSide, state_of, turning
 from pyharness.model.scene import Scene
 from pyharness.truth.reference import exact_coefficients
 
@@ -55,7 +56,7 @@ def _heyoka(scene: Scene) -> Maker:
 
     equations = _heyoka_equations(scene)
     integrators: dict[float, Any] = {}
-    start = np.array(_start(scene))
+    start = np.array(state_of(scene))
 
     def make(horizon: float, setting: float) -> Ready:
         if setting not in integrators:
@@ -91,27 +92,10 @@ def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
     return [(x, heyoka.expression(rate)) for x, rate in zip(state, rates, strict=True)]
 
 
-def _start(scene: Scene) -> tuple[float, ...]:
-    return scene.omega + (scene.attitude or ())
-
-
-def _right_hand_side(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
-    """Return that of `_start`, in plain floats."""
-    slope = scene.right_hand_side()
-    if scene.attitude is None:
-        return slope
-
-    def both(time: float, state: Sequence[float]) -> list[float]:
-        x, y, z, a, b, c, d = state
-        return [
-            *slope(time, (x, y, z)),
-            -0.5 * (b * x + c * y + d * z),
-            0.5 * (a * x + c * z - d * y),
-            0.5 * (a * y + d * x - b * z),
-            0.5 * (a * z + b * y - c * x),
-        ]
-
-    return both
+def _right_hand_side(scene: Scene) -> RightHandSide:
+    """Return that of omega, or of both, in plain floats."""
+    slopes = scene.right_hand_side()
+    return slopes if scene.attitude is None else turning(slopes)
 
 
 def _absolute(scene: Scene) -> Any:
@@ -124,7 +108,7 @@ def _solve_ivp(name: str, scene: Scene) -> Maker:
     """Integrate from end to end: no dense output, plain floats in the right-hand side."""
     from scipy.integrate import solve_ivp
 
-    slope, start, size = _right_hand_side(scene), _start(scene), _absolute(scene)
+    slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("solve_ivp", setting)
@@ -144,7 +128,7 @@ def _solve_ivp(name: str, scene: Scene) -> Maker:
 def _odeint(scene: Scene) -> Maker:
     from scipy.integrate import ODEintWarning, odeint
 
-    slope, start, size = _right_hand_side(scene), _start(scene), _absolute(scene)
+    slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("LSODA", setting)

@@ -294,19 +294,19 @@ def _angles(sequence: str, off: float, id: str) -> Iterator[Check]:
 
 def _product(q: Array, by: Quaternion) -> Array:
     a, b, c, d = q.T
-    return np.array(product((a, b, c, d), by)).T  # type: ignore[arg-type]
+    return np.array(product((a, b, c, d), by)).T
 
 
 def _from_left(by: Quaternion, q: Array) -> Array:
     a, b, c, d = q.T
-    return np.array(product(by, (a, b, c, d))).T  # type: ignore[arg-type]
+    return np.array(product(by, (a, b, c, d))).T
 
 
 TRIAL = Trial(
     "attitude",
     "attitude without torque: separatrix, symmetry, 1e6 revolutions, axes turned, poles of angles",
     "closed form: some twenty roundings of each component at any time, 4.4e-15 rad. Others: the "
-    "tolerance and rounding, amplified by the flow and turned all the way. Montgomery: 2 E T/L less "
-    "the solid angle, to the rounding of its terms. Angles: of three, rounded thrice.",
+    "tolerance and rounding, amplified by the flow and turned all the way. Montgomery: 2 E T/L "
+    "less the solid angle, to the rounding of its terms. Angles: of three, rounded thrice.",
     in_turn("attitude", _attempts),
 )

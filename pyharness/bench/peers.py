@@ -25,7 +25,9 @@ def peers() -> list[Contender]:
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> Contender:
         settings = finest if name == "heyoka" else TOLERANCES
-        return Contender(name, "tolerance", prepare, settings, package=package, attitude=True)
+        # That one writes to the standard output where it calls a motion stiff.
+        attitude = name != "numbalsoda-dop853"
+        return Contender(name, "tolerance", prepare, settings, package=package, attitude=attitude)
 
     def fixed(name: str, order: int) -> Contender:
         prepare = partial(compiled.numba_fixed, name)

@@ -71,7 +71,7 @@ def _wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.external
 @pytest.mark.usefixtures("_wrong_sign")
-@pytest.mark.parametrize("name", ["heyoka", "numbalsoda-dop853", "odeint", "solve_ivp-dop853"])
+@pytest.mark.parametrize("name", ["heyoka", "numbalsoda-lsoda", "odeint", "solve_ivp-dop853"])
 @pytest.mark.filterwarnings("ignore")
 def test_a_wrong_sign_is_seen(name: str, truths: dict[str, Reference]) -> None:
     peer = next(each for each in ABLE if each.name == name)

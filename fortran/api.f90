@@ -308,3 +308,20 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, f
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)
 end subroutine solve_packed
+
+subroutine solve_packed_attitude(packed, n_packed, start, t_end, state, status, steps, found)
+  ! The same with attitude.
+  !f2py threadsafe
+  use prepared, only: solve_prepared_attitude
+  implicit none
+  integer(4), intent(in) :: n_packed
+  real(8), intent(in) :: packed(n_packed)
+  real(8), intent(in) :: start(7)    ! omega in rad/s, and a unit quaternion, scalar first
+  real(8), intent(in) :: t_end       ! s
+  real(8), intent(out) :: state(7)   ! NaN unless the status is 0 or 6
+  integer(4), intent(out) :: status
+  integer(8), intent(out) :: steps   ! 0 of a closed form
+  real(8), intent(out) :: found(2)   ! estimated error and growth; below 0 where unknown
+
+  call solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
+end subroutine solve_packed_attitude

@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from typing import Self
 
+from pyharness.model.attitude import Quaternion
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, Numbers, Triple
 
@@ -13,5 +14,20 @@ class BoundKernel:
         brief: Array | None = None,
     ) -> Self: ...
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array: ...
+    @property
+    def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...
+
+class BoundAttitudeKernel:
+    def __new__(
+        cls,
+        kernel: Callable[..., tuple[Array, int, int, Array]],
+        packed: Array,
+        check: Callable[[object, object, object], tuple[tuple[float, ...], float]],
+        brief: Array | None,
+        attitude: Quaternion,
+    ) -> Self: ...
+    def __call__(
+        self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
+    ) -> tuple[Array, Array]: ...
     @property
     def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...

@@ -7,13 +7,15 @@ module prepared
   use kinds, only: dp
   use levels, only: quick_solve, taylor_solve
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, IMPROVED_EULER, QUICK, &
-                     QUICK_OR_TAYLOR, RK4, SPHERE, TAYLOR
-  use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, N_COSINES, &
-                    N_SINES, RATE, STEP, TOLERANCE, WAVES
+                     QUICK_OR_TAYLOR, RK4, SPACE_TORQUE, SPHERE, TAYLOR
+  use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
+                    N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use problem, only: problem_t
+  use space_torque, only: space_torque_solve
   use sphere, only: sphere_rows
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
   use torque_free, only: torque_free_rows
+  use torque_free_attitude, only: torque_free_attitude_rows
   implicit none(type, external)
   private
 
@@ -22,7 +24,7 @@ module prepared
   real(dp), parameter :: LARGE = 2.0_dp**300
   integer, parameter :: MOST_POWER = 1000
 
-  public :: solve_prepared
+  public :: solve_prepared, solve_prepared_attitude
 
 contains
 
@@ -181,6 +183,53 @@ contains
       if (.not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
     end if
   end subroutine solve_as_given
+
+  subroutine solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
+    !! Angular velocity and attitude at `t_end`; NaN where there are none.
+    integer, intent(in) :: n_packed
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
+    real(dp), intent(in) :: start(7)   !! omega, rad/s, and a unit quaternion, scalar first
+    real(dp), intent(in) :: t_end      !! s
+    real(dp), intent(out) :: state(7)
+    integer, intent(out) :: status     !! of the module statuses
+    integer(int64), intent(out) :: steps
+    real(dp), intent(out) :: found(2)  !! estimated error, relative, and growth; below 0: unknown
+    type(problem_t) :: problem
+    real(dp) :: times(1)
+    integer :: code, n_rows
+    real(dp) :: needed, estimates(3), attitudes(4, 0:1)
+
+    code = int(packed(METHOD))
+    times(1) = t_end
+    steps = 0
+    found = -1.0_dp
+    if (.not. (all(abs(start) <= huge(t_end)) .and. abs(t_end) <= huge(t_end))) then
+      status = OVERFLOW
+    else
+      status = REFUSED
+      attitudes(:, 0) = start(4:)
+      if (code == SPACE_TORQUE) then
+        call unpack(packed, n_packed, problem)
+        call space_torque_solve(problem, &
+                                maxval(packed(MOMENTS:MOMENTS + 2))/packed(MOMENTS:MOMENTS + 2), &
+                                start(:3), packed(TOLERANCE), packed(EFFORT), 1, times, state(:3), &
+                                attitudes, n_rows, status, steps, needed, estimates)
+        state(4:) = attitudes(:, 1)
+        found = estimates(:2)
+      else if (code /= TAYLOR) then
+        call torque_free_attitude_rows(packed(MOMENTS:MOMENTS + 2), start(:3), start(4:), 1, &
+                                       times, state(:3), state(4:), n_rows, status)
+      end if
+      if (status == REFUSED .and. code /= CLOSED_FORM) then
+        call unpack(packed, n_packed, problem)
+        call taylor_solve(problem, start(:3), packed(TOLERANCE), packed(EFFORT), 1, times, &
+                          state(:3), 1, attitudes, n_rows, status, steps, needed, estimates)
+        state(4:) = attitudes(:, 1)
+        found = estimates(:2)
+      end if
+    end if
+    if (.not. is_result(status)) state = transfer(huge(0_int64), 1.0_dp)
+  end subroutine solve_prepared_attitude
 
   pure logical function is_result(status)
     !! Whether there is an omega, though rounding may have cost it its digits.

@@ -11,10 +11,12 @@
 #define NPY_TARGET_VERSION NPY_2_0_API_VERSION
 #include <numpy/arrayobject.h>
 
-/* solve_packed of api.f90. */
-typedef void kernel(const double *packed, const int *n_packed, const double *omega0,
-                    const double *t_end, double *omega, int *status, int64_t *steps,
+/* solve_packed of api.f90, of three numbers; or solve_packed_attitude, of seven. */
+typedef void kernel(const double *packed, const int *n_packed, const double *start,
+                    const double *t_end, double *state, int *status, int64_t *steps,
                     double *found);
+
+enum { OMEGA = 3, ATTITUDE = 4, MOST = OMEGA + ATTITUDE }; /* numbers of each */
 
 /* How a thread's last call ended, and what it was: what a closed form did to rounding is worked out
    when it is asked for. A thread's number is never given again, as its address is. */
@@ -34,7 +36,9 @@ typedef struct {
   kernel *address;       /* NULL where it is not f2py's: then it is called as Python would */
   PyArrayObject *packed; /* read-only */
   PyArrayObject *brief;  /* the same, or NULL: for what takes less time than others' getting a turn */
-  PyObject *check;       /* (omega0, t_end, out) -> (three floats, float), or its InputError */
+  PyObject *check;       /* (omega0, t_end, third) -> (a start's floats, float), or its InputError */
+  int width;             /* numbers of a start: OMEGA, or MOST */
+  double attitude[ATTITUDE]; /* at time 0, where a call gives none */
   ending *endings;
   Py_ssize_t n_endings;
   Py_ssize_t room;
@@ -43,8 +47,11 @@ typedef struct {
 
 enum { COMPLETE = 0 }; /* of the statuses */
 
+/* How far the square of a length of 1 may be off: nothing is divided by such a length. */
+#define ROUNDED 0x1p-51
+
 static PyObject *out_name; /* interned, as the compiler's names of keywords are */
-static npy_intp three[1] = {3};
+static npy_intp three[1] = {OMEGA}, four[1] = {ATTITUDE};
 
 /* ---- Endings ------------------------------------------------------------------------------ */
 
@@ -111,22 +118,24 @@ static PyObject *get_ending(PyObject *object, void *Py_UNUSED(closure))
 typedef struct {
   PyObject *omega0;
   PyObject *t_end;
-  PyObject *out; /* or None */
+  PyObject *third; /* out or attitude0; or None */
 } arguments;
 
-/* Put what was given into its place by position and name, as for
-   def solver(omega0, t_end, *, out=None). */
-static int sort_arguments(arguments *found, PyObject *const *given, Py_ssize_t count,
+/* Put what was given into its place by position and name, as its signature says. */
+static int sort_arguments(arguments *found, int width, PyObject *const *given, Py_ssize_t count,
                           PyObject *names)
 {
-  static const char *const known[] = {"omega0", "t_end", "out"};
-  PyObject **const places[] = {&found->omega0, &found->t_end, &found->out};
+  const int with_attitude = width > OMEGA;
+  const char *const known[] = {"omega0", "t_end", with_attitude ? "attitude0" : "out"};
+  const char *const signature = with_attitude ? "solver(omega0, t_end, attitude0=None)"
+                                              : "solver(omega0, t_end, *, out=None)";
+  const int most = with_attitude ? 3 : 2;
+  PyObject **const places[] = {&found->omega0, &found->t_end, &found->third};
   const Py_ssize_t n_names = names ? PyTuple_GET_SIZE(names) : 0;
 
-  if (count > 2) {
-    PyErr_Format(PyExc_TypeError,
-                 "solver(omega0, t_end, *, out=None) takes 2 positional arguments but %zd were given",
-                 count);
+  if (count > most) {
+    PyErr_Format(PyExc_TypeError, "%s takes %d positional arguments but %zd were given", signature,
+                 most, count);
     return 0;
   }
   for (Py_ssize_t i = 0; i < count; i++) *places[i] = given[i];
@@ -135,13 +144,11 @@ static int sort_arguments(arguments *found, PyObject *const *given, Py_ssize_t c
     int k = 0;
     while (k < 3 && PyUnicode_CompareWithASCIIString(name, known[k]) != 0) k++;
     if (k == 3) {
-      PyErr_Format(PyExc_TypeError,
-                   "solver(omega0, t_end, *, out=None) got an unexpected keyword argument '%U'", name);
+      PyErr_Format(PyExc_TypeError, "%s got an unexpected keyword argument '%U'", signature, name);
       return 0;
     }
     if (*places[k] != NULL) {
-      PyErr_Format(PyExc_TypeError,
-                   "solver(omega0, t_end, *, out=None) got multiple values for argument '%s'",
+      PyErr_Format(PyExc_TypeError, "%s got multiple values for argument '%s'", signature,
                    known[k]);
       return 0;
     }
@@ -149,18 +156,17 @@ static int sort_arguments(arguments *found, PyObject *const *given, Py_ssize_t c
   }
   for (int k = 0; k < 2; k++) {
     if (*places[k] == NULL) {
-      PyErr_Format(PyExc_TypeError, "solver(omega0, t_end, *, out=None) missing argument '%s'",
-                   known[k]);
+      PyErr_Format(PyExc_TypeError, "%s missing argument '%s'", signature, known[k]);
       return 0;
     }
   }
-  if (found->out == NULL) found->out = Py_None;
+  if (found->third == NULL) found->third = Py_None;
   return 1;
 }
 
-static inline int is_three(PyArrayObject *array)
+static inline int is_of(int count, PyArrayObject *array)
 {
-  return PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == 3;
+  return PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == count;
 }
 
 /* NumPy's numbers that are all in the range of a double: no longdouble, no time span. */
@@ -191,7 +197,7 @@ static inline int read_number(PyObject *object, double *number)
 }
 
 /* Read an array of another kind of numbers, or of bytes that lie otherwise. */
-static int read_converted(PyArrayObject *array, double start[3])
+static int read_converted(PyArrayObject *array, int count, double *numbers)
 {
   const int type = PyArray_TYPE(array);
   if (!PyTypeNum_ISINTEGER(type) && type != NPY_HALF && type != NPY_FLOAT && type != NPY_DOUBLE) {
@@ -203,55 +209,74 @@ static int read_converted(PyArrayObject *array, double start[3])
     PyErr_Clear();
     return 0;
   }
-  memcpy(start, PyArray_DATA(same), 3 * sizeof(double));
+  memcpy(numbers, PyArray_DATA(same), (size_t)count * sizeof(double));
   Py_DECREF(same);
   return 1;
 }
 
-/* Read a start, if it is plainly one; an array's stride may be any. */
-static inline int read_start(PyObject *object, double start[3])
+/* Read so many numbers, if that is plainly what it is; an array's stride may be any. */
+static inline int read_numbers(PyObject *object, int count, double *numbers)
 {
   if (PyArray_CheckExact(object)) {
     PyArrayObject *array = (PyArrayObject *)object;
-    if (!is_three(array)) return 0;
+    if (!is_of(count, array)) return 0;
     if (PyArray_TYPE(array) != NPY_DOUBLE || !PyArray_ISBEHAVED_RO(array)) {
-      return read_converted(array, start);
+      return read_converted(array, count, numbers);
     }
     const char *data = PyArray_BYTES(array);
     const npy_intp stride = PyArray_STRIDE(array, 0);
-    for (int i = 0; i < 3; i++) start[i] = *(const double *)(data + i * stride);
+    for (int i = 0; i < count; i++) numbers[i] = *(const double *)(data + i * stride);
     return 1;
   }
-  if (PyTuple_CheckExact(object) && PyTuple_GET_SIZE(object) == 3) {
-    return read_number(PyTuple_GET_ITEM(object, 0), start) &&
-           read_number(PyTuple_GET_ITEM(object, 1), start + 1) &&
-           read_number(PyTuple_GET_ITEM(object, 2), start + 2);
+  if (PyTuple_CheckExact(object) && PyTuple_GET_SIZE(object) == count) {
+    for (int i = 0; i < count; i++) {
+      if (!read_number(PyTuple_GET_ITEM(object, i), numbers + i)) return 0;
+    }
+    return 1;
   }
-  if (PyList_CheckExact(object) && PyList_GET_SIZE(object) == 3) {
-    return read_number(PyList_GET_ITEM(object, 0), start) &&
-           read_number(PyList_GET_ITEM(object, 1), start + 1) &&
-           read_number(PyList_GET_ITEM(object, 2), start + 2);
+  if (PyList_CheckExact(object) && PyList_GET_SIZE(object) == count) {
+    for (int i = 0; i < count; i++) {
+      if (!read_number(PyList_GET_ITEM(object, i), numbers + i)) return 0;
+    }
+    return 1;
   }
   return 0;
+}
+
+/* Read an attitude that need not be divided by its length. */
+static inline int read_unit(PyObject *object, double *q)
+{
+  if (!read_numbers(object, ATTITUDE, q)) return 0;
+  const double off = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0;
+  return -ROUNDED <= off && off <= ROUNDED;
 }
 
 static inline int is_buffer(PyObject *object)
 {
   PyArrayObject *array = (PyArrayObject *)object;
-  return PyArray_Check(object) && is_three(array) && PyArray_TYPE(array) == NPY_DOUBLE &&
+  return PyArray_Check(object) && is_of(OMEGA, array) && PyArray_TYPE(array) == NPY_DOUBLE &&
          PyArray_ISCARRAY(array);
 }
 
+/* Read the third argument: out is looked at, an attitude is read behind omega. */
+static inline int read_third(const bound_kernel *self, PyObject *third, double *start)
+{
+  if (self->width == OMEGA) return third == Py_None || is_buffer(third);
+  if (third != Py_None) return read_unit(third, start + OMEGA);
+  memcpy(start + OMEGA, self->attitude, sizeof self->attitude);
+  return 1;
+}
+
 /* Let Python say what is wrong, or convert what is not. */
-static int read_slowly(bound_kernel *self, const arguments *given, double start[3], double *time)
+static int read_slowly(bound_kernel *self, const arguments *given, double *start, double *time)
 {
   PyObject *found =
-    PyObject_CallFunctionObjArgs(self->check, given->omega0, given->t_end, given->out, NULL);
+    PyObject_CallFunctionObjArgs(self->check, given->omega0, given->t_end, given->third, NULL);
   if (found == NULL) return 0;
   const int is_right = PyTuple_Check(found) && PyTuple_GET_SIZE(found) == 2 &&
-                       read_start(PyTuple_GET_ITEM(found, 0), start) &&
+                       read_numbers(PyTuple_GET_ITEM(found, 0), self->width, start) &&
                        read_number(PyTuple_GET_ITEM(found, 1), time) &&
-                       (given->out == Py_None || is_buffer(given->out));
+                       (self->width > OMEGA || read_third(self, given->third, start));
   Py_DECREF(found);
   if (!is_right) PyErr_SetString(PyExc_SystemError, "the check let through what can't be read");
   return is_right;
@@ -273,33 +298,53 @@ static int copy_numbers(PyObject *values, npy_intp count, double *numbers)
 }
 
 /* Enter a kernel of another kind, one that stands in f2py's place. */
-static int call_object(bound_kernel *self, double omega[3], ending *now)
+static int call_object(bound_kernel *self, const double *start, double *state, ending *now)
 {
   int is_right = 0;
   long long steps = 0;
   PyObject *result = NULL, *values, *found;
-  PyObject *omega0 = PyArray_SimpleNew(1, three, NPY_DOUBLE);
-  if (omega0 == NULL) return 0;
-  memcpy(PyArray_DATA((PyArrayObject *)omega0), now->start, 3 * sizeof(double));
-  result = PyObject_CallFunction(self->callable, "OOd", self->packed, omega0, now->time);
+  npy_intp width[1] = {self->width};
+  PyObject *given = PyArray_SimpleNew(1, width, NPY_DOUBLE);
+  if (given == NULL) return 0;
+  memcpy(PyArray_DATA((PyArrayObject *)given), start, (size_t)self->width * sizeof(double));
+  result = PyObject_CallFunction(self->callable, "OOd", self->packed, given, now->time);
   if (result != NULL && !PyTuple_Check(result)) {
     PyErr_SetString(PyExc_TypeError, "the kernel returned no tuple");
   } else if (result != NULL &&
              PyArg_ParseTuple(result, "OiLO", &values, &now->status, &steps, &found)) {
     now->steps = steps;
-    is_right = copy_numbers(values, 3, omega) && copy_numbers(found, 2, now->found);
+    is_right = copy_numbers(values, self->width, state) && copy_numbers(found, 2, now->found);
   }
   Py_XDECREF(result);
-  Py_DECREF(omega0);
+  Py_DECREF(given);
   return is_right;
 }
 
-static inline void enter(const bound_kernel *self, PyArrayObject *packed, ending *now,
-                         double omega[3])
+static inline void enter(const bound_kernel *self, PyArrayObject *packed, const double *start,
+                         double *state, ending *now)
 {
   const int n_packed = (int)PyArray_DIM(packed, 0);
-  self->address(PyArray_DATA(packed), &n_packed, now->start, &now->time, omega, &now->status,
+  self->address(PyArray_DATA(packed), &n_packed, start, &now->time, state, &now->status,
                 &now->steps, now->found);
+}
+
+static PyObject *new_array(npy_intp *shape, const double *numbers)
+{
+  PyObject *result = PyArray_SimpleNew(1, shape, NPY_DOUBLE);
+  if (result != NULL) {
+    memcpy(PyArray_DATA((PyArrayObject *)result), numbers, (size_t)shape[0] * sizeof(double));
+  }
+  return result;
+}
+
+static PyObject *omega_and_attitude(const double *state)
+{
+  PyObject *omega = new_array(three, state);
+  PyObject *attitude = new_array(four, state + OMEGA);
+  PyObject *both = omega && attitude ? PyTuple_Pack(2, omega, attitude) : NULL;
+  Py_XDECREF(omega);
+  Py_XDECREF(attitude);
+  return both;
 }
 
 static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, PyObject *names)
@@ -307,36 +352,37 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   bound_kernel *self = (bound_kernel *)object;
   const Py_ssize_t count = PyVectorcall_NARGS(n_given);
   arguments found = {NULL, NULL, NULL};
-  double omega[3];
+  double start[MOST], state[MOST];
   ending now;
 
   if (count == 2 && names == NULL) {
     found = (arguments){given[0], given[1], Py_None};
-  } else if (count == 2 && PyTuple_GET_SIZE(names) == 1 &&
+  } else if (self->width == OMEGA && count == 2 && PyTuple_GET_SIZE(names) == 1 &&
              PyTuple_GET_ITEM(names, 0) == out_name) {
     found = (arguments){given[0], given[1], given[2]};
-  } else if (!sort_arguments(&found, given, count, names)) {
+  } else if (!sort_arguments(&found, self->width, given, count, names)) {
     return NULL;
   }
-  if (!(read_start(found.omega0, now.start) && read_number(found.t_end, &now.time) &&
-        (found.out == Py_None || is_buffer(found.out)))) {
-    if (!read_slowly(self, &found, now.start, &now.time)) return NULL;
+  if (!(read_numbers(found.omega0, OMEGA, start) && read_number(found.t_end, &now.time) &&
+        read_third(self, found.third, start))) {
+    if (!read_slowly(self, &found, start, &now.time)) return NULL;
   }
+  memcpy(now.start, start, sizeof now.start);
 
   if (self->address != NULL) {
     PyThreadState *thread = PyThreadState_Get();
     now.status = COMPLETE + 1;
-    if (self->brief != NULL) enter(self, self->brief, &now, omega);
+    if (self->brief != NULL) enter(self, self->brief, start, state, &now);
     if (now.status != COMPLETE) {
       PyEval_SaveThread();
-      enter(self, self->packed, &now, omega);
+      enter(self, self->packed, start, state, &now);
       PyEval_RestoreThread(thread);
       /* Ctrl-C, which a kernel asks about now and then, ends it with this set. */
       if (PyErr_Occurred()) return NULL;
     }
     now.thread = PyThreadState_GetID(thread);
   } else {
-    if (!call_object(self, omega, &now)) return NULL;
+    if (!call_object(self, start, state, &now)) return NULL;
     now.thread = PyThreadState_GetID(PyThreadState_Get());
   }
 
@@ -345,18 +391,15 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   if (own == NULL) return NULL;
   *own = now;
 
-  PyObject *result = found.out;
-  if (result == Py_None) {
-    result = PyArray_SimpleNew(1, three, NPY_DOUBLE);
-    if (result == NULL) return NULL;
-  } else {
-    Py_INCREF(result);
-  }
-  memcpy(PyArray_DATA((PyArrayObject *)result), omega, 3 * sizeof(double));
-  return result;
+  if (self->width > OMEGA) return omega_and_attitude(state);
+  if (found.third == Py_None) return new_array(three, state);
+  memcpy(PyArray_DATA((PyArrayObject *)found.third), state, OMEGA * sizeof(double));
+  return Py_NewRef(found.third);
 }
 
 /* ---- The type ----------------------------------------------------------------------------- */
+
+static PyTypeObject bound_attitude_kernel_type; /* as bound_kernel_type, of seven numbers */
 
 /* A packed array of a solver's own; NULL with an error set where it is none. */
 static PyArrayObject *own_packed(PyObject *packed)
@@ -375,10 +418,11 @@ static PyArrayObject *own_packed(PyObject *packed)
 
 static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-  static char *known[] = {"kernel", "packed", "check", "brief", NULL};
+  static char *known[] = {"kernel", "packed", "check", "brief", "attitude", NULL};
   PyObject *callable, *packed, *check, *brief = Py_None;
-  if (!PyArg_ParseTupleAndKeywords(args, names, "OOO|O", known, &callable, &packed, &check,
-                                   &brief)) {
+  double q[ATTITUDE] = {0.0};
+  if (!PyArg_ParseTupleAndKeywords(args, names, "OOO|O(dddd)", known, &callable, &packed, &check,
+                                   &brief, q, q + 1, q + 2, q + 3)) {
     return NULL;
   }
   bound_kernel *self = (bound_kernel *)type->tp_alloc(type, 0);
@@ -386,6 +430,8 @@ static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
   self->vectorcall = call;
   self->callable = Py_NewRef(callable);
   self->check = Py_NewRef(check);
+  self->width = PyType_IsSubtype(type, &bound_attitude_kernel_type) ? MOST : OMEGA;
+  memcpy(self->attitude, q, sizeof q);
   PyObject *address = PyObject_GetAttrString(callable, "_cpointer");
   if (address != NULL) {
     self->address = (kernel *)PyCapsule_GetPointer(address, PyCapsule_GetName(address));
@@ -488,10 +534,17 @@ PyMODINIT_FUNC PyInit__solver(void)
 {
   import_array();
   out_name = PyUnicode_InternFromString("out");
-  if (out_name == NULL || PyType_Ready(&bound_kernel_type) < 0) return NULL;
+  bound_attitude_kernel_type = bound_kernel_type;
+  bound_attitude_kernel_type.tp_name = "pyharness._solver.BoundAttitudeKernel";
+  if (out_name == NULL || PyType_Ready(&bound_kernel_type) < 0 ||
+      PyType_Ready(&bound_attitude_kernel_type) < 0) {
+    return NULL;
+  }
   PyObject *created = PyModule_Create(&module);
   if (created != NULL &&
-      PyModule_AddObjectRef(created, "BoundKernel", (PyObject *)&bound_kernel_type) < 0) {
+      (PyModule_AddObjectRef(created, "BoundKernel", (PyObject *)&bound_kernel_type) < 0 ||
+       PyModule_AddObjectRef(created, "BoundAttitudeKernel",
+                             (PyObject *)&bound_attitude_kernel_type) < 0)) {
     Py_CLEAR(created);
   }
   return created;

@@ -140,6 +140,8 @@ contains
     n_rows = outcome%n_rows
     status = outcome%status
     steps = outcome%steps
+    ! The way is known as it is: it asks for no march that is more precise.
+    growth = growth*outcome%way
     found = [outcome%error + ROUNDING*growth, growth, spent]
     if (status == COMPLETE .and. ROUNDING*growth > UNSURE*tolerance) status = SENSITIVE
     if (status == GAVE_UP) then

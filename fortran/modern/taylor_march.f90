@@ -84,7 +84,8 @@ contains
     integer(int64) :: half_way   ! of the steps allowed
     real(dp) :: t_half           ! the time then, s
 
-    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true.)
+    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true., &
+                      1.0_dp)
     with_attitude = n_attitudes > 0
     rest = times(n_times)
     if (rest == 0.0_dp) then
@@ -234,8 +235,7 @@ contains
     if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
     if (now%scale > 0.0_dp) found%error = found%error/now%scale
     if (with_attitude) then
-      ! An error of omega turns it all the way.
-      found%growth = found%growth*(1.0_dp + 0.5_dp*now%scale*abs(times(n_times)))
+      found%way = 1.0_dp + 0.5_dp*now%scale*abs(times(n_times))
       if (.not. attitude%worst <= found%error) found%error = attitude%worst
     end if
     if (.not. found%error <= NO_DIGIT) found%error = NO_DIGIT

@@ -36,6 +36,7 @@ module taylor_rows
     real(dp) :: ahead    ! steps to the end, as far as known; where it gave up
     real(dp) :: precise_steps ! to the end, at the least, of a march that is precise
     logical :: finest    ! no step could err less
+    real(dp) :: way      ! how much more the attitude grows: an error of omega turns it all the way
   end type outcome_t
 
   public :: add_last_row, add_rows

@@ -12,7 +12,9 @@ import numpy as np
 
 from pyharness.bench.contenders import Maker, refuse_rounding
 from pyharness.compare.candidates import End, Ready, not_finite, plain
+from pyharness.methods.scipy_ivp import state_of
 from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
 
 MOST_STEPS = 10_000_000
 Formula = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]
@@ -54,13 +56,15 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
     solver = getattr(package, name)
     function = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=False)))
     counting = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=True)))
-    omega0, largest = np.array(scene.omega), max(map(abs, scene.omega)) or 1.0
+    start, size = np.array(state_of(scene)), max(map(abs, scene.omega)) or 1.0
+    # It takes one for all unknowns.
+    size = size if scene.attitude is None else min(1.0, size)
 
     def make(horizon: float, setting: float) -> Ready:
         if name == "lsoda":
             refuse_rounding("LSODA", setting)
         times, calls = np.array([0.0, horizon]), np.zeros(1)
-        given = omega0, times, calls, setting, setting * largest, MOST_STEPS
+        given = start, times, calls, setting, setting * size, MOST_STEPS
 
         def read(result: Any) -> End:
             rows, success = result
@@ -68,7 +72,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
                 return not_finite("the solver reports a failure")
             calls[0] = 0.0
             solver(counting.address, *given)
-            return End(plain(rows[-1]), evaluations=int(calls[0]))
+            return end_of(rows[-1], int(calls[0]))
 
         return Ready(partial(solver, function.address, *given), read)
 
@@ -85,8 +89,11 @@ def _compiled(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand sides as text; A, B, C are the scene's where none are given."""
-    x, y, z = state
+    """Return the right-hand sides as text; A, B, C are the scene's where none are given.
+
+    Of three names omega's, of seven the attitude's as well: q' = q (0, omega)/2.
+    """
+    x, y, z, *attitude = state
     moments = scene.moments or (1.0, 1.0, 1.0)
     law = scene.body_torque
     found = []
@@ -105,7 +112,27 @@ def rates(
                     wave = f"{function}({frequency!r} * ({time}))"
                     terms.append(f"{amplitude[axis] / moments[axis]!r} * {wave}")
         found.append(" + ".join(terms) or "0.0")
+    if attitude:
+        a, b, c, d = attitude
+        found += [
+            f"-0.5 * ({b} * {x} + {c} * {y} + {d} * {z})",
+            f"0.5 * ({a} * {x} + {c} * {z} - {d} * {y})",
+            f"0.5 * ({a} * {y} + {d} * {x} - {b} * {z})",
+            f"0.5 * ({a} * {z} + {b} * {y} - {c} * {x})",
+        ]
     return found
+
+
+def state_names(scene: Scene) -> str:
+    """Return a letter for each unknown: omega's three, and the attitude's four if any."""
+    return "xyz" if scene.attitude is None else "xyzabcd"
+
+
+def end_of(state: Array, evaluations: int | None = None) -> End:
+    """Return the end of a call from the unknowns at T."""
+    found = plain(state)
+    attitude = found[3:] if len(found) > 3 else None
+    return End(found[:3], evaluations=evaluations, attitude=attitude)
 
 
 def _steps_source(scene: Scene, formula: Formula) -> str:
@@ -137,8 +164,10 @@ def _increment(factors: Sequence[float], name: str) -> str:
 
 def _callback_source(scene: Scene, counted: bool) -> str:
     """Return a right-hand side as numbalsoda calls it; `p` counts the calls if asked to."""
-    lines = ["def function(t, u, du, p):", "    x, y, z = u[0], u[1], u[2]"]
-    lines += [f"    du[{i}] = {rate}" for i, rate in enumerate(rates(scene, "t", "xyz"))]
+    names = state_names(scene)
+    lines = ["def function(t, u, du, p):"]
+    lines += [f"    {name} = u[{i}]" for i, name in enumerate(names)]
+    lines += [f"    du[{i}] = {rate}" for i, rate in enumerate(rates(scene, "t", names))]
     if counted:
         lines.append("    p[0] += 1.0")
     return "\n".join(lines) + "\n"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from pyharness.compare.candidates import Candidate, Ready, called, listed
+from pyharness.compare.candidates import Candidate, Ready, called, listed, turning
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import corrected, original
@@ -20,7 +20,7 @@ Maker = Callable[[float, float], Ready]
 
 @dataclass(frozen=True)
 class Contender:
-    """A way to omega(T), with a setting that trades time for accuracy."""
+    """A way to omega(T), and to the attitude, with a setting that trades time for accuracy."""
 
     name: str
     setting: str  # what is varied: tolerance, steps, none
@@ -29,16 +29,17 @@ class Contender:
     settings: tuple[float, ...] = ()  # of a fixed step none: the numbers follow from the scene
     order: int = 0  # of a method of a fixed step
     package: str = ""  # that it needs; empty for our own
+    attitude: bool = False  # whether it carries that of a scene that has one
 
 
 def own() -> list[Contender]:
     """Return our methods and the three programs, original and corrected."""
     found = [
-        Contender(name, "tolerance", _made(partial(called, name)), TOLERANCES)
+        Contender(name, "tolerance", partial(_prepared, name), TOLERANCES, attitude=True)
         for name in ("auto", "taylor")
     ]
     found.append(
-        Contender("closed-form", "none", _made(lambda _: called("closed-form", 1e-12)), (0.0,))
+        Contender("closed-form", "none", partial(_prepared, "closed-form"), (0.0,), attitude=True)
     )
     in_steps = {name: (called(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)}
     for name, program in PROGRAM_REGISTRY.items():
@@ -58,9 +59,10 @@ def refuse_rounding(solver: str, setting: float) -> None:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")
 
 
-def _made(candidate: Callable[[float], Candidate]) -> Callable[[Scene], Maker]:
-    """Return what makes calls of the candidate of a tolerance."""
-    return lambda scene: lambda horizon, setting: candidate(setting).ready(scene, horizon)
+def _prepared(name: str, scene: Scene) -> Maker:
+    candidate = called if scene.attitude is None else turning
+    # A closed form has no setting.
+    return lambda horizon, setting: candidate(name, setting or 1e-12).ready(scene, horizon)
 
 
 def _in_steps(candidate: Candidate, scene: Scene) -> Maker:

@@ -1,8 +1,9 @@
 """The benchmark: run time against error, ours and other people's, in one process and one run.
 
-Every contender is called with a ladder of settings, each call from omega(0) to omega(T). First
-all are made, called once and judged against the reference; then they are timed in rounds, a batch
-of each in turn, so that what else the machine does hits all alike. The median counts.
+Every contender is called with a ladder of settings, each call from time 0 to T: to omega, and of a
+scene with an attitude to both. First all are made, called once and judged against the reference;
+then they are timed in rounds, a batch of each in turn, so that what else the machine does hits all
+alike. The median counts.
 """
 
 import math
@@ -14,8 +15,9 @@ from time import perf_counter
 import numpy as np
 
 from pyharness.bench.contenders import Contender, Maker
-from pyharness.compare.candidates import Ready, not_finite
+from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.compare.timing import seconds
+from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
@@ -25,6 +27,8 @@ from pyharness.truth.reference import Reference, reference
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 HORIZON, LONG_HORIZON = 3.0, 100.0
 _CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
+# With attitude; in Case 6 the reference would need too many steps.
+_TURNING_CASES, _LONG_TURNING_CASES = (1, *_CASES), (1, 2, 3, 4, 5, 7)
 
 _LONGEST_CALL = 1.0  # s
 # Seconds for the first calls of a contender in one case, by what is varied.
@@ -56,9 +60,9 @@ class Workload:
     @property
     def group(self) -> str:
         """What its ratios are averaged with."""
-        if self.horizon != HORIZON:
+        if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
-        return f"{'torque-free' if self.scene.torque.is_zero else 'torque'}, T = {HORIZON:g}"
+        return f"{'torque-free' if self.scene.torque.is_zero else 'torque'}, T = {self.horizon:g}"
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,9 @@ class Row:
     kind: str  # what the setting is: tolerance, steps, none
     setting: float | None
     seconds: float | None  # median time of a call; None where it failed
-    error: float | None  # of omega at T, over the largest component there; None where it failed
+    # Of omega at T, over the largest component there, or the attitude's (rad) where it is larger;
+    # None where it failed.
+    error: float | None
     evaluations: int | None  # right-hand sides of a call, where they can be counted
     note: str = ""  # why it failed
 
@@ -93,17 +99,32 @@ class Finding:
     rows: list[Row]
     refused: list[Refusal]
     preparation: dict[tuple[int | str, str], float]  # s, by (case or random scene, method)
-    doubt: dict[str, float]  # relative error that the reference may have, by label
+    doubt: dict[str, float]  # error that the reference may have, as that of a row, by label
+
+    @property
+    def attitude(self) -> bool:
+        """Whether the attitude was asked for."""
+        return any(load.scene.attitude is not None for load in self.workloads)
 
 
-def workloads(case: int | None = None, horizon: float | None = None) -> list[Workload]:
-    """Return what is integrated: Cases 2 to 7, Cases 3 and 4 also for long; or what is asked."""
-    cases = _CASES if case is None else (case,)
+def workloads(
+    case: int | None = None, horizon: float | None = None, attitude: bool = False
+) -> list[Workload]:
+    """Return what is integrated: Cases 2 to 7, Cases 3 and 4 also for long; or what is asked.
+
+    With `attitude` all cases, from the axes of space, and for long all but Case 6.
+    """
+    usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
+    cases = usual if case is None else (case,)
     asked = [(n, HORIZON if horizon is None else horizon) for n in cases]
     if horizon is None:
-        asked += [(n, LONG_HORIZON) for n in cases if n in _LONG_CASES]
+        asked += [(n, LONG_HORIZON) for n in cases if n in long]
     marks = {HORIZON: "", LONG_HORIZON: "L"}
-    return [Workload(f"{n}{marks.get(t, f' T={t:g}')}", case_scene(n), t) for n, t in asked]
+    start = IDENTITY if attitude else None
+    return [
+        Workload(f"{n}{marks.get(t, f' T={t:g}')}", replace(case_scene(n), attitude=start), t)
+        for n, t in asked
+    ]
 
 
 def measure(
@@ -123,11 +144,14 @@ def measure(
         tell("reference")
         truth = load.truth or reference(load.scene, [load.horizon], precise=True)
         size = float(np.abs(truth.omega).max(initial=0.0)) or 1.0
-        found.doubt[load.label] = truth.estimate / size
+        found.doubt[load.label] = max(truth.estimate / size, truth.angle_estimate)
         entries: list[tuple[Ready, Row]] = []
         if load.kinds:
             makers.clear()  # no random scene comes twice
         for contender in contenders:
+            if load.scene.attitude is not None and not contender.attitude:
+                found.refused.append(Refusal(load, contender.name, None, "carries no attitude"))
+                continue
             tell(contender.name)
             key = (load.scene.case or load.label, contender.name)
             # Compiled code is kept for the same scene with another horizon.
@@ -148,6 +172,22 @@ def measure(
             median = None if row.error is None else next(times)
             found.rows.append(replace(row, seconds=median))
     return found
+
+
+def error_of(end: End, truth: Reference) -> float | None:
+    """Return the relative error of omega, or the attitude's (rad) where it is larger; None if none.
+
+    Of a truth with an attitude both count, and who has none has no error.
+    """
+    error = relative_error(end.omega, truth)
+    if error is None or truth.attitude is None:
+        return error
+    if end.attitude is None or not np.isfinite(end.attitude).all() or not end.attitude.any():
+        return None
+    # Whatever its length, which integrators do not keep; scaled first, for its square is a number.
+    attitude = end.attitude / np.abs(end.attitude).max()
+    attitude /= np.linalg.norm(attitude)
+    return max(error, float(angle_between(attitude[None], truth.attitude)[0]))
 
 
 def relative_error(omega: Array, truth: Reference) -> float | None:
@@ -221,7 +261,7 @@ def _first_calls(
         preparing += max(0.0, middle - begin - first)
         spent += first
         before, last = last, first
-        error = relative_error(end.omega, truth)
+        error = error_of(end, truth)
         if error is None and end.has_result:
             end = not_finite()
         errors.append(error)

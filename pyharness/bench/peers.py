@@ -10,7 +10,8 @@ import numpy as np
 
 from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Contender, Maker, refuse_rounding
-from pyharness.compare.candidates import End, Ready, not_finite, plain
+from pyharness.compare.candidates import End, Ready, not_finite
+from pyharness.methods.scipy_ivp import RightHandSide, state_of, turning
 from pyharness.model.scene import Scene
 from pyharness.truth.reference import exact_coefficients
 
@@ -24,7 +25,9 @@ def peers() -> list[Contender]:
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> Contender:
         settings = finest if name == "heyoka" else TOLERANCES
-        return Contender(name, "tolerance", prepare, settings, package=package)
+        # That one writes to the standard output where it calls a motion stiff.
+        attitude = name != "numbalsoda-dop853"
+        return Contender(name, "tolerance", prepare, settings, package=package, attitude=attitude)
 
     def fixed(name: str, order: int) -> Contender:
         prepare = partial(compiled.numba_fixed, name)
@@ -55,12 +58,12 @@ def _heyoka(scene: Scene) -> Maker:
 
     equations = _heyoka_equations(scene)
     integrators: dict[float, Any] = {}
-    omega0 = np.array(scene.omega)
+    start = np.array(state_of(scene))
 
     def make(horizon: float, setting: float) -> Ready:
         if setting not in integrators:
             integrators[setting] = heyoka.taylor_adaptive(
-                equations, list(scene.omega), tol=setting, compact_mode=False
+                equations, start.tolist(), tol=setting, compact_mode=False
             )
         integrator = integrators[setting]
         state = integrator.state
@@ -68,11 +71,11 @@ def _heyoka(scene: Scene) -> Maker:
 
         def run() -> Any:
             integrator.time = 0.0
-            state[:] = omega0
+            state[:] = start
             return integrator.propagate_until(horizon)
 
         def read(result: Any) -> End:
-            return End(plain(state)) if result[0] == reached else not_finite(str(result[0]))
+            return compiled.end_of(state) if result[0] == reached else not_finite(str(result[0]))
 
         return Ready(run, read)
 
@@ -82,32 +85,44 @@ def _heyoka(scene: Scene) -> Maker:
 def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
     import heyoka
 
-    state = heyoka.make_vars("x", "y", "z")
+    unknowns = compiled.state_names(scene)
+    state = heyoka.make_vars(*unknowns)
     names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
-    names |= dict(zip("xyz", state, strict=True))
+    names |= dict(zip(unknowns, state, strict=True))
     coefficients = [float(each) for each in exact_coefficients(scene)]
-    rates = [eval(rate, names) for rate in compiled.rates(scene, "t", "xyz", coefficients)]
+    rates = [eval(rate, names) for rate in compiled.rates(scene, "t", unknowns, coefficients)]
     return [(x, heyoka.expression(rate)) for x, rate in zip(state, rates, strict=True)]
+
+
+def _right_hand_side(scene: Scene) -> RightHandSide:
+    """Return that of omega, or of both, in plain floats."""
+    slopes = scene.right_hand_side()
+    return slopes if scene.attitude is None else turning(slopes)
+
+
+def _absolute(scene: Scene) -> Any:
+    """Return what a relative tolerance is to be multiplied by: sizes of the unknowns."""
+    largest = max(map(abs, scene.omega)) or 1.0
+    return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
     """Integrate from end to end: no dense output, plain floats in the right-hand side."""
     from scipy.integrate import solve_ivp
 
-    largest = max(map(abs, scene.omega)) or 1.0
+    slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("solve_ivp", setting)
         run = partial(
-            solve_ivp, scene.right_hand_side(), (0.0, horizon), scene.omega, method=name,
-            rtol=setting, atol=setting * largest,
+            solve_ivp, slope, (0.0, horizon), start, method=name, rtol=setting, atol=setting * size,
         )  # fmt: skip
         return Ready(run, read)
 
     def read(result: Any) -> End:
         if not result.success:
             return not_finite(str(result.message))
-        return End(plain(result.y[:, -1]), evaluations=int(result.nfev))
+        return compiled.end_of(result.y[:, -1], int(result.nfev))
 
     return make
 
@@ -115,13 +130,13 @@ def _solve_ivp(name: str, scene: Scene) -> Maker:
 def _odeint(scene: Scene) -> Maker:
     from scipy.integrate import ODEintWarning, odeint
 
-    largest = max(map(abs, scene.omega)) or 1.0
+    slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("LSODA", setting)
         run = partial(
-            odeint, scene.right_hand_side(), scene.omega, np.array([0.0, horizon]),
-            rtol=setting, atol=setting * largest, tfirst=True, mxstep=compiled.MOST_STEPS,
+            odeint, slope, start, np.array([0.0, horizon]), rtol=setting, atol=setting * size,
+            tfirst=True, mxstep=compiled.MOST_STEPS,
         )  # fmt: skip
 
         def read(rows: Any) -> End:
@@ -131,7 +146,7 @@ def _odeint(scene: Scene) -> Maker:
                 _, told = run(full_output=True)
             if "successful" not in told["message"]:
                 return not_finite(told["message"])
-            return End(plain(rows[-1]), evaluations=int(told["nfe"][-1]))
+            return compiled.end_of(rows[-1], int(told["nfe"][-1]))
 
         return Ready(run, read)
 

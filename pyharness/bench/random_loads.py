@@ -7,11 +7,13 @@ whether a draw counts.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from random import Random
 
 import numpy as np
 
 from pyharness.bench.measure import Workload
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.theory.conditioning import along, conditioning
@@ -39,12 +41,14 @@ _BODIES: dict[str, Callable[[Random], list[float]]] = {
 KINDS = ("all", *LAWS, *_SPEEDS, *_BODIES, *_LENGTHS)
 
 
-def random_load(seed: str, number: int) -> Workload:
+def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return what `number`, from 1 on, of a seed stands for; its kind of torque is next in turn.
 
     Moments in kg m2, omega in rad/s, torque in N m, horizon in s; its `truth` is the second
     reference's, its `kinds` are of `KINDS`. Drawn again where a small difference grows
-    `MOST_GROWTH` times or more, or the body turns less than once or more than 300 times.
+    `MOST_GROWTH` times or more, or the body turns less than once or more than 300 times. With
+    `attitude` it is the same scene, from the axes of space, and has no `truth`: the second
+    reference carries no attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
@@ -73,7 +77,8 @@ def random_load(seed: str, number: int) -> Workload:
     estimate = 1e-29 * growth * found.largest
     truth = Reference(path.time, path.omega, None, "Taylor series in whole numbers", estimate)
     kinds = tuple(filter(None, ("all", law, speed, body, length)))
-    return Workload(str(number), scene, horizon, kinds, truth, growth, turns)
+    load = Workload(str(number), scene, horizon, kinds, truth, growth, turns)
+    return replace(load, scene=replace(scene, attitude=IDENTITY), truth=None) if attitude else load
 
 
 def _drawn(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:

@@ -53,7 +53,7 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
     ]
     tables: list[Section] = [[Line(f"## {title}"), table] for title, table in parts]
     page: list[Section] = [
-        [Line("# Run time against error")],
+        [Line("# Run time against error" + (" of omega and attitude" if finding.attitude else ""))],
         [Line(f"Made by `{command}`; run that again to have it for another machine.")],
         [Line(_DRIFT)],
         [Table((Column(""), Column("version")), versions)],
@@ -163,6 +163,7 @@ def _record(finding: Finding) -> dict[str, Any]:
             for (place, method), seconds in finding.preparation.items()
         ],
         "reference_error": finding.doubt,
+        "attitude": finding.attitude,
     }
     if drawn:
         found["spreads"] = [asdict(each) for each in spreads(finding, KINDS)]
@@ -218,7 +219,8 @@ def _parts(finding: Finding) -> list[tuple[str, Table]]:
         if rows:
             doubt = short(finding.doubt.get(load.label))
             title = f"Case {load.label}: {load.scene.name}, T = {load.horizon:g} s "
-            title += f"(reference good to {doubt} of the largest omega)"
+            title += f"(reference good to {doubt}"
+            title += ")" if finding.attitude else " of the largest omega)"
             parts.append((title, Table(columns, rows)))
     columns = [Column("ratio at", left=True), *(Column(name, ratio) for name in targets)]
     for group, loads in groups(finding).items():
@@ -240,9 +242,12 @@ def _power(target: float) -> str:
 def _notes(finding: Finding) -> list[str]:
     drawn = _random(finding)
     last = "mean: geometric, over the scenes in which both reach the error."
+    error = "max |w - ref| / max |ref| at T"
+    if finding.attitude:
+        error = f"{error} or the angle between the attitudes (rad), whichever is larger"
     lines = [
         f"ratio: time of {yardstick(finding)} over own time, above 1 is faster. A time is that of "
-        "the fastest setting whose error, max |w - ref| / max |ref| at T, is at most the one "
+        f"the fastest setting whose error, {error}, is at most the one "
         f"named; '-': none is. {last if drawn else 'best: smallest error of any setting.'}",
     ]
     compiling: dict[str, float] = {}
@@ -256,7 +261,7 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return what came to nothing, a line for each contender and reason, with the first places."""
+    """Return what came to nothing, a line for each reason: by whom, and the first places."""
     # What a call would take, and where it ended, differs from case to case; the reason does not.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
@@ -267,9 +272,10 @@ def not_measured(finding: Finding) -> list[str]:
         place = each.workload.place
         place += "" if each.setting is None else f" at {each.setting:g}"
         reasons.setdefault((each.method, reason), []).append(place)
-    lines = []
+    # Of those that fail alike, one line.
+    alike: dict[tuple[str, str], list[str]] = {}
     for (method, reason), places in reasons.items():
         shown = ", ".join(places[:_MOST_SHOWN])
         more = f" and {len(places) - _MOST_SHOWN} more" if len(places) > _MOST_SHOWN else ""
-        lines.append(f"{method}: {reason} ({shown}{more})")
-    return lines
+        alike.setdefault((reason, shown + more), []).append(method)
+    return [f"{', '.join(methods)}: {why} ({where})" for (why, where), methods in alike.items()]

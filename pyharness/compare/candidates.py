@@ -30,6 +30,7 @@ class End:
     ended: str = "complete"  # or why it is not
     steps: int = 0  # as the candidate counts them
     evaluations: int | None = None  # right-hand sides, where they are counted
+    attitude: Array | None = None  # shape (4,), scalar first, where it was carried
 
     @property
     def is_refused(self) -> bool:
@@ -44,7 +45,7 @@ class End:
 
 @dataclass(frozen=True)
 class Ready:
-    """A call that goes from omega(0) to omega(T) and does nothing else; and how to read it."""
+    """A call that goes from time 0 to T and does nothing else; and how to read it."""
 
     run: Callable[[], Any]
     read: Callable[[Any], End]
@@ -92,6 +93,21 @@ def called(name: str, tolerance: float, primed: bool = False) -> Candidate:
         if primed:
             solver(start[::-1].copy(), 0.5 * time)
         return Ready(partial(solver, start, time), partial(_answered, solver))
+
+    return Candidate(name, ready, _no_rows)
+
+
+def turning(name: str, tolerance: float) -> Candidate:
+    """Return a prepared solver with attitude."""
+
+    def ready(scene: Scene, time: float) -> Ready:
+        solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)
+
+        def read(found: tuple[Array, Array]) -> End:
+            omega, attitude = found
+            return End(plain(omega), solver.status, solver.steps, attitude=plain(attitude))
+
+        return Ready(partial(solver, start, time), read)
 
     return Candidate(name, ready, _no_rows)
 

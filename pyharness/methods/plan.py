@@ -125,10 +125,12 @@ def closed_form(scene: Scene) -> str | None:
     if scene.torque.in_space:
         return None
     a, b, c = scene.euler_coefficients
-    if a == b == c == 0.0 and (scene.attitude is None or scene.torque.is_zero):
-        return "sphere"
     # A body that is given by coefficients has no angular momentum to turn about.
-    if not scene.torque.is_zero or (scene.attitude is not None and scene.moments is None):
+    if scene.attitude is not None and (not scene.torque.is_zero or scene.moments is None):
+        return None
+    if a == b == c == 0.0:
+        return "sphere"
+    if not scene.torque.is_zero:
         return None
     if 0.0 in (a, b, c):
         # Two coefficients of opposite sign turn; of one sign, or one alone, they run away.

@@ -6,20 +6,20 @@ three arguments and enters the kernel.
 
 import reprlib
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, Self, overload
+from typing import TYPE_CHECKING, Literal, Self, overload
 
 import numpy as np
 
+from pyharness.methods.last_call import LastCall
+from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
-from pyharness.methods.problem import known, normalized, remainders
-from pyharness.methods.registry import GAUSS, check_torque
-from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, motion_growth
+from pyharness.methods.registry import check_torque
 from pyharness.model.codes import Methods, Places
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.extension import ENDS, extension
+from pyharness.model.extension import extension
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory, digits_left
+from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import (
     Number,
     Numbers,
@@ -55,7 +55,7 @@ PREPARED = ("auto", *(name for name in _CODES if name not in ("sphere", EITHER))
 _FEW_WAVES = 16  # that take less time than releasing the GIL does
 
 
-class Solver(BoundKernel):
+class Solver(LastCall, BoundKernel):
     """A scene prepared for one method.
 
     Call it as ``solver(omega0, t_end)``: `omega0` three real numbers (rad/s), `t_end` one, in
@@ -79,13 +79,10 @@ class Solver(BoundKernel):
 
     # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
     # Python between, which would cost as much as an easy solve.
-    plan: Plan
-    _given: tuple[float, str, float]  # tolerance, method and effort as asked for
-
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Pack what does not change; `prepare` is the way to make one."""
         kernel = extension().solve_packed
-        packed = _pack(chosen.scene, _code(chosen), tolerance, effort)
+        packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
         brief = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
             # Where there is a fallback, it is no part of that.
@@ -96,52 +93,6 @@ class Solver(BoundKernel):
         solver._given = tolerance, asked, effort
         return solver
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Let a copy, in this process or another, be prepared as this one was."""
-        return type(self), (self.plan, *self._given)
-
-    def __repr__(self) -> str:
-        """Say the scene and the method."""
-        return f"<Solver of '{self.plan.scene.name}' by {self.plan.method}>"
-
-    @property
-    def status(self) -> str:
-        """How this thread's last call ended: complete, sensitive, overflow, refused or gave up.
-
-        ``sensitive`` is a result too, but what the motion makes of rounding exceeds the tolerance:
-        `digits` says what is left. A closed form and Gauss collocation work that out when they are
-        asked, in microseconds and milliseconds. ``complete``, in 0 steps, before a call. What was
-        refused at the door, or interrupted, is none.
-        """
-        return self._found()[0]
-
-    @property
-    def error(self) -> float | None:
-        """Estimated error of this thread's last result, over the largest omega on the way.
-
-        None where the method estimates none, and where there is no result.
-        """
-        return self._found()[1]
-
-    @property
-    def growth(self) -> float | None:
-        """What the motion of this thread's last call makes of a small difference, at least 1.
-
-        The largest norm of the derivative of omega at the end by omega at any time before; None
-        where it is unknown.
-        """
-        return self._found()[2]
-
-    @property
-    def digits(self) -> float | None:
-        """Decimal digits that are left of this thread's last result; None where unknown."""
-        return digits_left(self.error)
-
-    @property
-    def steps(self) -> int:
-        """Steps of this thread's last call; right-hand sides of Gauss, 0 of a closed form."""
-        return abs(self._counted())
-
     @property
     def method(self) -> str:
         """The method of this thread's last call, where the kernel chose; else that of the plan."""
@@ -151,30 +102,6 @@ class Solver(BoundKernel):
         if self.plan.method == EITHER:
             return "quick" if steps < 0 else "taylor"
         return self.plan.fallback or self.plan.method
-
-    def _counted(self) -> int:
-        """Return the steps of this thread's last call, as the kernel counts them."""
-        ending = self._ending
-        return 0 if ending is None else ending[1]
-
-    def _found(self) -> tuple[str, float | None, float | None]:
-        """Return status, error and growth of this thread's last call."""
-        ending = self._ending
-        if ending is None:
-            return "complete", None, None
-        number, steps, of_kernel, grown, omega0, t_end = ending
-        status = ENDS[number]
-        if status not in WITH_ALL_ROWS:
-            return status, None, None
-        error, growth = known(of_kernel), known(grown)
-        scene = self.plan.scene
-        if self.plan.closed_form and not steps:
-            error, growth = closed_form_estimate(scene.euler_coefficients, omega0, t_end)
-        elif self.plan.method in GAUSS:
-            growth = motion_growth(replace(scene, omega=omega0), t_end)
-        else:
-            return status, error, growth
-        return "sensitive" if is_sensitive(growth, self._given[0]) else status, error, growth
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
         """Return rows from another start (rad/s) at `times` (s), strictly monotonic, on any side.
@@ -295,19 +222,3 @@ def _code(chosen: Plan) -> int:
         # A disturbance too faint to square: then the series, if that is not against the order.
         return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else _CODES["closed-form"]
     return _CODES[chosen.method]
-
-
-def _pack(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
-    coefficients, constant, rate, sines, cosines = normalized(scene)
-    packed = np.zeros(Places.WAVES)
-    packed[Places.METHOD] = code
-    packed[Places.TOLERANCE] = tolerance
-    packed[Places.STEP] = scene.step_size
-    packed[Places.N_SINES] = sines.shape[1]
-    packed[Places.N_COSINES] = cosines.shape[1]
-    packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
-    packed[Places.CONSTANT : Places.RATE] = constant
-    packed[Places.RATE : Places.EFFORT] = rate
-    packed[Places.EFFORT] = effort
-    packed[Places.COEFFICIENTS_LOW : Places.WAVES] = remainders(scene)
-    return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])

@@ -91,13 +91,13 @@ def scipy_method(name: str) -> Integrator:
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
     ) -> Trajectory:
         if times[-1] == 0.0:
-            return _rows_of(times, np.array([_start(scene)]), 0, 0, "complete")
+            return _rows_of(times, np.array([state_of(scene)]), 0, 0, "complete")
         run = _Run(scene, times[-1], name, effort)
         try:
             ahead = run.ahead()
             if ahead.largest == 0.0:
                 # At rest, and nothing that would move it.
-                rest = np.tile(_start(scene), (len(times), 1))
+                rest = np.tile(state_of(scene), (len(times), 1))
                 return _rows_of(times, rest, run.evaluations, len(times), "complete")
             run.carry_attitude()
             total = steps_sum(name, *ahead[1:])
@@ -141,11 +141,12 @@ def scipy_method(name: str) -> Integrator:
     return solve
 
 
-def _start(scene: Scene) -> tuple[float, ...]:
+def state_of(scene: Scene) -> tuple[float, ...]:
+    """Return omega at time 0, and the attitude of a scene that has one."""
     return (*scene.omega, *(scene.attitude or ()))
 
 
-def _turning(slopes: RightHandSide) -> RightHandSide:
+def turning(slopes: RightHandSide) -> RightHandSide:
     """Return the right-hand side of omega, and with it q (0, omega)/2."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
@@ -195,8 +196,8 @@ class _Run:
     def carry_attitude(self) -> None:
         """Go on with seven unknowns, where the scene has an attitude; a coarse run needs none."""
         if self.scene.attitude is not None:
-            self.start = _start(self.scene)
-            self.slopes = _turning(self.slopes)
+            self.start = state_of(self.scene)
+            self.slopes = turning(self.slopes)
 
     def solved(
         self,

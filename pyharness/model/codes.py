@@ -25,7 +25,8 @@ class Methods:
     QUICK = 7  # Runge-Kutta for few digits
     QUICK_OR_TAYLOR = 8  # whichever takes fewer operations
     CLOSED_FORM_OR_TAYLOR = 9  # the series where the closed form refuses
-    GAUSS = 10  # and the number of stages
+    GAUSS = 10  # and the number of stages, 8 at the most
+    SPACE_TORQUE = 19  # the series of a torque about the axes of space, with attitude
 
 
 class Places:
@@ -41,4 +42,5 @@ class Places:
     RATE = 11  # three, 1/s3
     EFFORT = 14  # factor on the limits
     COEFFICIENTS_LOW = 15  # three: what rounding took off, for the closed form
-    WAVES = 18  # four for each sine, then for each cosine
+    MOMENTS = 18  # three: of the closed form with attitude, and where the torque is in space
+    WAVES = 21  # four for each sine, then for each cosine

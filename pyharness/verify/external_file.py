@@ -142,7 +142,7 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
         if float(value.time) in values:
             raise InputError(f"[[value]] time {value.time} is given twice")
         values[float(value.time)] = value
-    found = tuple(values.values())
+    told = tuple(values.values())
     return Problem(
         name=name,
         **texts,
@@ -150,9 +150,9 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
         scene=replace(
             scene,
             omega=(first, second, third),
-            attitude=(scene.attitude or IDENTITY) if any(v.pointing for v in found) else None,
+            attitude=(scene.attitude or IDENTITY) if any(v.pointing for v in told) else None,
         ),
-        values=found,
+        values=told,
         path=given,
     )
 

@@ -1,7 +1,10 @@
 """Attitude by the joint series, and beside any rows: against integrators of its own equations."""
 
+import pickle
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,6 +34,7 @@ SCENES = {
     **{f"case {n}": replace(case_scene(n), attitude=TURNED) for n in range(1, 8)},
     "spin": SPIN,
     "coefficients": Scene("", (0.3, -1.0, 2.0), coefficients=(0.3, -0.7, 0.5)),
+    "sphere of coefficients": Scene("", (0.3, -1.0, 2.0), coefficients=(0.0, 0.0, 0.0)),
     "rest": Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=TorqueLaw((1.0, 0.0, 2.0))),
 }
 
@@ -284,6 +288,56 @@ def test_prepared_solver_takes_another_start() -> None:
         prepare(scene, "rk4", 1.0, attitude=True)
     omega = prepare(replace(scene, torque=TorqueLaw((1.0, 0.0, 0.0))), attitude=False)
     assert omega((1.0, 2.0, 3.0), 1.0).shape == (3,)
+
+
+def test_prepared_solver_takes_every_kind_of_argument() -> None:
+    solver: Any = prepare(replace(case_scene(4), attitude=TURNED), attitude=True)
+    start = np.array([1.0, 2.0, 3.0])
+    usual = [each.tolist() for each in solver(start, 1.0)]
+    for arguments, named in (
+        (([1, 2, 3], 1, TURNED), {}),
+        ((start, 1.0), {"attitude0": np.array(TURNED)}),
+        ((range(1, 4), np.float32(1.0), None), {}),
+        ((start, 1.0, [1.0, -0.2, 1.4, 1.0]), {}),
+        ((), {"t_end": 1.0, "omega0": start, "attitude0": iter(TURNED)}),
+    ):
+        found = solver(*arguments, **named)
+        assert [each.shape for each in found] == [(3,), (4,)]
+        assert np.abs(np.concatenate(found) - np.concatenate(usual)).max() < 1e-14
+    for attitude0, words in (
+        ((1.0, 0.0, 0.0), "attitude0: 3 numbers; allowed: four finite numbers"),
+        ((1.0, float("nan"), 0.0, 0.0), "attitude0: nan is not finite"),
+        ("1000", "attitude0: text"),
+    ):
+        with pytest.raises(InputError, match=words):
+            solver(start, 1.0, attitude0)
+    for more, named in (((TURNED, 1.0), {}), ((), {"out": start})):
+        with pytest.raises(TypeError, match=r"solver\(omega0, t_end, attitude0=None\)"):
+            solver(start, 1.0, *more, **named)
+
+
+def test_prepared_copies_and_threads_are_as_without_attitude() -> None:
+    scene = replace(case_scene(5), attitude=TURNED)
+    solver = prepare(scene, "taylor", 1e-9, attitude=True)
+    wanted = np.concatenate(solver(scene.omega, 3.0)).tolist()
+    other = pickle.loads(pickle.dumps(solver))
+    assert (other.plan, other.status, other.steps) == (solver.plan, "complete", 0)
+    assert np.concatenate(other(scene.omega, 3.0)).tolist() == wanted
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(solver, (1.0, float("inf"), 0.0), 3.0).result()
+        assert pool.submit(lambda: solver.status).result() == "overflow"
+    assert (solver.status, solver.steps) == ("complete", other.steps)
+
+
+def test_faint_disturbance_is_refused_by_the_closed_form_alone() -> None:
+    scene = Scene("", (1e-130, 1.0, 0.0), moments=(3.0, 2.0, 1.0))
+    solver = prepare(scene, "closed-form", attitude=True)
+    omega, attitude = solver(scene.omega, 5.0)
+    assert (solver.status, solver.error) == ("refused", None)
+    assert np.isnan([*omega, *attitude]).all()
+    solver = prepare(scene, attitude=True)
+    assert np.isfinite(np.concatenate(solver(scene.omega, 5.0))).all()
+    assert (solver.status, solver.steps > 0) == ("complete", True)
 
 
 def test_rows_come_in_the_order_of_their_times() -> None:

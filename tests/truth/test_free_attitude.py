@@ -19,7 +19,7 @@ def test_attitude_agrees_however_far(kind: str) -> None:
     for longest in (1.0, 6.0):
         moments, omega, attitude, time = draw(source, kind, longest)
         start = attitude[0], attitude[1], attitude[2], attitude[3]
-        scene = Scene("", tuple(omega), moments=tuple(moments), attitude=start)  # type: ignore[arg-type]
+        scene = Scene("", tuple(omega), moments=tuple(moments), attitude=start)
         found = free_attitude(scene, time)
         assert scene.attitude is not None
         _, wanted = exact(moments, omega, scene.attitude, time)

@@ -21,6 +21,7 @@ OPTIONS = {
     "--horizon T": "go to this time, s (default: 3; Cases 3 and 4 also 100)",
     "--random N": "N random scenes, the kinds in turn, in place of the cases",
     "--seed S": "of the random scenes (default: the week)",
+    "--attitude": "omega and attitude together, of the cases 1 to 7 or of the random scenes",
     "--methods A,B": "these of ours only, or none",
     "--peers X,Y": "these peers or packages only, or none",
     "--plan": "what each skip of the plan saves, with and without",
@@ -32,7 +33,7 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Measure and show."""
     if options.plan or options.growth:
-        meaningless = ["case", "horizon", "random", "seed", "methods", "peers"]
+        meaningless = ["case", "horizon", "random", "seed", "attitude", "methods", "peers"]
         meaningless += ["plot", "growth"] if options.plan else []
         shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
         shared.check_outputs(options)
@@ -44,8 +45,8 @@ def run(options: argparse.Namespace) -> int:
         horizon = shared.positive(options.horizon, "--horizon", 0.0)
         if horizon > _LONGEST:
             raise InputError(f"--horizon: {horizon:g}; allowed: above 0, up to {_LONGEST:g}")
-    methods = chosen(own(), options.methods, "method", "--methods")
-    others = chosen(peers(), options.peers, "peer", "--peers")
+    methods = chosen(own(), options.methods, "method", "--methods", options.attitude)
+    others = chosen(peers(), options.peers, "peer", "--peers", options.attitude)
     missing = [each for each in others if not installed(each)]
     if missing and options.peers is not None:
         raise InputError(
@@ -60,9 +61,10 @@ def run(options: argparse.Namespace) -> int:
         loads = []
         for number in range(1, count + 1):
             shared.progress(f"drawing scene {number} of {count}")
-            loads.append(random_load(options.seed, number))
+            loads.append(random_load(options.seed, number, options.attitude))
     else:
-        loads = workloads(None if options.case is None else int(options.case), horizon)
+        case = None if options.case is None else int(options.case)
+        loads = workloads(case, horizon, options.attitude)
     found = measure(loads, contenders, shared.progress)
     shared.progress("")
     if not found.rows:
@@ -93,9 +95,16 @@ def _count(options: argparse.Namespace) -> int:
 
 
 def chosen(
-    contenders: Sequence[Contender], text: str | None, what: str, where: str
+    contenders: Sequence[Contender],
+    text: str | None,
+    what: str,
+    where: str,
+    attitude: bool = False,
 ) -> list[Contender]:
-    """Return the contenders named, by their own name or their package; all where none are."""
+    """Return the contenders named, by their own name or their package; all where none are.
+
+    Where the `attitude` is asked for, who is named must carry it.
+    """
     if text is None:
         return list(contenders)
     names = shared.names(text)
@@ -106,7 +115,11 @@ def chosen(
     for name in names:
         if name not in allowed and name not in packages:
             raise unknown(what, name, [*allowed, *packages, "none"], where)
-    return [each for each in contenders if each.name in names or each.package in names]
+    found = [each for each in contenders if each.name in names or each.package in names]
+    if attitude and (lacking := [each.name for each in found if not each.attitude]):
+        able = ", ".join(each.name for each in contenders if each.attitude)
+        raise InputError(f"{where}: {lacking[0]} carries no attitude; allowed: {able}")
+    return found
 
 
 def _again(options: argparse.Namespace) -> str:
@@ -115,6 +128,7 @@ def _again(options: argparse.Namespace) -> str:
     for name in ("case", "horizon", "random", "seed", "methods", "peers"):
         value = getattr(options, name)
         command += f" --{name} {shlex.quote(value)}" if value is not None else ""
+    command += " --attitude" if options.attitude else ""
     return command + " --format markdown"
 
 

@@ -1,0 +1,166 @@
+"""`bench --attitude`: both are judged, by whoever carries both; nothing asserts seconds."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness.bench import compiled_peers, measure, peers
+from pyharness.bench.contenders import Contender, own
+from pyharness.bench.measure import Finding, error_of, workloads
+from pyharness.bench.random_loads import random_load
+from pyharness.bench.scores import groups
+from pyharness.cli.main import main
+from pyharness.compare.candidates import End
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.truth.reference import Reference, reference
+
+Capture = pytest.CaptureFixture[str]
+TURNED = (0.5, -0.1, 0.7, 0.5)
+SCENE = replace(case_scene(5), attitude=TURNED)
+FREE = replace(case_scene(4), attitude=TURNED)
+ABLE = [each for each in (*own(), *peers.peers()) if each.attitude]
+
+
+@pytest.fixture(scope="module")
+def truths() -> dict[str, Reference]:
+    return {scene.name: reference(scene, [2.0], precise=True) for scene in (SCENE, FREE)}
+
+
+def _error(contender: Contender, scene: Scene, truth: Reference) -> float:
+    ready = contender.prepare(scene)(2.0, 1e-12)
+    ready.run()
+    # The second call starts where the first one did.
+    error = error_of(ready.read(ready.run()), truth)
+    assert error is not None
+    return error
+
+
+@pytest.mark.external
+@pytest.mark.parametrize("contender", ABLE, ids=lambda each: each.name)
+@pytest.mark.filterwarnings("ignore")
+def test_everyone_reaches_both(contender: Contender, truths: dict[str, Reference]) -> None:
+    if not peers.installed(contender):
+        pytest.skip(f"{contender.package} is not installed")
+    for scene in (FREE,) if contender.name == "closed-form" else (SCENE, FREE):
+        assert _error(contender, scene, truths[scene.name]) < 1e-9
+
+
+def _backward(right: Callable[..., Any]) -> Callable[..., Any]:
+    """Return right-hand sides, written or called, in which one of the attitude has a wrong sign."""
+
+    def rates(*given: Any, **named: Any) -> Any:
+        found = list(right(*given, **named))
+        found[4] = f"-({found[4]})" if isinstance(found[4], str) else -found[4]
+        return found
+
+    return rates
+
+
+@pytest.fixture
+def _wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
+    slope = peers._right_hand_side
+    monkeypatch.setattr(compiled_peers, "rates", _backward(compiled_peers.rates))
+    monkeypatch.setattr(peers, "_right_hand_side", lambda scene: _backward(slope(scene)))
+
+
+@pytest.mark.external
+@pytest.mark.usefixtures("_wrong_sign")
+@pytest.mark.parametrize("name", ["heyoka", "numbalsoda-lsoda", "odeint", "solve_ivp-dop853"])
+@pytest.mark.filterwarnings("ignore")
+def test_a_wrong_sign_is_seen(name: str, truths: dict[str, Reference]) -> None:
+    peer = next(each for each in ABLE if each.name == name)
+    if not peers.installed(peer):
+        pytest.skip(f"{peer.package} is not installed")
+    # Omega alone is right.
+    assert _error(peer, FREE, truths[FREE.name]) > 0.1
+
+
+@pytest.mark.parametrize("name", ["auto", "taylor", "solve_ivp-dop853"])
+def test_an_attitude_from_another_start_is_seen(name: str, truths: dict[str, Reference]) -> None:
+    contender = next(each for each in ABLE if each.name == name)
+    error = _error(contender, replace(SCENE, attitude=IDENTITY), truths[SCENE.name])
+    assert error == pytest.approx(2.0 * np.arccos(0.5), rel=1e-6)
+
+
+def test_the_larger_error_counts(truths: dict[str, Reference]) -> None:
+    truth = truths[SCENE.name]
+    assert truth.attitude is not None
+    omega, (w, x, y, z) = truth.omega[0], truth.attitude[0]
+    right = truth.attitude[0]
+    tilt = np.sin(1e-5)
+    tilted = np.array([w - tilt * x, x + tilt * w, y + tilt * z, z - tilt * y])
+    off = omega * (1.0 + 1e-3)
+    for end, error in (
+        (End(omega, attitude=tilted), 2e-5),
+        (End(off, attitude=right), 1e-3),
+        (End(off, attitude=tilted), 1e-3),
+        # A quaternion stands for the attitude of its direction, whatever its length and sign.
+        (End(omega, attitude=-1.01 * tilted), 2e-5),
+    ):
+        assert error_of(end, truth) == pytest.approx(error, rel=1e-4)
+    assert (error_of(End(omega, attitude=right), truth) or 0.0) < 1e-15
+    for lost in (None, np.full(4, np.nan), np.zeros(4)):
+        assert error_of(End(omega, attitude=lost), truth) is None
+    assert error_of(End(omega), replace(truth, attitude=None)) is not None
+
+
+def test_loads_are_all_cases_from_the_axes_of_space() -> None:
+    loads = workloads(attitude=True)
+    assert {load.scene.attitude for load in loads} == {IDENTITY}
+    found = groups(Finding(loads, [], [], {}, {}))
+    assert {name: [load.label for load in group] for name, group in found.items()} == {
+        "torque, T = 3": ["1", "5", "6", "7"],
+        "torque-free, T = 3": ["2", "3", "4"],
+        "torque, T = 100": ["1L", "5L", "7L"],
+        "torque-free, T = 100": ["2L", "3L", "4L"],
+    }
+    assert [load.horizon for load in workloads(6, attitude=True)] == [3.0]
+    drawn, bare = random_load("f", 2, attitude=True), random_load("f", 2)
+    assert (drawn.truth, drawn.scene) == (None, replace(bare.scene, attitude=IDENTITY))
+    assert (drawn.kinds, drawn.horizon, drawn.turns) == (bare.kinds, bare.horizon, bare.turns)
+
+
+@pytest.fixture
+def _hurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measure, "_ROUNDS", 1)
+    monkeypatch.setattr(measure, "_BATCH", 1e-5)
+
+
+@pytest.mark.usefixtures("_hurried")
+@pytest.mark.parametrize("scene", ["--case 4 --horizon 1", "--random 1 --seed f"])
+def test_verb_judges_both_and_says_who_carries_none(scene: str, capsys: Capture) -> None:
+    command = ["bench", "--attitude", *scene.split(), "--peers", "none"]
+    assert main([*command, "--format", "json"]) == 0
+    record: dict[str, Any] = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert record["attitude"] is True
+    assert {row["method"] for row in record["rows"]} == {"auto", "taylor", "closed-form"}
+    assert all(row["error"] <= max(row["setting"] or 0.0, 5e-15) for row in record["rows"])
+    reasons = {each["method"]: each["reason"] for each in record["refused"]}
+    assert reasons["rk4"] == reasons["two-term-original"] == "carries no attitude"
+    assert main([*command, "--methods", "auto", "--format", "markdown"]) == 0
+    page = capsys.readouterr().out
+    assert "# Run time against error of omega and attitude\n" in page
+    assert "--attitude --format markdown`" in page
+    assert "the angle between the attitudes (rad)" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("--attitude --methods rk4", "--methods: rk4 carries no attitude; allowed: auto, taylor"),
+        ("--attitude --peers numba", "--peers: numba-rk4 carries no attitude; allowed: heyoka"),
+        ("--attitude --plan", "--attitude has no meaning with --plan"),
+        ("--growth --attitude", "--attitude has no meaning with --growth"),
+    ],
+)
+def test_mistake_is_one_line(arguments: str, words: str, capsys: Capture) -> None:
+    assert main(["bench", *arguments.split()]) == 2
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err.count("\n")) == ("", 1)
+    assert words in captured.err

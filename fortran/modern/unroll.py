@@ -368,7 +368,8 @@ def attitude_term(k: int, wide: bool) -> Iterator[str]:
     older = range(k - 1)
     if wide:
         pairs = [i for i in older if i % 2 and i < k - 1]
-        for n, i in enumerate(pairs):
+        # What is there before the others first, so that the sums need not wait for the newest.
+        for n, i in enumerate(sorted(pairs, key=lambda i: max(i, k - i))):
             for axis in (1, 2, 3):
                 given = f"pp{axis}_{i}, oo{axis}_{k - i}"
                 if n:

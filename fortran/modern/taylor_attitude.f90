@@ -114,15 +114,6 @@ contains
     row = row/sqrt(dot_product(row, row))
   end subroutine add_attitude_row
 
-  pure function by_vector(q, v) result(r)
-    !! q (0, v)
-    real(dp), intent(in) :: q(4), v(3)
-    real(dp) :: r(4), parts(4, 3)
-
-    call times_units(q, 1.0_dp, parts)
-    r = (parts(:, 1)*v(1) + parts(:, 2)*v(2)) + parts(:, 3)*v(3)
-  end function by_vector
-
   pure function from_left(v, q) result(r)
     !! (0, v) q
     real(dp), intent(in) :: v(3), q(4)
@@ -148,8 +139,14 @@ contains
     !! A vector of the body about the axes of space: q (0, v) times the conjugate of q.
     real(dp), intent(in) :: q(4), v(3)
     real(dp) :: u(3)
+    real(dp) :: x, y, z ! twice the vector of q across v
 
-    u = left_turn(by_vector(q, v), q)
+    x = 2.0_dp*(q(3)*v(3) - q(4)*v(2))
+    y = 2.0_dp*(q(4)*v(1) - q(2)*v(3))
+    z = 2.0_dp*(q(2)*v(2) - q(3)*v(1))
+    u(1) = v(1) + q(1)*x + (q(3)*z - q(4)*y)
+    u(2) = v(2) + q(1)*y + (q(4)*x - q(2)*z)
+    u(3) = v(3) + q(1)*z + (q(2)*y - q(3)*x)
   end function in_space
 
 end module taylor_attitude

@@ -30,6 +30,7 @@ class Contender:
     order: int = 0  # of a method of a fixed step
     package: str = ""  # that it needs; empty for our own
     attitude: bool = False  # whether it carries that of a scene that has one
+    velocity: bool = True  # whether it takes a scene that has none
 
 
 def own() -> list[Contender]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Contender, Maker, refuse_rounding
+from pyharness.bench.orekit_peer import orekit
 from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.methods.scipy_ivp import RightHandSide, state_of, turning
 from pyharness.model.scene import Scene
@@ -43,6 +44,9 @@ def peers() -> list[Contender]:
         *(
             adaptive(f"solve_ivp-{name.lower()}", "scipy", partial(_solve_ivp, name))
             for name in _SOLVE_IVP
+        ),
+        Contender(
+            "orekit", "none", orekit, (0.0,), package="orekit_jpype", attitude=True, velocity=False
         ),
     ]
 

@@ -74,7 +74,8 @@ def run(options: argparse.Namespace) -> int:
     found.refused.extend(
         Refusal(load, each.name, None, absent) for each in missing for load in loads
     )
-    packages = sorted({each.package for each in peers()} - {"", "scipy"})
+    those = chosen(peers(), None, "peer", "--peers", options.attitude)
+    packages = sorted({each.package for each in those} - {"", "scipy"})
     shared.show(reports.bench_report(found, packages, _again(options)), options)
     return 0
 
@@ -103,10 +104,10 @@ def chosen(
 ) -> list[Contender]:
     """Return the contenders named, by their own name or their package; all where none are.
 
-    Where the `attitude` is asked for, who is named must carry it.
+    Where the `attitude` is asked for, who is named must carry it; where it is not, omega alone.
     """
     if text is None:
-        return list(contenders)
+        return [each for each in contenders if attitude or each.velocity]
     names = shared.names(text)
     if names == ["none"]:
         return []
@@ -119,6 +120,8 @@ def chosen(
     if attitude and (lacking := [each.name for each in found if not each.attitude]):
         able = ", ".join(each.name for each in contenders if each.attitude)
         raise InputError(f"{where}: {lacking[0]} carries no attitude; allowed: {able}")
+    if not attitude and (lacking := [each.name for each in found if not each.velocity]):
+        raise InputError(f"{where}: {lacking[0]} gives omega with the attitude; add --attitude")
     return found
 
 

@@ -1,0 +1,80 @@
+"""Orekit's closed form without torque, `TorqueFree`, in a Java machine in this process."""
+
+from importlib import import_module
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from pyharness.bench.contenders import Maker
+from pyharness.compare.candidates import End, Ready
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+
+# s, of calls before the first that counts: Java compiles what runs often, while it runs.
+WARMING = 2.0
+
+
+def orekit(scene: Scene) -> Maker:
+    """Return calls that each make the motion from its start, elliptic integrals and all."""
+    if not scene.torque.is_zero or scene.moments is None:
+        raise InputError("TorqueFree does not take this scene; allowed: moments, and no torque")
+    jpype = _machine()
+    named = jpype.JClass
+    try:
+        vector = named("org.hipparchus.geometry.euclidean.threed.Vector3D")
+        axis = named("org.orekit.attitudes.InertiaAxis")
+        motion = named("org.orekit.attitudes.TorqueFree")
+        # Neither needs Orekit's data: no Earth, no leap seconds.
+        begin = named("org.orekit.time.AbsoluteDate").ARBITRARY_EPOCH
+        frame = named("org.orekit.frames.FramesFactory").getGCRF()
+        axes = vector.PLUS_I, vector.PLUS_J, vector.PLUS_K
+        inertia = named("org.orekit.attitudes.Inertia")(*map(axis, scene.moments, axes))
+        rotation = named("org.hipparchus.geometry.euclidean.threed.Rotation")
+        turned = rotation(*(scene.attitude or ()), False)
+        spin = vector(*scene.omega)
+        start = named("org.orekit.attitudes.Attitude")(begin, frame, turned, spin, vector.ZERO)
+    except (TypeError, jpype.JException) as error:
+        raise _unable(error) from error
+
+    def make(horizon: float, setting: float) -> Ready:
+        end = begin.shiftedBy(horizon)
+
+        def run() -> Any:
+            return motion(start, inertia).getAttitude(None, end, frame)
+
+        try:
+            until = perf_counter() + WARMING
+            run()
+            while perf_counter() < until:
+                run()
+        except jpype.JException as error:
+            raise _unable(error) from error
+        return Ready(run, _end)
+
+    return make
+
+
+def _end(found: Any) -> End:
+    # Orekit turns space's vectors into the body's, and Hipparchus by the inverse of a quaternion:
+    # the four numbers are ours.
+    q, w = found.getRotation(), found.getSpin()
+    attitude = np.array([q.getQ0(), q.getQ1(), q.getQ2(), q.getQ3()])
+    return End(np.array([w.getX(), w.getY(), w.getZ()]), attitude=attitude)
+
+
+def _machine() -> Any:
+    """Return JPype with a machine that runs; it can be started once in a process."""
+    try:
+        # JPype's types tell only some of its names.
+        jpype, package = map(import_module, ("jpype", "orekit_jpype"))
+        if not jpype.isJVMStarted():
+            # The signals stay Python's.
+            package.initVM("-Xrs")
+    except (ImportError, OSError, RuntimeError, TypeError, ValueError) as error:
+        raise _unable(error) from error
+    return jpype
+
+
+def _unable(error: Exception) -> InputError:
+    return InputError(f"Java or Orekit fails: {' '.join(str(error).split())}")

@@ -256,6 +256,7 @@ class _Run:
             return self.slopes(time, omega)
         return [self.unit * slope for slope in self.slopes(self.unit * time, omega)]
 
+    @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
         """Look ahead in a coarse run, whose own scale is found on the way.
 

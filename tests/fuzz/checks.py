@@ -85,7 +85,9 @@ def _program(given: strategies.ProgramInput, folder: Path) -> None:
 
 def _method(given: strategies.MethodInput, folder: Path) -> None:
     try:
-        found = solve(given.scene, given.times, given.method, given.tolerance)
+        found = solve(
+            given.scene, given.times, given.method, given.tolerance, attitude=given.attitude
+        )
     except InputError as error:
         _one_line(error)
         return
@@ -97,15 +99,22 @@ def _method(given: strategies.MethodInput, folder: Path) -> None:
     assert found.error is None or found.error >= 0.0, found.error
     assert found.growth is None or found.growth >= 1.0, found.growth
     assert set(found.time.tolist()) <= set(given.times)
+    assert (found.attitude is not None) == given.attitude
+    if found.attitude is not None:
+        assert found.attitude.shape == (rows, 4)
+        lengths = np.linalg.norm(found.attitude, axis=1)
+        assert (np.abs(lengths - 1.0) < 1e-14).all(), f"{found.ended}, of lengths {lengths}"
 
 
 def _prepared(given: strategies.PreparedInput, folder: Path) -> None:
     try:
-        solver = prepare(given.scene, given.method, given.tolerance, given.effort)
+        asked = given.scene, given.method, given.tolerance, given.effort
+        solver: Any = prepare(*asked, attitude=True) if given.attitude else prepare(*asked)
     except InputError as error:
         _one_line(error)
         return
     found = solver(np.array(given.omega0), given.t_end)
+    found = np.concatenate(found) if given.attitude else found
     assert solver.status in ENDS
     if solver.status in WITH_ALL_ROWS:
         assert np.isfinite(found).all(), f"{solver.status}, but omega is {found.tolist()}"

@@ -114,6 +114,7 @@ class MethodInput:
     times: tuple[float, ...]
     method: str
     tolerance: float
+    attitude: bool
 
 
 def tolerance(random: Random) -> float:
@@ -151,7 +152,20 @@ def method_input(random: Random) -> MethodInput:
         # Most often so short that no method gives up, which takes some of them ten seconds.
         shrink = min(1.0, 10.0 ** random.uniform(-3.0, 3.0) / (rate * longest))
         wanted = tuple(t * shrink for t in wanted)
-    return MethodInput(found, wanted, method, asked)
+    found, attitude = _pointing(random, found)
+    return MethodInput(found, wanted, method, asked, attitude)
+
+
+def _pointing(random: Random, found: Scene) -> tuple[Scene, bool]:
+    """Return a scene that may point somewhere, with a torque in space too; and whether to ask."""
+    if random.random() < 0.6:
+        return found, False
+    if random.random() < 0.5:
+        q = tuple(number(random, 0.2) for _ in range(4))
+        found = replace(found, attitude=(q[0], q[1], q[2], q[3]) if any(q) else None)
+    if found.moments is not None and random.random() < 0.3:
+        found = replace(found, torque=replace(found.torque, frame="space"))
+    return found, random.random() < 0.9
 
 
 @dataclass(frozen=True)
@@ -164,6 +178,7 @@ class PreparedInput:
     effort: float
     omega0: Triple
     t_end: float
+    attitude: bool
 
 
 def prepared_input(random: Random) -> PreparedInput:
@@ -176,7 +191,9 @@ def prepared_input(random: Random) -> PreparedInput:
         omega0, t_end = random.choice((((odd, 1.0, 2.0), t_end), (omega0, odd)))
     # Sines of huge phases take ten times as long, and a build with every check five times that.
     effort = random.choice((1e-6, 1e-3, 0.1))
-    return PreparedInput(found, random.choice(PREPARED), tolerance(random), effort, omega0, t_end)
+    found, attitude = _pointing(random, found)
+    method = random.choice(PREPARED)
+    return PreparedInput(found, method, tolerance(random), effort, omega0, t_end, attitude)
 
 
 @dataclass(frozen=True)
@@ -232,10 +249,23 @@ def scene_text(random: Random) -> str:
     body = "moments" if found.moments else "coefficients"
     lines = [f'name = "{random.choice(("brick", "ü", "a b", ""))}"'] * (random.random() < 0.5)
     lines += ["[body]", f"{body} = {_list(found.moments or found.coefficients or ())}"]
+    if random.random() < 0.1:
+        x, y, z = found.moments or (3.0, 2.0, 1.0)
+        lines[-1] = f"inertia = [[{x!r}, 0.1, 0], [0.1, {y!r}, 0], [0, 0, {z!r}]]"
     lines += ["[initial]", f"omega = {_list(found.omega)}"]
+    if random.random() < 0.2:
+        lines.append(f"attitude = {_list([number(random, 0.2) for _ in range(4)])}")
+    elif random.random() < 0.1:
+        lines += [f"angles_deg = {_list(found.omega)}", 'sequence = "3-2-1"']
     if random.random() < 0.6:
         law = found.torque
-        lines += ["[torque]", f"constant = {_list(law.constant)}", f"rate = {_list(law.rate)}"]
+        frame = ['frame = "space"'] * (random.random() < 0.1)
+        lines += [
+            "[torque]",
+            *frame,
+            f"constant = {_list(law.constant)}",
+            f"rate = {_list(law.rate)}",
+        ]
         for kind, waves in (("sines", law.sines), ("cosines", law.cosines)):
             entries = [f"{{ amplitude = {_list(a)}, frequency = {f!r} }}" for a, f in waves]
             lines.append(f"{kind} = [{', '.join(entries)}]")
@@ -256,7 +286,8 @@ _VALUES = (
 )  # fmt: skip
 _KEYS = (
     "name", "body", "initial", "torque", "run", "moments", "coefficients", "omega", "constant",
-    "rate", "sines", "cosines", "amplitude", "frequency", "step_size", "steps", "x", '""', '"ü"',
+    "rate", "sines", "cosines", "amplitude", "attitude", "angles_deg", "sequence", "inertia",
+    "frame", "frequency", "step_size", "steps", "x", '""', '"ü"',
 )  # fmt: skip
 
 

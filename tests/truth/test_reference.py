@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from pyharness import solve
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
@@ -226,3 +227,12 @@ def test_attitude_of_a_body_that_is_pushed_about_one_axis() -> None:
     for time, row in zip((1.0, 2.0), found, strict=True):
         half = 0.5 * (time**3 / 12.0 + time**2 / 4.0)
         assert row == pytest.approx([-math.sin(half), 0.0, 0.0, math.cos(half)], abs=2e-16)
+
+
+def test_known_solution_ends_where_binary64_does() -> None:
+    law = TorqueLaw((0.0, 9.0, 0.0), (0.0, 0.0, 9.0))
+    scene = Scene("", (7.0, 1.0, 0.0), coefficients=(0.0, 0.0, 0.0), torque=law)
+    found = reference(scene, [1.0, 1e150, 1e160, 1e300])
+    assert found.time.tolist() == [1.0, 1e150]
+    assert np.isfinite(found.omega).all()
+    assert solve(scene, [1.0, 1e160], "reference").ended == "overflow"

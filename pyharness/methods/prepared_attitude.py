@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Self
 from pyharness.methods.last_call import LastCall
 from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import Plan, plan
-from pyharness.methods.registry import REGISTRY
+from pyharness.methods.registry import check_attitude
 from pyharness.model.attitude import IDENTITY, Quaternion, unit_quaternion
 from pyharness.model.codes import Methods, Places
-from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.scene import Scene
 from pyharness.model.values import number, three_floats
@@ -63,9 +62,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
     """Return a solver; InputError where the method carries no attitude."""
-    if not REGISTRY[method].attitude:
-        able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
-        raise InputError(f"method {method} carries no attitude; allowed: {able}")
+    check_attitude(method)
     chosen = plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
     return AttitudeSolver(chosen, tolerance, method, effort)
 

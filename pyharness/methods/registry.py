@@ -157,6 +157,13 @@ GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
 
+def check_attitude(method: str) -> None:
+    """Refuse a method that carries no attitude."""
+    if not REGISTRY[method].attitude:
+        able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
+        raise InputError(f"method {method} carries no attitude; allowed: {able}")
+
+
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Refuse a torque about the axes of space where the method, or no attitude, can't take it."""
     if not scene.torque.in_space:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.methods.plan import plan
-from pyharness.methods.registry import METHODS, SCIPY_METHODS, Method, check_torque
+from pyharness.methods.registry import METHODS, SCIPY_METHODS, Method, check_attitude, check_torque
 from pyharness.methods.scipy_ivp import finest_tolerance
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
@@ -89,9 +89,8 @@ def solve(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
     check_torque(scene, method, attitude)
-    if attitude and not chosen.attitude:
-        able = ", ".join(each.name for each in METHODS.values() if each.attitude)
-        raise InputError(f"method {method} carries no attitude; allowed: {able}")
+    if attitude:
+        check_attitude(method)
     # Who does not ask for it pays nothing.
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:

@@ -18,6 +18,9 @@ from pyharness.model.trajectory import Array
 ROUNDING = 2.0**-53
 # Roundings in a right-hand side: two in each of A, B, C, two products, the sums.
 _ROUNDINGS = 8.0
+# Of a value of an attitude: some twenty roundings of each component; an angle has twice as many.
+ATTITUDE = 40.0 * ROUNDING
+LIVELY = 1e3  # growth of small differences up to which a tolerance is kept as it stands
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 50
 _MOST_NODES = 400_000
@@ -48,9 +51,15 @@ class Conditioning:
         # What is no number allows nothing.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
-    def angle(self, time: float) -> float:
-        """Return the error of an attitude at `time` (s) if omega errs as much all the way (rad)."""
-        return self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
+    def angle_limit(self, tolerance: float, time: float) -> float:
+        """Return the error that an attitude at `time` (s) may have (rad).
+
+        A tolerance is kept as it stands up to a growth of `LIVELY`, and omega may err by its
+        rounding all the way.
+        """
+        kept = tolerance * (self.amplification if self.amplification > LIVELY else 1.0)
+        turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
+        return kept + turned + ATTITUDE
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:

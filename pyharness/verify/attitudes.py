@@ -16,7 +16,7 @@ from pyharness.model.attitude import Quaternion, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
-from pyharness.theory.conditioning import ROUNDING, conditioning
+from pyharness.theory.conditioning import Conditioning, conditioning
 from pyharness.truth.reference import Reference, reference
 from pyharness.verify.selection import Selection, replay
 
@@ -30,24 +30,18 @@ _ENDS = (1.0, 3.0, -1.0)
 _EVERY = 20
 _EFFORT = 0.05
 _EARLIER = 0.4  # of the last time
-_LIVELY = 1e3  # growth of small differences up to which a tolerance is kept as it stands
-_VALUE = (
-    40.0 * ROUNDING
-)  # some twenty roundings of a component, of which an angle has twice as many
 
 
 @dataclass(frozen=True, eq=False)
 class Standard:
-    """The truth at some times, and what rounding may make of an angle there (rad)."""
+    """The truth at some times, and what the flow makes of small errors until then."""
 
     truth: Reference
-    rounding: float
-    growth: float = 1.0
+    flow: Conditioning
 
     def limit(self, tolerance: float) -> float:
         """Return the largest error of an angle that a method may have (rad)."""
-        kept = tolerance * (self.growth if self.growth > _LIVELY else 1.0)
-        return kept + self.rounding + self.truth.angle_error
+        return self.flow.angle_limit(tolerance, self.truth.time[-1]) + self.truth.angle_error
 
 
 def attitudes(chosen: Selection) -> Iterator[Check]:
@@ -94,11 +88,12 @@ def _drawn(chosen: Selection, number: int, asked: Mapping[str, str]) -> Iterator
             made = _held_prepared(id, scene, "auto", tolerance, standard)
         else:
             made = _held(id, scene, name, tolerance, standard)
-        told = f"{drawn.scene.name}, tolerance {tolerance:.2g}, growth {standard.growth:.3g}"
+        growth = standard.flow.amplification
+        told = f"{drawn.scene.name}, tolerance {tolerance:.2g}, growth {growth:.3g}"
         yield Sample(
             id, made.passed, made.value, made.limit, chosen.replay_of_draw(id),
             f"{told}: {made.note}" if made.note else told, f"attitude-{name}", tolerance,
-            standard.growth,
+            growth,
         )  # fmt: skip
 
 
@@ -108,7 +103,8 @@ def _standard(scene: Scene, times: Sequence[float], effort: float | None = None)
     truth = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(truth.time) < len(times):
         raise InputError("the solution leaves every bound")
-    return Standard(truth, flow.angle(times[-1]) + _VALUE, flow.amplification if effort else 1.0)
+    # In the cases a tolerance is meant as it stands.
+    return Standard(truth, flow if effort else replace(flow, amplification=1.0))
 
 
 def _held(id: str, scene: Scene, name: str, tolerance: float, standard: Standard) -> Check:

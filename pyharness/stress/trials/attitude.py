@@ -26,7 +26,7 @@ from pyharness.model.turned_scenes import turned
 from pyharness.stress.hold import LINEAR, MIDDLING, in_steps
 from pyharness.stress.run import Attempt, Trial, bounded, described, in_turn, replay
 from pyharness.stress.trials import separatrix
-from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
+from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
 from pyharness.theory.promises import may_refuse
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
@@ -34,12 +34,8 @@ from pyharness.truth.free_attitude import free_attitude, period_of
 _FORMS = ("closed-form", "auto")
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
-# Of a value of the closed form, at any time: some twenty roundings of each component, of which an
-# angle has twice as many.
-_VALUE = 40.0 * ROUNDING
 # An angle in degrees is rounded when it is formed, converted and read again, and three add up.
 _ANGLES = 64.0 * ROUNDING
-_LIVELY = 1e3  # growth of small differences up to which a tolerance is kept as it stands
 _BODIES = 8
 
 _START: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
@@ -100,11 +96,7 @@ class Known:
 
     def limit(self, name: str, tolerance: float) -> float:
         """Return the largest error of an angle that a method may have (rad)."""
-        if name in _FORMS:
-            return _VALUE
-        growth = self.flow.amplification
-        kept = tolerance * (growth if growth > _LIVELY else 1.0)
-        return kept + self.flow.angle(self.time) + _VALUE
+        return ATTITUDE if name in _FORMS else self.flow.angle_limit(tolerance, self.time)
 
 
 def _attempts() -> Iterator[Attempt]:
@@ -188,7 +180,7 @@ def _held(known: Known, name: str, tolerance: float, id: str) -> Iterator[Check]
     if name in _FORMS:
         # An angle turns the angular momentum by no more than itself; moments multiply, and the
         # turning takes two products.
-        limit = _VALUE + _omega_limit(scene)
+        limit = ATTITUDE + _omega_limit(scene)
         yield bounded(f"{id}/momentum", _momentum_drift(scene, found), limit)
 
 
@@ -227,7 +219,7 @@ def _montgomery(scene: Scene, id: str) -> Iterator[Check]:
     found = 2.0 * math.atan2(float(turn[1:] @ along), float(turn[0]))
     apart = abs(math.remainder(found - wanted, 2.0 * math.pi))
     # The time is rounded, and so are the terms.
-    limit = _VALUE + 8.0 * ROUNDING * (2.0 * energy * period / size + 2.0 * math.pi)
+    limit = ATTITUDE + 8.0 * ROUNDING * (2.0 * energy * period / size + 2.0 * math.pi)
     yield bounded(id, apart, limit)
 
 

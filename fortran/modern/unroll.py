@@ -11,6 +11,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from unroll_many import many_steps
+
 MODULES = (
     "two_words",
     "torque_terms",
@@ -24,6 +26,10 @@ MODULES = (
     "taylor_rows",
     "taylor_march",
     "taylor",
+    "many_circular",
+    "many_free",
+    "many_fixed",
+    "many_taylor",
 )
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
@@ -102,6 +108,7 @@ def fortran_source(text: str, level: str) -> str:
         "expand_both": fortran_door("expand_both", "attitude_terms", level),
         "multiply": fortran_multiply(),
         "carry_precisely": fortran_precise(),
+        "many_step": many_steps(),
     }
     if level == "plain":
         written["expand"] = fortran_terms()

@@ -5,13 +5,13 @@ module many_taylor
   !! to be sure of, the body is left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: bodies_t, i1, LANES, LEFT, of_body, single_of
+  use bodies, only: bodies_t, columns_of, i1, LANES, LEFT, of_body
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
-  use problem, only: problem_t
+  use many_free, only: coefficients_from
   use statuses, only: COMPLETE
-  use taylor_plan, only: plan
+  use taylor_plan, only: add_wave_rates, share_and_step, steady_rates
   implicit none(type, external)
   private
 
@@ -21,7 +21,7 @@ module many_taylor
   integer, parameter :: BETWEEN_LOOKS = 100000 ! at the user, steps of all slots
   ! A step may leave out so much more than that of a single march, whose order it does not choose:
   ! what it leaves out is known and taken off.
-  real(dp), parameter :: MORE = 30.0_dp
+  real(dp), parameter :: MORE = 10.0_dp
   real(dp), parameter :: TRUSTED = 0.3_dp    ! error that is taken off, in tolerances
   real(dp), parameter :: MOST_GROWTH = 200.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
@@ -30,6 +30,8 @@ module many_taylor
   real(dp), parameter :: SHORTEST = 1e-7_dp  ! step over the time
   real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! of each radian of a wave
   real(dp), parameter :: FAR = 1e60_dp       ! from 1: products of such rates are numbers
+  ! None that a symmetry keeps from growing; of length 1 as growth takes it.
+  real(dp), parameter :: DIFFERENCE(3) = [0.48_dp, -0.31_dp, 0.21_dp]
   real(dp), parameter :: RIDGE = 1.001_dp
   real(dp), parameter :: LEAST = 1e-290_dp
   real(dp), parameter :: MOST_BITS = 2.0_dp**57
@@ -46,8 +48,17 @@ module many_taylor
     real(dp), dimension(SLOTS) :: scale       !! largest omega so far, rad/s
     real(dp), dimension(SLOTS) :: share       !! that the last terms may have of it
     real(dp), dimension(SLOTS) :: farthest    !! A_STEP over the coupling
-    real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! what it adds to the terms, rad/s
+    real(dp), dimension(SLOTS) :: going       !! above 0 where a body has a way to go
+    real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! what waves add to the terms, rad/s
   end type slots_t
+
+  type :: ready_t
+    !! Bodies before their first step.
+    real(dp), dimension(LANES, 3) :: w, a, constant, rate
+    real(dp), dimension(LANES) :: rest, h, scale, share, farthest
+    real(dp), dimension(LANES) :: fits
+    integer :: there, taken
+  end type ready_t
 
 contains
 
@@ -61,7 +72,9 @@ contains
     type(slots_t) :: s
     real(dp) :: waves(4, MOST_WAVES, SLOTS)
     integer :: body(SLOTS)   ! in each slot; 0: none
-    integer :: n_sines, n_waves, order, next, active, i, unseen
+    type(ready_t) :: ready
+    real(dp) :: ready_waves(4, MOST_WAVES, LANES)
+    integer :: n_sines, n_waves, order, first, active, i, j, unseen
 
     call c_f_pointer(bodies_at, bodies)
     interrupted = 0
@@ -74,31 +87,40 @@ contains
     order = order_for(bodies%tolerance)
     call fill(s)
     body = 0
-    next = 0
+    first = 0
+    call make_ready(bodies, first, ready_waves, ready)
     active = 0
     unseen = 0
     do
-      do i = 1, SLOTS
-        if (body(i) > 0) then
-          if (is_going(s, i)) cycle
-          call take_out(bodies%tolerance, s, i, omega(:, body(i)), status(body(i)))
-          active = active - 1
+      if (.not. minval(s%going) > 0.0_dp) then
+        do i = 1, SLOTS
+          if (s%going(i) > 0.0_dp) cycle
+          if (body(i) > 0) then
+            call take_out(bodies%tolerance, s, i, omega(:, body(i)), status(body(i)))
+            active = active - 1
+          end if
           body(i) = 0
-        end if
-        do while (next < bodies%n)
-          next = next + 1
-          call put_in(bodies, next, s, i, waves(:, :, i), status(next))
-          if (status(next) == LEFT) cycle
-          body(i) = next
-          active = active + 1
-          exit
+          do
+            if (ready%taken == ready%there) then
+              if (first + ready%there >= bodies%n) exit
+              first = first + LANES
+              call make_ready(bodies, first, ready_waves, ready)
+            end if
+            j = ready%taken + 1
+            ready%taken = j
+            status(first + j) = LEFT
+            if (ready%fits(j) < 0.0_dp) cycle
+            call put_in(ready, j, s, i)
+            if (n_waves > 0) waves(:, :n_waves, i) = ready_waves(:, :n_waves, j)
+            body(i) = first + j
+            active = active + 1
+            exit
+          end do
         end do
-        ! An empty slot goes on as it is: no number that takes the processor longer.
-        if (body(i) == 0) s%rest(i) = 0.0_dp
-      end do
+      end if
       if (active == 0) exit
-      call torque_terms(order, n_sines, n_waves, waves, s)
-      call step(order, SLOTS, s)
+      if (n_waves > 0) call wave_terms(order, n_sines, n_waves, waves, s)
+      call step(order, n_waves > 0, SLOTS, s)
       unseen = unseen + 1
       if (unseen >= BETWEEN_LOOKS) then
         unseen = 0
@@ -141,66 +163,124 @@ contains
     s%scale = 1.0_dp
     s%share = 1.0_dp
     s%farthest = 1.0_dp
-    s%torque = 0.0_dp
+    s%going = 0.0_dp
   end subroutine fill
 
-  subroutine put_in(bodies, n, s, i, waves, status)
-    !! Body n into slot i; LEFT where it is none for here.
+  subroutine make_ready(bodies, first, waves, r)
+    !! The next bodies, as many as there are lanes; r%fits is below 0 of one that is none for here.
     type(bodies_t), intent(in) :: bodies
-    integer, intent(in) :: n, i
-    type(slots_t), intent(inout) :: s
-    real(dp), intent(inout), target :: waves(4, MOST_WAVES)
-    integer(i1), intent(out) :: status
-    type(problem_t) :: problem
-    real(dp) :: omega(3), time, scale, share, h, coupling, sizes(3)
-    integer :: order
+    integer, intent(in) :: first
+    real(dp), intent(inout) :: waves(4, MOST_WAVES, LANES)
+    type(ready_t), intent(inout) :: r
+    real(dp), dimension(LANES, 3) :: moments
+    real(dp), dimension(LANES) :: coupling, gain, rate, turned, fastest
+    real(dp) :: push, ramp, tolerance
+    integer :: i, n, n_sines, n_waves
 
-    status = LEFT
-    omega = bodies%omega0(:, n)
-    time = bodies%times(of_body(size(bodies%times), n))
-    call single_of(bodies, n, problem, waves)
-    scale = max(abs(omega(1)), abs(omega(2)), abs(omega(3)))
-    if (.not. (scale <= FAR .and. scale >= 1.0_dp/FAR)) return
-    if (.not. (abs(time) <= FAR .and. abs(time) >= 1.0_dp/FAR)) return
-    if (.not. (all(abs(problem%coefficients) <= FAR) .and. all(abs(problem%constant) <= FAR) &
-               .and. all(abs(problem%rate) <= FAR))) return
-    if (problem%n_sines + problem%n_cosines > 0) then
-      problem%sines => waves(:, :problem%n_sines)
-      problem%cosines => waves(:, problem%n_sines + 1:problem%n_sines + problem%n_cosines)
-      if (.not. all(abs(waves(:, :problem%n_sines + problem%n_cosines)) <= FAR)) return
-      if (.not. maxval(abs(waves(4, :problem%n_sines + problem%n_cosines)))*abs(time)*WAVES_ERR &
-          <= SURE*bodies%tolerance) return
+    r%there = min(LANES, bodies%n - first)
+    r%taken = 0
+    tolerance = bodies%tolerance
+    call columns_of(bodies%omega0, first, LANES, r%w)
+    call columns_of(bodies%constant, first, LANES, r%constant)
+    call columns_of(bodies%rate, first, LANES, r%rate)
+    call columns_of(bodies%body, first, LANES, r%a)
+    moments = 1.0_dp
+    if (bodies%by_moments) then
+      moments = r%a
+      call coefficients_from(moments, LANES, r%a)
+      r%constant = r%constant/moments
+      r%rate = r%rate/moments
     end if
-    call plan(problem, scale, bodies%tolerance, time, .false., order, share, h)
-    sizes = sqrt(abs(problem%coefficients))
-    coupling = max(sizes(1)*sizes(2), sizes(2)*sizes(3), sizes(3)*sizes(1))
-    if (.not. abs(h) > 1e-3_dp*SHORTEST*abs(time)) return
-    s%w(i, :) = omega
-    s%low(i, :) = 0.0_dp
-    s%a(i, :) = problem%coefficients
-    s%constant(i, :) = problem%constant
-    s%rate(i, :) = problem%rate
-    s%error(i, :) = 0.0_dp
-    ! None that a symmetry keeps from growing.
-    s%small(i, :) = [0.48_dp, -0.31_dp, 0.21_dp]
+    if (size(bodies%times) == 1) then
+      r%rest = bodies%times(1)
+    else
+      r%rest(:r%there) = bodies%times(first + 1:first + r%there)
+      r%rest(r%there + 1:) = r%rest(r%there)
+    end if
+    do i = 1, LANES
+      coupling(i) = max(abs(r%a(i, 1)), abs(r%a(i, 2)), abs(r%a(i, 3)))
+      push = max(abs(r%constant(i, 1)), abs(r%constant(i, 2)), abs(r%constant(i, 3)))
+      ramp = max(abs(r%rate(i, 1)), abs(r%rate(i, 2)), abs(r%rate(i, 3)))
+      r%scale(i) = max(abs(r%w(i, 1)), abs(r%w(i, 2)), abs(r%w(i, 3)))
+      call steady_rates(coupling(i), r%scale(i), push, ramp, r%rest(i), gain(i), rate(i))
+      ! Of numbers that are none, or not far from the end of the range, a product may be.
+      r%fits(i) = 1.0_dp
+      if (.not. (r%scale(i) <= FAR .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
+      if (.not. (abs(r%rest(i)) <= FAR .and. abs(r%rest(i)) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
+      if (.not. (coupling(i) <= FAR .and. push <= FAR .and. ramp <= FAR)) r%fits(i) = -1.0_dp
+      if (.not. min(moments(i, 1), moments(i, 2), moments(i, 3)) > 0.0_dp) r%fits(i) = -1.0_dp
+    end do
+    turned = 0.0_dp
+    n_sines = size(bodies%sines, 2)
+    n_waves = n_sines + size(bodies%cosines, 2)
+    if (n_waves > 0) then
+      fastest = 0.0_dp
+      do n = 1, n_waves
+        do i = 1, r%there
+          if (n <= n_sines) then
+            waves(:, n, i) = bodies%sines(:, n, of_body(size(bodies%sines, 3), first + i))
+          else
+            waves(:, n, i) = bodies%cosines(:, n - n_sines, &
+                                            of_body(size(bodies%cosines, 3), first + i))
+          end if
+          waves(:3, n, i) = waves(:3, n, i)/moments(i, :)
+          call add_wave_rates(waves(:, n, i), n <= n_sines, coupling(i), r%rest(i), gain(i), &
+                              rate(i), turned(i))
+          fastest(i) = max(fastest(i), abs(waves(4, n, i)))
+          if (.not. all(abs(waves(:, n, i)) <= FAR)) r%fits(i) = -1.0_dp
+        end do
+      end do
+      do i = 1, r%there
+        if (.not. fastest(i)*abs(r%rest(i))*WAVES_ERR <= SURE*tolerance) r%fits(i) = -1.0_dp
+      end do
+    end if
+    do i = 1, LANES
+      call share_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
+                          r%rest(i), r%share(i), r%h(i))
+      r%share(i) = MORE*r%share(i)
+      push = sqrt(abs(r%a(i, 1)))
+      ramp = sqrt(abs(r%a(i, 2)))
+      rate(i) = sqrt(abs(r%a(i, 3)))
+      r%farthest(i) = A_STEP/max(push*ramp, ramp*rate(i), rate(i)*push, LEAST)
+      if (.not. abs(r%h(i)) > SHORTEST*abs(r%rest(i))) r%fits(i) = -1.0_dp
+    end do
+  end subroutine make_ready
+
+  pure subroutine put_in(r, j, s, i)
+    !! Body j of those that are ready into slot i.
+    type(ready_t), intent(in) :: r
+    integer, intent(in) :: j, i
+    type(slots_t), intent(inout) :: s
+    integer :: axis
+
+    do axis = 1, 3
+      s%w(i, axis) = r%w(j, axis)
+      s%low(i, axis) = 0.0_dp
+      s%a(i, axis) = r%a(j, axis)
+      s%constant(i, axis) = r%constant(j, axis)
+      s%rate(i, axis) = r%rate(j, axis)
+      s%error(i, axis) = 0.0_dp
+      s%small(i, axis) = DIFFERENCE(axis)
+    end do
     s%growth(i) = 1.0_dp
     s%t(i) = 0.0_dp
-    s%rest(i) = time
-    s%h(i) = h
-    s%scale(i) = scale
-    s%share(i) = MORE*share
-    s%farthest(i) = A_STEP/max(coupling, LEAST)
-    status = COMPLETE
+    s%rest(i) = r%rest(j)
+    s%h(i) = r%h(j)
+    s%scale(i) = r%scale(j)
+    s%share(i) = r%share(j)
+    s%farthest(i) = r%farthest(j)
+    s%going(i) = 1.0_dp
   end subroutine put_in
 
-  pure logical function is_going(s, i)
-    !! Whether a slot's body has a way to go, and is none that is left to the single kernel.
-    type(slots_t), intent(in) :: s
-    integer, intent(in) :: i
+  pure real(dp) function going(rest, h, t, growth)
+    !! Above 0 where a body has a way to go, and is none that is left to the single kernel.
+    real(dp), intent(in) :: rest, h, t !! s
+    real(dp), intent(in) :: growth
 
-    is_going = abs(s%rest(i)) > 0.0_dp .and. s%growth(i) <= MOST_GROWTH &
-               .and. abs(s%h(i)) > SHORTEST*abs(s%t(i) + s%rest(i))
-  end function is_going
+    going = abs(rest)
+    if (.not. growth <= MOST_GROWTH) going = 0.0_dp
+    if (.not. abs(h) > SHORTEST*abs(t + rest)) going = 0.0_dp
+  end function going
 
   pure subroutine take_out(tolerance, s, i, omega, status)
     !! What has come of a slot's body.
@@ -221,8 +301,8 @@ contains
     end if
   end subroutine take_out
 
-  subroutine torque_terms(order, n_sines, n_waves, waves, s)
-    !! What the torque adds to the terms of a step as long as the one before.
+  subroutine wave_terms(order, n_sines, n_waves, waves, s)
+    !! What waves of torque add to the terms of a step as long as the one before.
     integer, intent(in) :: order, n_sines, n_waves
     real(dp), intent(in) :: waves(4, MOST_WAVES, SLOTS)
     type(slots_t), intent(inout) :: s
@@ -230,14 +310,7 @@ contains
     real(dp), dimension(SLOTS) :: turn, power, even, odd
     integer :: axis, i, k, n
 
-    do axis = 1, 3
-      do i = 1, SLOTS
-        s%torque(i, axis, 1) = s%h(i)*(s%constant(i, axis) + s%rate(i, axis)*s%t(i))
-        s%torque(i, axis, 2) = (0.5_dp*s%h(i))*(s%h(i)*s%rate(i, axis))
-      end do
-    end do
-    if (n_waves == 0) return
-    s%torque(:, :, 3:order) = 0.0_dp
+    s%torque(:, :, :order) = 0.0_dp
     do n = 1, n_waves
       do i = 1, SLOTS
         angle(i) = waves(4, n, i)*s%t(i)
@@ -267,7 +340,7 @@ contains
         end do
       end do
     end do
-  end subroutine torque_terms
+  end subroutine wave_terms
 
   pure real(dp) function ratio(order, allowed, last)
     !! Of the step with which the last terms would be as large as allowed: the bits of a positive
@@ -284,20 +357,22 @@ contains
   end function ratio
 
   ! unroll: many_step
-  pure subroutine step(order, m, s)
+  pure subroutine step(order, waves, m, s)
     !! One step of each slot.
     integer, intent(in) :: order, m
+    logical, intent(in) :: waves !! else the torque has none
     type(slots_t), intent(inout) :: s
     integer :: i
 
     do i = 1, m
-      call step_of(order, i, s)
+      call step_of(order, waves, i, s)
     end do
   end subroutine step
 
-  pure subroutine step_of(order, i, s)
+  pure subroutine step_of(order, waves, i, s)
     !! The terms with the step before, their ratio to it, the sum, what is left out.
     integer, intent(in) :: order, i
+    logical, intent(in) :: waves
     type(slots_t), intent(inout) :: s
     integer, parameter :: CARRIED = 7, MOMENTS = 8
     real(dp) :: terms(3, 0:MOST_ORDER), f(3), products(3), change(3), total(3), part(3)
@@ -313,7 +388,10 @@ contains
       do j = 0, k - 1
         products = products + cshift(terms(:, j), 1)*cshift(terms(:, k - 1 - j), 2)
       end do
-      terms(:, k) = (f/real(k, dp))*products + s%torque(i, :, k)
+      terms(:, k) = (f/real(k, dp))*products
+      if (k == 1) terms(:, k) = terms(:, k) + h*(s%constant(i, :) + s%rate(i, :)*s%t(i))
+      if (k == 2) terms(:, k) = terms(:, k) + (0.5_dp*h)*(h*s%rate(i, :))
+      if (waves) terms(:, k) = terms(:, k) + s%torque(i, :, k)
     end do
     scale = max(s%scale(i), maxval(abs(terms(:, 0))))
     allowed = s%share(i)*scale
@@ -379,6 +457,7 @@ contains
     s%rest(i) = s%rest(i) - next
     s%h(i) = next
     s%scale(i) = scale
+    s%going(i) = going(s%rest(i), next, s%t(i), s%growth(i))
   end subroutine step_of
   ! end unroll
 

@@ -1,5 +1,6 @@
 """Write out the step of many series side by side: one loop over the lanes for each order."""
 
+import itertools
 from collections.abc import Iterator
 
 ORDERS = (8, 12, 18, 24)
@@ -45,28 +46,34 @@ oyx = fb*(mz - fc*cz)
 oyz = fb*(mx + fa*cx)
 ozx = fc*(my + fb*cy)
 ozy = fc*(mx - fa*cx)"""
-END = """s%t(i) = s%t(i) + next
-s%rest(i) = rest - next
+END = """rest = rest - next
+s%t(i) = s%t(i) + next
+s%rest(i) = rest
 s%h(i) = next
-s%scale(i) = scale"""
+s%scale(i) = scale
+next = going(rest, next, s%t(i), s%growth(i))
+s%going(i) = next"""
 
 
 def many_steps() -> Iterator[str]:
     """Yield a procedure for each order, and the one that chooses."""
-    yield "pure subroutine step(order, m, s)"
+    yield "pure subroutine step(order, waves, m, s)"
     yield "  integer, intent(in) :: order, m"
+    yield "  logical, intent(in) :: waves"
     yield "  type(slots_t), intent(inout) :: s"
-    yield "  select case (order)"
+    yield "  select case (merge(order, -order, waves))"
     for order in ORDERS:
         yield f"  case ({order})"
-        yield f"    call step_{order}(m, s)"
+        yield f"    call waves_{order}(m, s)"
+        yield f"  case (-{order})"
+        yield f"    call steady_{order}(m, s)"
     yield "  end select"
     yield "end subroutine step"
-    for order in ORDERS:
-        lines = list(one_step(order))
+    for name, order in itertools.product(("waves", "steady"), ORDERS):
+        lines = list(one_step(order, name == "waves"))
         names = sorted({line.split(" = ")[0] for line in lines if _is_local(line)})
         yield ""
-        yield f"pure subroutine step_{order}(m, s)"
+        yield f"pure subroutine {name}_{order}(m, s)"
         yield "  integer, intent(in) :: m"
         yield "  type(slots_t), intent(inout) :: s"
         yield from (f"  real(dp) :: {name}" for name in names)
@@ -74,18 +81,18 @@ def many_steps() -> Iterator[str]:
         yield "  do i = 1, m"
         yield from (f"    {line}" for line in lines)
         yield "  end do"
-        yield f"end subroutine step_{order}"
+        yield f"end subroutine {name}_{order}"
 
 
 def _is_local(line: str) -> bool:
     return " = " in line and line.split(" = ")[0].isidentifier()
 
 
-def one_step(order: int) -> Iterator[str]:
+def one_step(order: int, waves: bool) -> Iterator[str]:
     """Yield the statements for one lane."""
     yield from BEGINNING.splitlines()
     for k in range(1, order + 1):
-        yield from term(k)
+        yield from term(k, waves)
     last = " + ".join(f"(abs({x}{order}) + abs({x}{order - 1}))" for x in "xyz")
     yield f"last = {last}"
     yield from LENGTH.format(order=order).splitlines()
@@ -131,8 +138,12 @@ def one_step(order: int) -> Iterator[str]:
     yield from END.splitlines()
 
 
-def term(k: int) -> Iterator[str]:
+def term(k: int, waves: bool) -> Iterator[str]:
     """Yield term k of the three unknowns: two sums, so that one need not wait for itself."""
+    steady = {
+        1: "h*(s%constant(i, {axis}) + s%rate(i, {axis})*s%t(i))",
+        2: "(0.5_dp*h)*(h*s%rate(i, {axis}))",
+    }.get(k)
     pairs = sorted(((j, k - 1 - j) for j in range(k)), key=max)
     for axis, (x, u, v, factor) in enumerate(FACTORS, 1):
         sums = ("p", "q") if len(pairs) > 4 else ("p",)
@@ -142,7 +153,9 @@ def term(k: int) -> Iterator[str]:
             yield f"{place} = {u}{i}*{v}{j}{more}"
         if len(sums) > 1:
             yield "p = p + q"
-        yield f"{x}{k} = ({factor}*(1.0_dp/{k}.0_dp))*p + s%torque(i, {axis}, {k})"
+        more = f" + {steady.format(axis=axis)}" if steady else ""
+        more += f" + s%torque(i, {axis}, {k})" if waves else ""
+        yield f"{x}{k} = ({factor}*(1.0_dp/{k}.0_dp))*p{more}"
 
 
 def mean_weight(k: int) -> str:

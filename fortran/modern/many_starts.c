@@ -13,14 +13,21 @@ typedef void kernel(const double *packed, const int *n_packed, const int *n, con
                     const int *n_times, const double *times, double *omega, int8_t *status,
                     int *raised);
 
+/* solve_packed, for a start alone. */
+typedef void single_kernel(const double *packed, const int *n_packed, const double *start,
+                           const double *t_end, double *state, int *status, int64_t *steps,
+                           double *found);
+
 typedef struct {
   PyObject_HEAD
   vectorcallfunc vectorcall;
   PyObject *callable;    /* the kernel as Python has it: keeps its address */
+  PyObject *single;
   kernel *address;
+  single_kernel *single_address;
   PyArrayObject *packed; /* read-only */
+  PyArrayObject *brief;  /* the same, or NULL: for what takes less time than others' getting a turn */
   PyObject *slowly;      /* what takes any arguments */
-  int is_brief;          /* a few starts take less time than others' getting a turn */
 } many_starts;
 
 enum { FEW = 16 };
@@ -32,12 +39,32 @@ static int is_plain(PyObject *object, int dimensions)
          PyArray_TYPE(array) == NPY_DOUBLE && PyArray_ISCARRAY_RO(array);
 }
 
+/* Enter the kernel; returns whether every start has a result at once. */
+static int enter(const many_starts *self, PyArrayObject *packed, int n, const double *start,
+                 int n_times, const double *times, double *omega, int8_t *status)
+{
+  const int n_packed = (int)PyArray_DIM(packed, 0);
+  const double *numbers = PyArray_DATA(packed);
+  int raised = 0, is_complete = 1;
+  if (n == 1) {
+    int ended;
+    int64_t steps;
+    double found[2];
+    self->single_address(numbers, &n_packed, start, times, omega, &ended, &steps, found);
+    *status = (int8_t)ended;
+    return ended == 0;
+  }
+  self->address(numbers, &n_packed, &n, start, &n_times, times, omega, status, &raised);
+  for (int i = 0; i < n && is_complete; i++) is_complete = status[i] == 0;
+  return is_complete;
+}
+
 static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, PyObject *names)
 {
   many_starts *self = (many_starts *)object;
   double time;
   const double *times = &time;
-  int n_times = 1, raised = 0;
+  int n_times = 1;
 
   if (PyVectorcall_NARGS(n_given) != 2 || names != NULL || !is_plain(given[0], 2)) goto slowly;
   PyArrayObject *start = (PyArrayObject *)given[0];
@@ -56,12 +83,16 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   PyObject *status = PyArray_SimpleNew(1, shape, NPY_INT8);
   PyObject *both = omega && status ? PyTuple_Pack(2, omega, status) : NULL;
   if (both != NULL) {
-    const int n_packed = (int)PyArray_DIM(self->packed, 0), n = (int)shape[0];
-    PyThreadState *thread = self->is_brief && n <= FEW ? NULL : PyEval_SaveThread();
-    self->address(PyArray_DATA(self->packed), &n_packed, &n, PyArray_DATA(start), &n_times, times,
-                  PyArray_DATA((PyArrayObject *)omega), PyArray_DATA((PyArrayObject *)status),
-                  &raised);
-    if (thread != NULL) PyEval_RestoreThread(thread);
+    const int n = (int)shape[0];
+    const double *numbers = PyArray_DATA(start);
+    double *found = PyArray_DATA((PyArrayObject *)omega);
+    int8_t *ended = PyArray_DATA((PyArrayObject *)status);
+    if (!(self->brief != NULL && n <= FEW &&
+          enter(self, self->brief, n, numbers, n_times, times, found, ended))) {
+      PyThreadState *thread = PyEval_SaveThread();
+      enter(self, self->packed, n, numbers, n_times, times, found, ended);
+      PyEval_RestoreThread(thread);
+    }
     if (PyErr_Occurred()) Py_CLEAR(both);
   }
   Py_XDECREF(omega);
@@ -71,35 +102,41 @@ slowly:
   return PyObject_Vectorcall(self->slowly, given, n_given, names);
 }
 
+/* The address behind one of f2py's functions; NULL with an error set where there is none. */
+static void *address_of(PyObject *callable)
+{
+  PyObject *capsule = PyObject_GetAttrString(callable, "_cpointer");
+  if (capsule == NULL) return NULL;
+  void *address = PyCapsule_GetPointer(capsule, PyCapsule_GetName(capsule));
+  Py_DECREF(capsule);
+  return address;
+}
+
+static PyArrayObject *own_packed(PyObject *packed)
+{
+  return (PyArrayObject *)PyArray_FROMANY(packed, NPY_DOUBLE, 1, 1,
+                                          NPY_ARRAY_CARRAY | NPY_ARRAY_ENSURECOPY);
+}
+
 static PyObject *new_many(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-  static char *known[] = {"kernel", "packed", "slowly", "is_brief", NULL};
-  PyObject *callable, *packed, *slowly;
-  int is_brief;
-  if (!PyArg_ParseTupleAndKeywords(args, names, "OOOp", known, &callable, &packed, &slowly,
-                                   &is_brief)) {
+  static char *known[] = {"kernel", "single", "packed", "brief", "slowly", NULL};
+  PyObject *callable, *single, *packed, *brief, *slowly;
+  if (!PyArg_ParseTupleAndKeywords(args, names, "OOOOO", known, &callable, &single, &packed,
+                                   &brief, &slowly)) {
     return NULL;
   }
   many_starts *self = (many_starts *)type->tp_alloc(type, 0);
   if (self == NULL) return NULL;
   self->vectorcall = call;
   self->callable = Py_NewRef(callable);
+  self->single = Py_NewRef(single);
   self->slowly = Py_NewRef(slowly);
-  self->is_brief = is_brief;
-  PyObject *address = PyObject_GetAttrString(callable, "_cpointer");
-  if (address != NULL) {
-    self->address = (kernel *)PyCapsule_GetPointer(address, PyCapsule_GetName(address));
-    Py_DECREF(address);
-  }
-  if (self->address != NULL) {
-    self->packed = (PyArrayObject *)PyArray_FROM_OTF(packed, NPY_DOUBLE,
-                                                     NPY_ARRAY_CARRAY | NPY_ARRAY_ENSURECOPY);
-  }
-  if (self->packed == NULL || PyArray_NDIM(self->packed) != 1) {
-    if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "packed: allowed: one dimension");
-    Py_DECREF(self);
-    return NULL;
-  }
+  self->address = (kernel *)address_of(callable);
+  if (self->address != NULL) self->single_address = (single_kernel *)address_of(single);
+  if (self->single_address != NULL) self->packed = own_packed(packed);
+  if (self->packed != NULL && brief != Py_None) self->brief = own_packed(brief);
+  if (PyErr_Occurred()) Py_CLEAR(self);
   return (PyObject *)self;
 }
 
@@ -107,7 +144,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
 {
   many_starts *self = (many_starts *)object;
   Py_VISIT(self->callable);
-  Py_VISIT(self->packed);
+  Py_VISIT(self->single);
   Py_VISIT(self->slowly);
   return 0;
 }
@@ -123,7 +160,9 @@ static void dealloc(PyObject *object)
   many_starts *self = (many_starts *)object;
   PyObject_GC_UnTrack(object);
   Py_XDECREF(self->callable);
+  Py_XDECREF(self->single);
   Py_XDECREF(self->packed);
+  Py_XDECREF(self->brief);
   Py_XDECREF(self->slowly);
   Py_TYPE(object)->tp_free(object);
 }

@@ -22,8 +22,10 @@ module many_taylor
   ! A step may leave out so much more than that of a single march, whose order it does not choose:
   ! what it leaves out is known and taken off.
   real(dp), parameter :: MORE = 10.0_dp
-  real(dp), parameter :: TRUSTED = 0.3_dp    ! error that is taken off, in tolerances
-  real(dp), parameter :: MOST_GROWTH = 200.0_dp
+  ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
+  real(dp), parameter :: TRUSTED = 0.4_dp
+  real(dp), parameter :: DOUBTED = 16.0_dp   ! growth at which it is half of that
+  real(dp), parameter :: MOST_GROWTH = 100.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: SURE = 0.03_dp      ! rounding times growth, in tolerances
   real(dp), parameter :: A_STEP = 3.0_dp     ! norm up to which an exponential is taken at once
@@ -295,7 +297,8 @@ contains
     error = max(abs(s%error(i, 1)), abs(s%error(i, 2)), abs(s%error(i, 3)))
     scale = max(s%scale(i), abs(omega(1)), abs(omega(2)), abs(omega(3)))
     status = LEFT
-    if (.not. abs(s%rest(i)) > 0.0_dp .and. scale <= FAR .and. error <= TRUSTED*tolerance*scale &
+    if (.not. abs(s%rest(i)) > 0.0_dp .and. scale <= FAR &
+        .and. error*(1.0_dp + s%growth(i)/DOUBTED) <= TRUSTED*tolerance*scale &
         .and. s%growth(i) <= min(MOST_GROWTH, SURE*tolerance/ROUNDING)) then
       status = COMPLETE
     end if

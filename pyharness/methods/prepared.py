@@ -81,6 +81,7 @@ class Solver(LastCall, BoundKernel):
     """
 
     _packed: Array
+    _brief: Array | None
 
     # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
     # Python between, which would cost as much as an easy solve.
@@ -95,7 +96,7 @@ class Solver(LastCall, BoundKernel):
             brief[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
         solver = super().__new__(cls, kernel, packed, _check, brief)
         solver.plan = chosen
-        solver._packed = packed
+        solver._packed, solver._brief = packed, brief
         solver._given = tolerance, asked, effort
         return solver
 
@@ -110,9 +111,10 @@ class Solver(LastCall, BoundKernel):
         """
         from pyharness._many import ManyStarts
 
-        is_brief = bool(self.plan.closed_form) and not self.plan.scene.torque.varies
-        slowly = partial(many_starts, self._packed)
-        return ManyStarts(extension().solve_packed_many, self._packed, slowly, is_brief)
+        kernels, slowly = extension(), partial(many_starts, self._packed)
+        return ManyStarts(
+            kernels.solve_packed_many, kernels.solve_packed, self._packed, self._brief, slowly
+        )
 
     @property
     def method(self) -> str:

@@ -1,12 +1,18 @@
 """Executors: who computes the chunks; all of them compute the same."""
 
+import asyncio
+import contextlib
+import logging
 import multiprocessing
 import os
-from collections.abc import Iterator
+import re
+import socket
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 from pyharness.ensembles.sweep import Arrays, Sweep, solve_chunk
 from pyharness.model.errors import InputError
@@ -16,26 +22,40 @@ Results = Iterator[tuple[int, Arrays]]
 
 _ATTEMPTS = 3  # of a chunk whose process dies
 _AHEAD = 2  # chunks for each process, so that none waits for the disk
-_ANSWER = 5.0  # s, until a scheduler must have answered, and until it must have a worker
+_ANSWER = 4.0  # s, until a scheduler must have answered, and until it must have a worker
+_ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
 
 
-def computed(
-    executor: str, sweep: Sweep, chunks: list[int], workers: int, address: str | None = None
-) -> Results:
-    """Yield chunks as they are computed; InputError where nobody is left to compute them."""
-    if executor == "processes":
-        return _by_processes(sweep, chunks, workers)
-    if executor == "dask":
-        return _by_dask(sweep, chunks, workers, address)
+class Engine(NamedTuple):
+    """Who computes: how many at once, and what yields chunks of a sweep as they are computed."""
+
+    workers: int
+    computed: Callable[[Sweep, list[int]], Results]
+
+
+@contextlib.contextmanager
+def engine(
+    executor: str, workers: int | None = None, address: str | None = None
+) -> Iterator[Engine]:
+    """Start what computes, and end it; InputError where a scheduler's address has none.
+
+    Its results raise InputError where nobody is left to compute them.
+    """
+    if executor == "here":
+        yield Engine(1, _here)
+    elif executor == "processes":
+        count = workers or len(os.sched_getaffinity(0))
+        yield Engine(count, partial(_by_processes, count))
+    else:
+        with _client(workers or len(os.sched_getaffinity(0)), address) as client:
+            yield Engine(max(1, sum(client.nthreads().values())), partial(_by_client, client))
+
+
+def _here(sweep: Sweep, chunks: list[int]) -> Results:
     return ((chunk, solve_chunk(sweep, chunk)) for chunk in chunks)
 
 
-def default_workers(executor: str) -> int:
-    """Return how many processes an executor has where nothing is said."""
-    return 1 if executor == "here" else len(os.sched_getaffinity(0))
-
-
-def _by_processes(sweep: Sweep, chunks: list[int], workers: int) -> Results:
+def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
     left = list(chunks)
     deaths = 0
     while left:
@@ -80,64 +100,67 @@ def check_dask() -> None:
         raise InputError("--executor dask needs dask: pip install 'pyharness[sweep]'") from None
 
 
-def _by_dask(sweep: Sweep, chunks: list[int], workers: int, address: str | None) -> Results:
+@contextlib.contextmanager
+def _client(workers: int, address: str | None) -> Iterator[Any]:
     dask: Any = import_module("distributed")
+    # What it logs, of workers that come and go, is for those who look after a cluster.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    if address is not None:
+        with _connected(dask, address) as client:
+            yield client
+        return
+    settings = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
+    with (
+        dask.LocalCluster(n_workers=workers, **settings) as cluster,
+        dask.Client(cluster) as client,
+    ):
+        yield client
 
-    if address is None:
-        with (
-            dask.LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
-            ) as cluster,
-            dask.Client(cluster) as client,
-        ):
-            yield from _by_client(client, sweep, chunks)
-    else:
-        with connected(address) as client:
-            yield from _by_client(client, sweep, chunks)
 
-
-def connected(address: str) -> Any:
+def _connected(dask: Any, address: str) -> Any:
     """Return a client of the scheduler at an address; InputError where nobody answers."""
-    import logging
-
-    dask: Any = import_module("distributed")
-
-    client: Any = None
+    found = _ADDRESS.fullmatch(address)
+    allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
+    where = f"--scheduler '{address}'"
+    if found is None or int(found["port"]) > 65535:
+        raise InputError(f"{where}: no address; {allowed}")
+    place = found["host"].strip("[]"), int(found["port"])
+    answered: list[bool] = []
     try:
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        client = dask.Client(address, timeout=_ANSWER, set_as_default=False)
-        client.wait_for_workers(1, timeout=_ANSWER / 2.0)
-        return client
-    except Exception as error:  # whatever answers there may make anything of the question
-        if client is not None:
-            client.close(timeout=1.0)
-        reason = "it has no worker" if client is not None else _reason(error)
-        raise InputError(
-            f"--scheduler '{address}': {reason}; allowed: the address of a Dask scheduler with "
-            "workers, as in tcp://host:8786"
-        ) from None
+        # Whoever is not there says so at once; Dask would ask again and again.
+        socket.create_connection(place, timeout=_ANSWER).close()
+        asyncio.run(asyncio.wait_for(_has_workers(dask, address, answered), _ANSWER))
+        return dask.Client(address, timeout=_ANSWER, set_as_default=False)
+    except Exception as error:  # what answers there may make anything of the question
+        reason = "no Dask scheduler answers there"
+        if answered:
+            reason = "it has no worker"
+        elif isinstance(error, ConnectionError | socket.gaierror):
+            reason = f"nobody answers: {error.strerror or error}"
+        raise InputError(f"{where}: {reason}; {allowed}") from None
 
 
-def _reason(error: Exception) -> str:
-    if isinstance(error, ValueError) and not isinstance(error, OSError):
-        return str(error)
-    return f"no scheduler answered within {_ANSWER:g} s"
+async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
+    """Return once a scheduler has workers, and say when it has answered; wait without end."""
+    # A client waits for half a minute where something takes the connection and says nothing.
+    async with dask.rpc(address) as scheduler:
+        while not (await scheduler.identity())["workers"]:
+            answered.append(True)
+            await asyncio.sleep(0.1)
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
     """Keep every worker busy; what dies with one is computed again by another, as Dask does."""
     dask: Any = import_module("distributed")
-
     n_threads = sum(client.nthreads().values())
-    (sent,) = client.scatter([sweep], broadcast=True)
     rest = iter(chunks)
-    running = dask.as_completed()
+    running = dask.as_completed(loop=client.loop)
     chunk_of = {}
 
     def submit() -> None:
         if (chunk := next(rest, None)) is not None:
-            # Not pure: Dask is not to think of names for what is new each time.
-            future = client.submit(solve_chunk, sent, chunk, pure=False)
+            # The sweep with each: what is sent once may be lost with the workers that have it.
+            future = client.submit(solve_chunk, sweep, chunk, pure=False)
             chunk_of[future.key] = chunk
             running.add(future)
 
@@ -150,6 +173,13 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
             raise InputError(
                 "--executor dask: the workers that took a chunk died, one after the other; is "
                 "there enough memory? The same command goes on with what is missing"
+            ) from None
+        except InputError:
+            raise
+        except Exception as error:  # of a worker that lacks something, or a scheduler that is gone
+            raise InputError(
+                f"--executor dask: chunk {chunk_of[future.key]}: {type(error).__name__}: {error}; "
+                "the same command goes on with what is missing"
             ) from None
         yield chunk_of.pop(future.key), found
         future.release()

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pyharness.ensembles.executors import computed, default_workers
+from pyharness.ensembles.executors import Engine, engine
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import Store, check_store, opened
 from pyharness.ensembles.sweep import Sweep, solve_points, spread
@@ -132,12 +132,12 @@ def run_sweep(
         For a store of another sweep, a size that disk or memory can't hold, a disk that is full, a
         cluster that does not answer. What was computed stays, and the next call goes on from it.
     """
-    workers = workers or default_workers(executor)
     is_there = check_store(sweep, path)
-    check_size(sweep, path, workers, 0 if is_there else sweep.n_chunks)
+    check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
     try:
-        with opened(sweep, path) as store:
-            return _filled(store, executor, workers, address, before, progress)
+        # Whoever does not answer is found out before anything is made.
+        with engine(executor, workers, address) as own, opened(sweep, path) as store:
+            return _filled(store, own, before, progress)
     except OSError as error:
         raise InputError(
             f"--out '{path}': {error.strerror or error}; what is done stays, and the same command "
@@ -147,9 +147,7 @@ def run_sweep(
 
 def _filled(
     store: Store,
-    executor: str,
-    workers: int,
-    address: str | None,
+    own: Engine,
     before: Callable[[Estimate], None],
     progress: Callable[[str], None],
 ) -> Outcome:
@@ -158,13 +156,13 @@ def _filled(
     n_before = sweep.n_chunks - len(missing)
     if not missing:
         return Outcome(None, n_before, 0, 0.0)
-    size = check_size(sweep, str(store.folder), workers, len(missing))
+    size = check_size(sweep, str(store.folder), own.workers, len(missing))
     share = len(missing) / sweep.n_chunks
-    seconds = seconds_per_scene(sweep) * sweep.n_scenes * share / workers
+    seconds = seconds_per_scene(sweep) * sweep.n_scenes * share / own.workers
     estimate = Estimate(sweep.n_scenes, sweep.n_chunks, len(missing), *size, seconds)
     before(estimate)
     begin = time.monotonic()
-    results = computed(executor, sweep, missing, workers, address)
+    results = own.computed(sweep, missing)
     try:
         for n, (chunk, found) in enumerate(results, 1):
             store.write(chunk, found)
@@ -173,8 +171,9 @@ def _filled(
             progress(f"chunk {n_before + n} of {sweep.n_chunks}, {duration(rest)} left")
     finally:
         # Processes and connections end here, not when the garbage is collected.
-        if hasattr(results, "close"):
-            results.close()
+        close = getattr(results, "close", None)
+        if close is not None:
+            close()
     return Outcome(estimate, n_before, len(missing), time.monotonic() - begin)
 
 

@@ -6,7 +6,9 @@ import logging
 import multiprocessing
 import os
 import re
+import signal
 import socket
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -77,19 +79,24 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
 def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
     # A fork of a process with threads, as those of NumPy and Zarr, may never wake up.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        waiting: dict[Future[Arrays], int] = {}
-        rest = iter(chunks)
-        try:
-            while True:
-                while len(waiting) < _AHEAD * workers and (chunk := next(rest, None)) is not None:
-                    waiting[pool.submit(solve_chunk, sweep, chunk)] = chunk
-                if not waiting:
-                    return
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                    yield waiting.pop(future), future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    # A Ctrl-C goes to all of them, and is the business of this one.
+    pool = ProcessPoolExecutor(workers, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    waiting: dict[Future[Arrays], int] = {}
+    rest = iter(chunks)
+    try:
+        while True:
+            while len(waiting) < _AHEAD * workers and (chunk := next(rest, None)) is not None:
+                waiting[pool.submit(solve_chunk, sweep, chunk)] = chunk
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                yield waiting.pop(future), future.result()
+    finally:
+        # What they still compute is lost; to wait for it may be to wait for ever.
+        processes = list((pool._processes or {}).values())
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.kill()
 
 
 def check_dask() -> None:
@@ -110,11 +117,25 @@ def _client(workers: int, address: str | None) -> Iterator[Any]:
             yield client
         return
     settings = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
-    with (
-        dask.LocalCluster(n_workers=workers, **settings) as cluster,
-        dask.Client(cluster) as client,
-    ):
+    with _deaf_to_interrupts():
+        cluster = dask.LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+        )
+    with cluster, dask.Client(cluster) as client:
         yield client
+
+
+@contextlib.contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C here, and in every process started meanwhile for as long as it lives."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _connected(dask: Any, address: str) -> Any:

@@ -325,3 +325,56 @@ subroutine solve_packed_attitude(packed, n_packed, start, t_end, state, status, 
 
   call solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
 end subroutine solve_packed_attitude
+
+subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, body, n_constant, &
+                          constant, n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
+                          n_cosine_sets, cosines, n, omega0, n_times, times, n_attitudes, &
+                          attitude0, omega, n_results, attitude, status, raised)
+  ! Many bodies in one call: omega, and the attitude where it is given, of each at its time. Arrays
+  ! of one column are shared by all.
+  !f2py threadsafe
+  use bodies, only: bodies_t
+  use ensemble, only: solve_bodies
+  implicit none
+  integer(4), intent(in) :: code                ! of the module methods
+  real(8), intent(in) :: tolerance              ! relative, of the series
+  real(8), intent(in) :: step                   ! s, of the methods with a fixed step
+  real(8), intent(in) :: effort                 ! factor on the limits, for each body
+  integer(4), intent(in) :: by_moments          ! 1: body is I1, I2, I3; 0: A, B, C
+  integer(4), intent(in) :: n_body
+  real(8), intent(in), target :: body(3, n_body)
+  integer(4), intent(in) :: n_constant
+  real(8), intent(in), target :: constant(3, n_constant) ! N m, or 1/s2
+  integer(4), intent(in) :: n_rate
+  real(8), intent(in), target :: rate(3, n_rate)         ! N m/s, or 1/s3
+  integer(4), intent(in) :: n_sines, n_sine_sets
+  real(8), intent(in), target :: sines(4, n_sines, n_sine_sets)       ! amplitude (3), rad/s
+  integer(4), intent(in) :: n_cosines, n_cosine_sets
+  real(8), intent(in), target :: cosines(4, n_cosines, n_cosine_sets) ! the same
+  integer(4), intent(in) :: n
+  real(8), intent(in), target :: omega0(3, n)   ! rad/s
+  integer(4), intent(in) :: n_times
+  real(8), intent(in), target :: times(n_times) ! s
+  integer(4), intent(in) :: n_attitudes
+  real(8), intent(in) :: attitude0(4, n_attitudes)
+  real(8), intent(inout) :: omega(3, n)         ! rad/s; NaN unless the status is 0 or 6
+  integer(4), intent(in) :: n_results           ! n with attitude, else 0
+  real(8), intent(inout) :: attitude(4, n_results)
+  integer(1), intent(inout) :: status(n)        ! of the module statuses
+  integer(4), intent(out) :: raised             ! 1: interrupted by the user
+  type(bodies_t) :: bodies
+  real(8) :: packed(0)
+
+  bodies%by_moments = by_moments /= 0
+  bodies%tolerance = tolerance
+  bodies%step = step
+  bodies%n = n
+  bodies%body => body
+  bodies%constant => constant
+  bodies%rate => rate
+  bodies%sines => sines
+  bodies%cosines => cosines
+  bodies%omega0 => omega0
+  bodies%times => times
+  call solve_bodies(bodies, code, effort, packed, attitude0, omega, attitude, status, raised)
+end subroutine solve_ensemble

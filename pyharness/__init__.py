@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pyharness.compare.comparison import Comparison, compare_programs
+    from pyharness.methods.many import Ensemble, solve_many
     from pyharness.methods.prepared import Solver, prepare
     from pyharness.methods.solve import solve
     from pyharness.model.errors import InputError, NotBuiltError
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Comparison",
+    "Ensemble",
     "InputError",
     "Listing",
     "NotBuiltError",
@@ -37,6 +39,7 @@ __all__ = [
     "read_scene",
     "run_program",
     "solve",
+    "solve_many",
     "subset",
 ]
 
@@ -50,6 +53,7 @@ _ROOMS = {
     "model.scene_file": ("case_scene", "read_scene"),
     "model.trajectory": ("Stop", "Trajectory"),
     "original.programs": ("run_program",),
+    "methods.many": ("Ensemble", "solve_many"),
     "methods.prepared": ("Solver", "prepare"),
     "methods.solve": ("solve",),
 }

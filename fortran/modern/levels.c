@@ -14,16 +14,40 @@
 
 typedef void solver(ARGUMENTS);
 typedef void quick_solver(QUICK_ARGUMENTS);
+typedef void free_solver(const void *bodies, double *omega, int8_t *status);
+typedef void series_solver(const void *bodies, double *omega, int8_t *status, int *interrupted);
+typedef void fixed_solver(const void *bodies, int method, double *omega, int8_t *status,
+                          int *interrupted);
 
-solver taylor_solve_plain;
-quick_solver quick_solve_plain;
+#define DECLARED(level)                                                                        \
+  solver taylor_solve_##level;                                                                 \
+  quick_solver quick_solve_##level;                                                            \
+  free_solver solve_many_free_##level;                                                               \
+  series_solver solve_many_taylor_##level;                                                           \
+  fixed_solver solve_many_fixed_##level;
+#define TAKEN(level)                                                                           \
+  {taylor_solve_##level, quick_solve_##level, solve_many_free_##level, solve_many_taylor_##level,          \
+   solve_many_fixed_##level}
+
+DECLARED(plain)
 #ifdef WITH_LEVELS
-solver taylor_solve_avx2, taylor_solve_avx512;
-quick_solver quick_solve_avx2, quick_solve_avx512;
+DECLARED(avx2)
+DECLARED(avx512)
 #endif
 
-static solver *chosen = taylor_solve_plain;
-static quick_solver *chosen_quick = quick_solve_plain;
+static struct {
+  solver *taylor;
+  quick_solver *quick;
+  free_solver *free;
+  series_solver *series;
+  fixed_solver *fixed;
+} chosen, known[] = {
+  TAKEN(plain),
+#ifdef WITH_LEVELS
+  TAKEN(avx2),
+  TAKEN(avx512),
+#endif
+};
 static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
 
 /* All of x86-64-v3 that a processor with AVX2 may lack, or that a virtual machine may hide. */
@@ -38,35 +62,40 @@ static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
 /* Take a level, or the best below it that the processor has; return the one taken. */
 int choose_level(int highest)
 {
-  chosen = taylor_solve_plain;
-  chosen_quick = quick_solve_plain;
   level = 0;
 #ifdef WITH_LEVELS
   __builtin_cpu_init();
-  if (highest >= 2 && HAS_AVX512) {
-    chosen = taylor_solve_avx512;
-    chosen_quick = quick_solve_avx512;
-    level = 2;
-  } else if (highest >= 1 && HAS_AVX2) {
-    chosen = taylor_solve_avx2;
-    chosen_quick = quick_solve_avx2;
-    level = 1;
-  }
+  if (highest >= 2 && HAS_AVX512) level = 2;
+  else if (highest >= 1 && HAS_AVX2) level = 1;
 #endif
+  chosen = known[level];
   return level;
 }
 
-#ifdef WITH_LEVELS
 __attribute__((constructor)) static void choose_best(void) { choose_level(2); }
-#endif
 
 void taylor_solve(ARGUMENTS)
 {
-  chosen(problem, omega, tolerance, effort, n_times, times, rows, n_attitudes, attitudes, n_rows, status, steps,
-         needed, found);
+  chosen.taylor(problem, omega, tolerance, effort, n_times, times, rows, n_attitudes, attitudes,
+                n_rows, status, steps, needed, found);
 }
 
 void quick_solve(QUICK_ARGUMENTS)
 {
-  chosen_quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps, error);
+  chosen.quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps, error);
+}
+
+void many_free(const void *bodies, double *omega, int8_t *status)
+{
+  chosen.free(bodies, omega, status);
+}
+
+void many_taylor(const void *bodies, double *omega, int8_t *status, int *interrupted)
+{
+  chosen.series(bodies, omega, status, interrupted);
+}
+
+void many_fixed(const void *bodies, int method, double *omega, int8_t *status, int *interrupted)
+{
+  chosen.fixed(bodies, method, omega, status, interrupted);
 }

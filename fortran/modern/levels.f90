@@ -1,11 +1,12 @@
 module levels
   !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a problem_t
   !! on as it is, and knows no more of it than its address.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
+  use bodies, only: i1
   implicit none(type, external)
   private
 
-  public :: choose_level, quick_solve, taylor_solve
+  public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -45,6 +46,36 @@ module levels
       integer(c_int), intent(out) :: status, steps
       real(c_double), intent(out) :: error
     end subroutine quick_solve
+
+    subroutine many_free(bodies, omega, status) bind(c, name="many_free")
+      !! As in many_free.f90.
+      import :: c_double, c_ptr, i1
+      implicit none(type, external)
+      type(c_ptr), intent(in), value :: bodies
+      real(c_double), intent(inout) :: omega(3, *)
+      integer(i1), intent(inout) :: status(*)
+    end subroutine many_free
+
+    subroutine many_taylor(bodies, omega, status, interrupted) bind(c, name="many_taylor")
+      !! As in many_taylor.f90.
+      import :: c_double, c_int, c_ptr, i1
+      implicit none(type, external)
+      type(c_ptr), intent(in), value :: bodies
+      real(c_double), intent(inout) :: omega(3, *)
+      integer(i1), intent(inout) :: status(*)
+      integer(c_int), intent(out) :: interrupted
+    end subroutine many_taylor
+
+    subroutine many_fixed(bodies, method, omega, status, interrupted) bind(c, name="many_fixed")
+      !! As in many_fixed.f90.
+      import :: c_double, c_int, c_ptr, i1
+      implicit none(type, external)
+      type(c_ptr), intent(in), value :: bodies
+      integer(c_int), intent(in), value :: method
+      real(c_double), intent(inout) :: omega(3, *)
+      integer(i1), intent(inout) :: status(*)
+      integer(c_int), intent(out) :: interrupted
+    end subroutine many_fixed
   end interface
 
 end module levels

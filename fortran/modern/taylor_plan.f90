@@ -11,7 +11,7 @@ module taylor_plan
   real(dp), parameter, public :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
   real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
 
-  public :: plan
+  public :: add_wave_rates, plan, share_and_step, steady_rates
 
 contains
 
@@ -27,40 +27,66 @@ contains
     real(dp), intent(out) :: h              !! s
     real(dp) :: coupling
     real(dp) :: push                        ! largest torque over moment, 1/s2
+    real(dp) :: ramp                        ! its largest rate, 1/s3
     real(dp) :: gain                        ! speed that torques may add, rad/s
     real(dp) :: rate                        ! 1/s
     real(dp) :: turned                      ! by the waves, rad
-    real(dp) :: way                         ! about the body's, rad
     integer :: n
 
     turned = 0.0_dp
     coupling = max(abs(problem%coefficients(1)), abs(problem%coefficients(2)), &
                    abs(problem%coefficients(3)))
     push = max(abs(problem%constant(1)), abs(problem%constant(2)), abs(problem%constant(3)))
-    gain = 0.5_dp*push*abs(time)
-    rate = coupling*scale + sqrt(coupling)*sqrt(push)
-    push = max(abs(problem%rate(1)), abs(problem%rate(2)), abs(problem%rate(3)))
-    if (push > 0.0_dp) then
-      gain = gain + push*time*time/6.0_dp
-      rate = rate + sqrt(coupling)*sqrt(push*abs(time))
-    end if
+    ramp = max(abs(problem%rate(1)), abs(problem%rate(2)), abs(problem%rate(3)))
+    call steady_rates(coupling, scale, push, ramp, time, gain, rate)
     do n = 1, problem%n_sines
       call add_wave_rates(problem%sines(:, n), .true., coupling, time, gain, rate, turned)
     end do
     do n = 1, problem%n_cosines
       call add_wave_rates(problem%cosines(:, n), .false., coupling, time, gain, rate, turned)
     end do
+    if (with_attitude) then
+      call share_and_step(max(coupling, 1.0_dp), scale, gain, rate, turned, tolerance, time, &
+                          share, h)
+    else
+      call share_and_step(coupling, scale, gain, rate, turned, tolerance, time, share, h)
+    end if
+    order = order_for(share)
+  end subroutine plan
+
+  elemental subroutine steady_rates(coupling, scale, push, ramp, time, gain, rate)
+    !! What a body turns with, and the part of the torque that is no wave.
+    real(dp), intent(in) :: coupling        !! largest of |A|, |B|, |C|
+    real(dp), intent(in) :: scale           !! largest |omega|, rad/s
+    real(dp), intent(in) :: push            !! 1/s2
+    real(dp), intent(in) :: ramp            !! 1/s3
+    real(dp), intent(in) :: time            !! to go, s
+    real(dp), intent(out) :: gain           !! rad/s
+    real(dp), intent(out) :: rate           !! 1/s
+
+    gain = 0.5_dp*push*abs(time)
+    rate = coupling*scale + sqrt(coupling)*sqrt(push)
+    if (ramp > 0.0_dp) then
+      gain = gain + ramp*time*time/6.0_dp
+      rate = rate + sqrt(coupling)*sqrt(ramp*abs(time))
+    end if
+  end subroutine steady_rates
+
+  elemental subroutine share_and_step(coupling, scale, gain, rate, turned, tolerance, time, share, h)
+    !! An error turns into one of phase and grows with it, and the phase of all later ones with that;
+    !! the weights are from random scenes.
+    !! Waves ask for more steps, and those may all err alike.
+    real(dp), intent(in) :: coupling, scale, gain, rate, turned, tolerance, time
+    real(dp), intent(out) :: share          !! part of the scale that the last terms may have
+    real(dp), intent(out) :: h              !! the first step, s
+    real(dp) :: way                         ! about the body's, rad
+
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
-    ! An error turns into one of phase and grows with it, and the phase of all later ones with that;
-    ! the weights are from random scenes.
-    ! Waves ask for more steps, and those may all err alike.
-    if (with_attitude) coupling = max(coupling, 1.0_dp)
     way = coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain)
     share = tolerance/(8.0_dp + way + way*(way/14.0_dp) + ALIKE*turned)
     share = max(share, LEAST_SHARE)
-    order = order_for(share)
-  end subroutine plan
+  end subroutine share_and_step
 
   pure subroutine add_wave_rates(wave, is_sine, coupling, time, gain, rate, turned)
     !! What a wave of torque adds to the speed that may be gained, and to the rate of change.

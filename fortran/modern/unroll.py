@@ -11,6 +11,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from unroll_many import many_steps
+
 MODULES = (
     "two_words",
     "torque_terms",
@@ -24,6 +26,10 @@ MODULES = (
     "taylor_rows",
     "taylor_march",
     "taylor",
+    "many_circular",
+    "many_free",
+    "many_fixed",
+    "many_taylor",
 )
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
@@ -49,11 +55,14 @@ SIGNS = ("-1.0, 1.0, 1.0, -1.0", "-1.0, -1.0, 1.0, 1.0", "-1.0, 1.0, -1.0, 1.0")
 
 
 def main(level: str, target: str, *sources: str) -> None:
-    """Write `target`, Fortran from `sources` or C; names in it end in `level`."""
+    """Write `target`, Fortran from `sources` or C, for an instruction set."""
     if target.endswith(".c"):
         written = "\n".join(c_source(level)) + "\n"
     else:
-        written = "".join(fortran_source(Path(source).read_text(), level) for source in sources)
+        # So that a module may stand in more than one file.
+        file = Path(target).stem
+        texts = (Path(source).read_text() for source in sources)
+        written = "".join(fortran_source(text, level, file) for text in texts)
     Path(target).write_text(written)
 
 
@@ -92,16 +101,17 @@ def recurrence(order: int) -> Iterator[str]:
 # ---- Fortran ------------------------------------------------------------------------------------
 
 
-def fortran_source(text: str, level: str) -> str:
-    """Return a module for one instruction set."""
+def fortran_source(text: str, level: str, file: str) -> str:
+    """Return a module for one instruction set; its name ends in the file's."""
     for module in MODULES:
-        text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{level}", text)
+        text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{file}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
     written: dict[str, Iterator[str]] = {
         "expand": fortran_door("expand", "taylor_terms", level),
         "expand_both": fortran_door("expand_both", "attitude_terms", level),
         "multiply": fortran_multiply(),
         "carry_precisely": fortran_precise(),
+        "many_step": many_steps(),
     }
     if level == "plain":
         written["expand"] = fortran_terms()

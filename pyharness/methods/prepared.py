@@ -39,7 +39,7 @@ else:
     except ImportError:  # not built, as `extension` says when a solver is made
         BoundKernel = object
 
-_CODES = {
+CODES = {
     "closed-form": Methods.CLOSED_FORM,
     "sphere": Methods.SPHERE,
     EITHER: Methods.QUICK_OR_TAYLOR,
@@ -50,7 +50,7 @@ _CODES = {
     "quick": Methods.QUICK,
     **{f"gauss-{stages}": Methods.GAUSS + stages for stages in range(1, 9)},
 }
-PREPARED = ("auto", *(name for name in _CODES if name not in ("sphere", EITHER)))
+PREPARED = ("auto", *(name for name in CODES if name not in ("sphere", EITHER)))
 
 _FEW_WAVES = 16  # that take less time than releasing the GIL does
 
@@ -87,7 +87,7 @@ class Solver(LastCall, BoundKernel):
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
             # Where there is a fallback, it is no part of that.
             brief = packed.copy()
-            brief[Places.METHOD] = _CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
+            brief[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
         solver = super().__new__(cls, kernel, packed, _check, brief)
         solver.plan = chosen
         solver._given = tolerance, asked, effort
@@ -217,8 +217,8 @@ def _no_buffer(out: object) -> str:
 def _code(chosen: Plan) -> int:
     """Return the number by which the kernel knows what was decided."""
     if chosen.closed_form == "sphere":
-        return _CODES["sphere"]
+        return CODES["sphere"]
     if chosen.method == "closed-form":
         # A disturbance too faint to square: then the series, if that is not against the order.
-        return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else _CODES["closed-form"]
-    return _CODES[chosen.method]
+        return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else CODES["closed-form"]
+    return CODES[chosen.method]

@@ -1,0 +1,175 @@
+module ensemble
+  !! Many bodies in one call: side by side where that will do, and each by itself what is left.
+  use, intrinsic :: iso_c_binding, only: c_loc
+  use, intrinsic :: iso_fortran_env, only: int64
+  use bodies, only: bodies_t, coefficients_of, has_torque, i1, LEFT, of_body, single_of
+  use kinds, only: dp
+  use levels, only: many_fixed, many_free, many_taylor
+  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, RK4, TAYLOR
+  use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
+                    N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
+  use prepared, only: solve_prepared, solve_prepared_attitude
+  use problem, only: problem_t
+  use statuses, only: INTERRUPTED
+  use two_words, only: two_product, two_sum
+  implicit none(type, external)
+  private
+
+  public :: solve_bodies
+
+contains
+
+  subroutine solve_bodies(bodies, code, effort_, packed, attitude0, omega, attitude, status, raised)
+    !! Angular velocity of each body at its time, and its attitude where that is given.
+    type(bodies_t), intent(in), target :: bodies
+    integer, intent(in) :: code                !! of the module methods
+    real(dp), intent(in) :: effort_            !! factor on the limits, for each body
+    real(dp), intent(in) :: packed(0:)         !! the scene of all, as in prepared.f90; or none
+    real(dp), intent(in) :: attitude0(:, :)    !! (4, 0, 1 or n)
+    real(dp), intent(inout) :: omega(3, bodies%n) !! rad/s; NaN unless the status is 0 or 6
+    real(dp), intent(inout) :: attitude(:, :)  !! (4, n), or nothing
+    integer(i1), intent(inout) :: status(bodies%n) !! of the module statuses
+    integer, intent(out) :: raised             !! 1: interrupted by the user, all is void
+    logical :: with_torque
+
+    raised = 0
+    if (bodies%n == 0) return
+    with_torque = has_torque(bodies)
+    if (size(attitude0) > 0) then
+      status = LEFT
+    else if (code == CLOSED_FORM .or. (code == CLOSED_FORM_OR_TAYLOR .and. .not. with_torque)) then
+      call many_free(c_loc(bodies), omega, status)
+    else if (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR) then
+      call many_taylor(c_loc(bodies), omega, status, raised)
+    else if (code >= IMPROVED_EULER .and. code <= RK4) then
+      call many_fixed(c_loc(bodies), code, omega, status, raised)
+    else
+      status = LEFT
+    end if
+    if (raised /= 0) return
+    if (.not. any(status == LEFT)) return
+    if (size(attitude0) > 0) then
+      call solve_left_with_attitude(bodies, code, with_torque, effort_, attitude0, omega, &
+                                    attitude, status, raised)
+    else
+      call solve_left(bodies, code, with_torque, effort_, packed, omega, status, raised)
+    end if
+  end subroutine solve_bodies
+
+  subroutine solve_left(bodies, code, with_torque, effort_, packed, omega, status, raised)
+    !! What is left, one by one.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: code
+    logical, intent(in) :: with_torque
+    real(dp), intent(in) :: effort_
+    real(dp), intent(in) :: packed(0:)
+    real(dp), intent(inout) :: omega(3, bodies%n)
+    integer(i1), intent(inout) :: status(bodies%n)
+    integer, intent(out) :: raised
+    real(dp) :: own(0:WAVES + 4*(size(bodies%sines, 2) + size(bodies%cosines, 2)) - 1)
+    real(dp) :: found(2)
+    integer(int64) :: steps
+    integer :: ended, i
+
+    raised = 0
+    do i = 1, bodies%n
+      if (status(i) /= LEFT) cycle
+      if (size(packed) > 0) then
+        call solve_prepared(packed, size(packed), bodies%omega0(:, i), &
+                            bodies%times(of_body(size(bodies%times), i)), omega(:, i), ended, &
+                            steps, found)
+      else
+        call pack(bodies, i, code, with_torque, effort_, own)
+        call solve_prepared(own, size(own), bodies%omega0(:, i), &
+                            bodies%times(of_body(size(bodies%times), i)), omega(:, i), ended, &
+                            steps, found)
+      end if
+      status(i) = int(ended, i1)
+      if (ended == INTERRUPTED) raised = 1
+      if (raised /= 0) return
+    end do
+  end subroutine solve_left
+
+  subroutine solve_left_with_attitude(bodies, code, with_torque, effort_, attitude0, omega, &
+                                      attitude, status, raised)
+    !! The same with attitude.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: code
+    logical, intent(in) :: with_torque
+    real(dp), intent(in) :: effort_
+    real(dp), intent(in) :: attitude0(:, :)
+    real(dp), intent(inout) :: omega(3, bodies%n)
+    real(dp), intent(inout) :: attitude(:, :)
+    integer(i1), intent(inout) :: status(bodies%n)
+    integer, intent(out) :: raised
+    real(dp) :: own(0:WAVES + 4*(size(bodies%sines, 2) + size(bodies%cosines, 2)) - 1)
+    real(dp) :: start(7), state(7), found(2)
+    integer(int64) :: steps
+    integer :: ended, i
+
+    raised = 0
+    do i = 1, bodies%n
+      call pack(bodies, i, code, with_torque, effort_, own)
+      start(:3) = bodies%omega0(:, i)
+      start(4:) = attitude0(:, of_body(size(attitude0, 2), i))
+      call solve_prepared_attitude(own, size(own), start, &
+                                   bodies%times(of_body(size(bodies%times), i)), state, ended, &
+                                   steps, found)
+      omega(:, i) = state(:3)
+      attitude(:, i) = state(4:)
+      status(i) = int(ended, i1)
+      if (ended == INTERRUPTED) raised = 1
+      if (raised /= 0) return
+    end do
+  end subroutine solve_left_with_attitude
+
+  subroutine pack(bodies, i, code, with_torque, effort_, packed)
+    !! Body i for prepared.f90.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i, code
+    logical, intent(in) :: with_torque
+    real(dp), intent(in) :: effort_
+    real(dp), intent(inout) :: packed(0:)
+    type(problem_t) :: problem
+    real(dp) :: own_waves(4, size(bodies%sines, 2) + size(bodies%cosines, 2))
+    real(dp) :: of(3)
+    integer :: k
+
+    call single_of(bodies, i, problem, own_waves)
+    packed(METHOD) = real(code, dp)
+    ! Whoever asked for auto has the closed form only without torque.
+    if (code == CLOSED_FORM_OR_TAYLOR .and. with_torque) packed(METHOD) = real(TAYLOR, dp)
+    packed(TOLERANCE) = bodies%tolerance
+    packed(STEP) = bodies%step
+    packed(N_SINES) = real(problem%n_sines, dp)
+    packed(N_COSINES) = real(problem%n_cosines, dp)
+    packed(COEFFICIENTS:COEFFICIENTS + 2) = problem%coefficients
+    packed(CONSTANT:CONSTANT + 2) = problem%constant
+    packed(RATE:RATE + 2) = problem%rate
+    packed(EFFORT) = effort_
+    packed(COEFFICIENTS_LOW:COEFFICIENTS_LOW + 2) = 0.0_dp
+    packed(MOMENTS:MOMENTS + 2) = 1.0_dp
+    if (bodies%by_moments) then
+      of = bodies%body(:, of_body(size(bodies%body, 2), i))
+      packed(MOMENTS:MOMENTS + 2) = of
+      packed(COEFFICIENTS_LOW) = remainder_of(of(2), of(3), of(1))
+      packed(COEFFICIENTS_LOW + 1) = remainder_of(of(3), of(1), of(2))
+      packed(COEFFICIENTS_LOW + 2) = remainder_of(of(1), of(2), of(3))
+    end if
+    do k = 1, size(own_waves, 2)
+      packed(WAVES + 4*k - 4:WAVES + 4*k - 1) = own_waves(:, k)
+    end do
+  end subroutine pack
+
+  pure real(dp) function remainder_of(x, y, z)
+    !! What rounding takes off (x - y)/z.
+    real(dp), intent(in) :: x, y, z
+    real(dp) :: difference, difference_low, product, product_low
+
+    call two_sum(x, -y, difference, difference_low)
+    call two_product(difference/z, z, product, product_low)
+    remainder_of = ((difference - product) + (difference_low - product_low))/z
+    if (.not. abs(remainder_of) <= huge(x)) remainder_of = 0.0_dp
+  end function remainder_of
+
+end module ensemble

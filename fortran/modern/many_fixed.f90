@@ -1,0 +1,323 @@
+module many_fixed
+  !! Many bodies under constant torque in steps of one size, side by side: the methods of III.2 in
+  !! unknowns so scaled that a right-hand side is one product and one sum. Bodies with a coefficient
+  !! of 0, or with three of one sign, are left to the single kernel.
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
+  use bodies, only: A_GROUP, bodies_t, columns_of, i1, LANES, LEFT
+  use interruption, only: interrupt_raised
+  use kinds, only: dp
+  use many_free, only: coefficients_from
+  use methods, only: IMPROVED_EULER, TAYLOR_3
+  use statuses, only: COMPLETE
+  implicit none(type, external)
+  private
+
+  real(dp), parameter :: EXCESS = 1e-6_dp   ! of a step, rather than one step more
+  real(dp), parameter :: MOST_STEPS = 1e8_dp
+  integer(int64), parameter :: BETWEEN_LOOKS = 100000_int64 ! at the user, steps of a block
+  real(dp), parameter :: FAR = 1e60_dp      ! from 1: products of such scales are numbers
+  real(dp), parameter :: THIRD = 1.0_dp/3.0_dp
+
+  type :: scaled_t
+    real(dp), dimension(LANES) :: x, y, z          !! omega, scaled; x' = y z, y' = -x z, z' = x y
+    real(dp), dimension(LANES) :: mx, my, mz       !! torque of half a step
+    real(dp), dimension(LANES) :: scale1, scale2, scale3
+    real(dp), dimension(LANES) :: second           !! 1, 2 or 3: the body's axis that is y
+  end type scaled_t
+
+contains
+
+  subroutine many_fixed_solve(bodies_at, method, omega, status, interrupted) &
+    bind(c, name="solve_many_fixed_level")
+    !! Angular velocity of each body at the one time of all; status is COMPLETE or LEFT.
+    type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
+    integer(c_int), intent(in), value :: method           !! IMPROVED_EULER, TAYLOR_3 or RK4
+    real(c_double), intent(inout) :: omega(3, *)          !! rad/s
+    integer(i1), intent(inout) :: status(*)
+    integer(c_int), intent(out) :: interrupted            !! 1: by the user
+    type(bodies_t), pointer :: bodies
+    type(scaled_t) :: s
+    real(dp), dimension(LANES, 3) :: a, w, constant, moments
+    real(dp) :: h, n_steps, last
+    integer(int64) :: left_over, piece
+    integer :: first, i, m, there
+
+    call c_f_pointer(bodies_at, bodies)
+    interrupted = 0
+    n_steps = 0.0_dp
+    if (size(bodies%times) == 1) then
+      n_steps = max(1.0_dp, aint(abs(bodies%times(1))/bodies%step + (1.0_dp - EXCESS)))
+    end if
+    if (.not. (n_steps >= 1.0_dp .and. n_steps <= MOST_STEPS) .or. size(bodies%sines, 2) > 0 &
+        .or. size(bodies%cosines, 2) > 0 .or. any(abs(bodies%rate) > 0.0_dp)) then
+      status(:bodies%n) = LEFT
+      return
+    end if
+    h = sign(bodies%step, bodies%times(1))
+    last = bodies%times(1) - h*(n_steps - 1.0_dp)
+    do first = 0, bodies%n - 1, LANES
+      there = min(LANES, bodies%n - first)
+      m = A_GROUP*((there + A_GROUP - 1)/A_GROUP)
+      call columns_of(bodies%body, first, m, a)
+      call columns_of(bodies%constant, first, m, constant)
+      if (bodies%by_moments) then
+        moments(:m, :) = a(:m, :)
+        call coefficients_from(moments, m, a)
+        constant(:m, :) = constant(:m, :)/moments(:m, :)
+      end if
+      call columns_of(bodies%omega0, first, m, w)
+      call scale_to(m, h, a, constant, w, s)
+      left_over = int(n_steps, int64) - 1
+      do while (left_over > 0)
+        piece = min(left_over, BETWEEN_LOOKS)
+        call advance(method, m, piece, s)
+        left_over = left_over - piece
+        if (piece == BETWEEN_LOOKS) interrupted = merge(1, 0, interrupt_raised() /= 0)
+        if (interrupted /= 0) return
+      end do
+      call lengthen(m, last/h, s)
+      call advance(method, m, 1_int64, s)
+      call scale_back(m, last/h, s, w)
+      do i = 1, there
+        omega(:, first + i) = w(i, :)
+        status(first + i) = merge(int(COMPLETE, i1), LEFT, &
+                                  abs(w(i, 1)) + abs(w(i, 2)) + abs(w(i, 3)) <= huge(h))
+      end do
+    end do
+  end subroutine many_fixed_solve
+
+  pure subroutine scale_to(m, h, a, constant, w, s)
+    !! Half a step is the unit of time.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: h                  !! s
+    real(dp), intent(in) :: a(LANES, 3), constant(LANES, 3), w(LANES, 3)
+    type(scaled_t), intent(inout) :: s
+    real(dp) :: odd2, odd3, odd1, place, direction, half
+    real(dp) :: a1, a2, a3, w1, w2, w3, m1, m2, m3, scale1, scale2, scale3
+    integer :: i
+
+    half = 0.5_dp*h
+    do i = 1, m
+      odd2 = max(a(i, 1)*a(i, 2), a(i, 2)*a(i, 3))
+      odd3 = max(a(i, 1)*a(i, 3), a(i, 2)*a(i, 3))
+      odd1 = max(a(i, 1)*a(i, 2), a(i, 1)*a(i, 3))
+      place = 1.0_dp
+      a1 = a(i, 3)
+      a2 = a(i, 1)
+      a3 = a(i, 2)
+      w1 = w(i, 3)
+      w2 = w(i, 1)
+      w3 = w(i, 2)
+      m1 = constant(i, 3)
+      m2 = constant(i, 1)
+      m3 = constant(i, 2)
+      if (odd3 < 0.0_dp) then
+        place = 3.0_dp
+        a1 = a(i, 2)
+        a2 = a(i, 3)
+        a3 = a(i, 1)
+        w1 = w(i, 2)
+        w2 = w(i, 3)
+        w3 = w(i, 1)
+        m1 = constant(i, 2)
+        m2 = constant(i, 3)
+        m3 = constant(i, 1)
+      end if
+      if (odd2 < 0.0_dp) then
+        place = 2.0_dp
+        a1 = a(i, 1)
+        a2 = a(i, 2)
+        a3 = a(i, 3)
+        w1 = w(i, 1)
+        w2 = w(i, 2)
+        w3 = w(i, 3)
+        m1 = constant(i, 1)
+        m2 = constant(i, 2)
+        m3 = constant(i, 3)
+      end if
+      ! All three turned round, products change their sign.
+      direction = sign(half, a1*half)
+      scale1 = direction*(sqrt(abs(a2))*sqrt(abs(a3)))
+      scale2 = direction*(sqrt(abs(a1))*sqrt(abs(a3)))
+      scale3 = direction*(sqrt(abs(a1))*sqrt(abs(a2)))
+      if (.not. min(odd1, odd2, odd3) < 0.0_dp) place = 0.0_dp
+      if (.not. min(abs(scale1), abs(scale2), abs(scale3)) >= 1.0_dp/FAR) place = 0.0_dp
+      if (.not. max(abs(scale1), abs(scale2), abs(scale3)) <= FAR) place = 0.0_dp
+      if (.not. max(abs(w1), abs(w2), abs(w3)) <= FAR) place = 0.0_dp
+      s%second(i) = place
+      s%scale1(i) = scale1
+      s%scale2(i) = scale2
+      s%scale3(i) = scale3
+      s%x(i) = scale1*w1
+      s%y(i) = scale2*w2
+      s%z(i) = scale3*w3
+      s%mx(i) = half*(scale1*m1)
+      s%my(i) = half*(scale2*m2)
+      s%mz(i) = half*(scale3*m3)
+    end do
+  end subroutine scale_to
+
+  pure subroutine lengthen(m, factor, s)
+    !! Another step, `factor` times as long.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: factor
+    type(scaled_t), intent(inout) :: s
+    integer :: i
+
+    do i = 1, m
+      s%x(i) = factor*s%x(i)
+      s%y(i) = factor*s%y(i)
+      s%z(i) = factor*s%z(i)
+      s%mx(i) = (factor*factor)*s%mx(i)
+      s%my(i) = (factor*factor)*s%my(i)
+      s%mz(i) = (factor*factor)*s%mz(i)
+    end do
+  end subroutine lengthen
+
+  pure subroutine scale_back(m, factor, s, w)
+    !! Omega about the body's axes; NaN of a body that is none for here.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: factor  !! of the step
+    type(scaled_t), intent(in) :: s
+    real(dp), intent(inout) :: w(LANES, 3)
+    real(dp) :: first, second, third, x, y, z
+    integer :: i
+
+    do i = 1, m
+      first = s%x(i)/(factor*s%scale1(i))
+      second = s%y(i)/(factor*s%scale2(i))
+      third = s%z(i)/(factor*s%scale3(i))
+      if (.not. s%second(i) > 0.0_dp) second = transfer(huge(0_int64), second)
+      x = second
+      y = third
+      z = first
+      if (s%second(i) > 2.5_dp) then
+        x = third
+        y = first
+        z = second
+      end if
+      if (abs(s%second(i) - 2.0_dp) < 0.5_dp) then
+        x = first
+        y = second
+        z = third
+      end if
+      w(i, 1) = x
+      w(i, 2) = y
+      w(i, 3) = z
+    end do
+  end subroutine scale_back
+
+  pure subroutine advance(method, m, n_steps, s)
+    integer, intent(in) :: method, m
+    integer(int64), intent(in) :: n_steps
+    type(scaled_t), intent(inout) :: s
+
+    select case (method)
+    case (IMPROVED_EULER)
+      call improved_euler_steps(m, n_steps, s)
+    case (TAYLOR_3)
+      call taylor_steps(m, n_steps, s)
+    case default
+      call runge_kutta_steps(m, n_steps, s)
+    end select
+  end subroutine advance
+
+  pure subroutine runge_kutta_steps(m, n_steps, s)
+    !! Eq. 31: as many sums as products, so that neither kind waits for the other.
+    integer, intent(in) :: m
+    integer(int64), intent(in) :: n_steps
+    type(scaled_t), intent(inout) :: s
+    real(dp) :: x, y, z, u, v, w
+    real(dp) :: p1, q1, r1, p2, q2, r2, p3, q3, r3
+    integer(int64) :: n
+    integer :: i
+
+    do n = 1, n_steps
+      do i = 1, m
+        x = s%x(i)
+        y = s%y(i)
+        z = s%z(i)
+        p1 = s%mx(i) + y*z
+        q1 = s%my(i) - x*z
+        r1 = s%mz(i) + x*y
+        u = x + p1
+        v = y + q1
+        w = z + r1
+        p2 = s%mx(i) + v*w
+        q2 = s%my(i) - u*w
+        r2 = s%mz(i) + u*v
+        u = x + p2
+        v = y + q2
+        w = z + r2
+        p3 = s%mx(i) + v*w
+        q3 = s%my(i) - u*w
+        r3 = s%mz(i) + u*v
+        p2 = p2 + p3
+        q2 = q2 + q3
+        r2 = r2 + r3
+        u = x + (p3 + p3)
+        v = y + (q3 + q3)
+        w = z + (r3 + r3)
+        p1 = p1 + (s%mx(i) + v*w)
+        q1 = q1 + (s%my(i) - u*w)
+        r1 = r1 + (s%mz(i) + u*v)
+        s%x(i) = x + THIRD*(p1 + 2.0_dp*p2)
+        s%y(i) = y + THIRD*(q1 + 2.0_dp*q2)
+        s%z(i) = z + THIRD*(r1 + 2.0_dp*r2)
+      end do
+    end do
+  end subroutine runge_kutta_steps
+
+  pure subroutine improved_euler_steps(m, n_steps, s)
+    !! Eq. 29.
+    integer, intent(in) :: m
+    integer(int64), intent(in) :: n_steps
+    type(scaled_t), intent(inout) :: s
+    real(dp) :: x, y, z, u, v, w, p, q, r
+    integer(int64) :: n
+    integer :: i
+
+    do n = 1, n_steps
+      do i = 1, m
+        x = s%x(i)
+        y = s%y(i)
+        z = s%z(i)
+        p = s%mx(i) + y*z
+        q = s%my(i) - x*z
+        r = s%mz(i) + x*y
+        u = x + (p + p)
+        v = y + (q + q)
+        w = z + (r + r)
+        s%x(i) = x + (p + (s%mx(i) + v*w))
+        s%y(i) = y + (q + (s%my(i) - u*w))
+        s%z(i) = z + (r + (s%mz(i) + u*v))
+      end do
+    end do
+  end subroutine improved_euler_steps
+
+  pure subroutine taylor_steps(m, n_steps, s)
+    !! Eq. 30.
+    integer, intent(in) :: m
+    integer(int64), intent(in) :: n_steps
+    type(scaled_t), intent(inout) :: s
+    real(dp) :: x, y, z, p, q, r
+    integer(int64) :: n
+    integer :: i
+
+    do n = 1, n_steps
+      do i = 1, m
+        x = s%x(i)
+        y = s%y(i)
+        z = s%z(i)
+        p = s%mx(i) + y*z
+        q = s%my(i) - x*z
+        r = s%mz(i) + x*y
+        s%x(i) = x + 2.0_dp*(p + (q*z + y*r))
+        s%y(i) = y + 2.0_dp*(q - (p*z + x*r))
+        s%z(i) = z + 2.0_dp*(r + (p*y + x*q))
+      end do
+    end do
+  end subroutine taylor_steps
+
+end module many_fixed

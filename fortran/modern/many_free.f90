@@ -1,0 +1,298 @@
+module many_free
+  !! Many bodies without torque, side by side: the closed form of torque_free.f90 in numbers of one
+  !! word and without a branch. Bodies for which that is not exact enough, or that stand near the
+  !! end of a range, are left to the single kernel.
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
+  use bodies, only: A_GROUP, bodies_t, columns_of, i1, LANES, LEFT
+  use kinds, only: dp
+  use many_circular, only: sine_cosine_lanes
+  use statuses, only: COMPLETE
+  implicit none(type, external)
+  private
+
+  integer, parameter :: LEVELS = 5     ! of the arithmetic-geometric mean
+  real(dp), parameter :: NEARLY_CIRCULAR = 2e-4_dp ! modulus beyond them whose 4th power counts not
+  ! Rounding of the frequency, of each radian, in tolerances of 1; measured: at most a quarter.
+  real(dp), parameter :: ERROR = 8.0_dp*2.0_dp**(-53)
+  real(dp), parameter :: FAR = 1e100_dp ! from 1: products of such moduli are numbers
+  real(dp), parameter :: NEVER = huge(1.0_dp) ! an error with which no body is finished here
+
+  type :: orbits_t
+    !! As orbit_t of torque_free.f90, axes in the same order.
+    real(dp), dimension(LANES) :: omega1, omega2, omega3
+    real(dp), dimension(LANES) :: rate1, rate2, rate3
+    real(dp), dimension(LANES) :: modulus, amplitude2, amplitude3, half_gap
+    real(dp), dimension(LANES) :: gap       !! below 0: axes 1 and 3 are swapped
+    real(dp), dimension(LANES) :: error     !! estimate, in radians and tolerances of 1
+    real(dp), dimension(LANES) :: a, b      !! of the mean
+    real(dp), dimension(LANES) :: half      !! of their difference
+    real(dp), dimension(LANES) :: frequency
+    real(dp), dimension(LANES) :: sine, cosine !! in the ratio of sn and cn
+    real(dp), dimension(LANES) :: numerator, denominator !! of dn
+    real(dp), dimension(LANES) :: square    !! of the sine, of the last level but one
+    real(dp) :: upper(LANES, LEVELS), lower(LANES, LEVELS)
+  end type orbits_t
+
+  public :: coefficients_from
+
+contains
+
+  subroutine many_free_solve(bodies_at, omega, status) bind(c, name="solve_many_free_level")
+    !! Angular velocity of each body at its time; status is COMPLETE or LEFT.
+    type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
+    real(c_double), intent(inout) :: omega(3, *)          !! rad/s
+    integer(i1), intent(inout) :: status(*)
+    type(bodies_t), pointer :: bodies
+    type(orbits_t) :: o
+    real(dp), dimension(LANES, 3) :: a, w, moments
+    real(dp) :: t(LANES)
+    integer :: first, i, m, there
+
+    call c_f_pointer(bodies_at, bodies)
+    if (size(bodies%times) == 1) t = bodies%times(1)
+    do first = 0, bodies%n - 1, LANES
+      there = min(LANES, bodies%n - first)
+      m = A_GROUP*((there + A_GROUP - 1)/A_GROUP)
+      if (first == 0 .or. size(bodies%body, 2) > 1) then
+        if (bodies%by_moments) then
+          call columns_of(bodies%body, first, m, moments)
+          call coefficients_from(moments, m, a)
+        else
+          call columns_of(bodies%body, first, m, a)
+        end if
+      end if
+      call columns_of(bodies%omega0, first, m, w)
+      if (size(bodies%times) > 1) then
+        t(:there) = bodies%times(first + 1:first + there)
+        t(there + 1:m) = t(there)
+      end if
+      call begin(m, a, w, o)
+      call climb(m, o)
+      call turn(m, t, o)
+      call descend(m, o)
+      call finish(m, a, o, w)
+      do i = 1, there
+        omega(1, first + i) = w(i, 1)
+        omega(2, first + i) = w(i, 2)
+        omega(3, first + i) = w(i, 3)
+      end do
+      do i = 1, there
+        status(first + i) = merge(int(COMPLETE, i1), LEFT, o%error(i) <= bodies%tolerance)
+      end do
+    end do
+  end subroutine many_free_solve
+
+  pure subroutine coefficients_from(moments, m, a)
+    !! A, B, C of equations 13-15.
+    real(dp), intent(in) :: moments(LANES, 3)
+    integer, intent(in) :: m
+    real(dp), intent(inout) :: a(LANES, 3)
+    integer :: i
+
+    do i = 1, m
+      a(i, 1) = (moments(i, 2) - moments(i, 3))/moments(i, 1)
+      a(i, 2) = (moments(i, 3) - moments(i, 1))/moments(i, 2)
+      a(i, 3) = (moments(i, 1) - moments(i, 2))/moments(i, 3)
+    end do
+  end subroutine coefficients_from
+
+  pure subroutine begin(m, a, w, o)
+    !! All that does not depend on the time. Axis 2 of an orbit has the coefficient of the odd sign,
+    !! axis 3 keeps its direction.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: a(LANES, 3), w(LANES, 3)
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: odd2, odd3, odd1 ! at most 0 where that axis of the body is axis 2 of the orbit
+    real(dp) :: a1, a2, a3, w1, w2, w3, s1, s2, s3, first, third, y1, y2, y3, left, right, gap
+    integer :: i
+
+    do i = 1, m
+      odd2 = max(a(i, 1)*a(i, 2), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 3))
+      odd3 = max(a(i, 1)*a(i, 3), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 2))
+      odd1 = max(a(i, 1)*a(i, 2), a(i, 1)*a(i, 3), -a(i, 2)*a(i, 3))
+      a1 = a(i, 3)
+      a2 = a(i, 1)
+      a3 = a(i, 2)
+      w1 = w(i, 3)
+      w2 = w(i, 1)
+      w3 = w(i, 2)
+      if (odd3 <= 0.0_dp) then
+        a1 = a(i, 2)
+        a2 = a(i, 3)
+        a3 = a(i, 1)
+        w1 = w(i, 2)
+        w2 = w(i, 3)
+        w3 = w(i, 1)
+      end if
+      if (odd2 <= 0.0_dp) then
+        a1 = a(i, 1)
+        a2 = a(i, 2)
+        a3 = a(i, 3)
+        w1 = w(i, 1)
+        w2 = w(i, 2)
+        w3 = w(i, 3)
+      end if
+      left = abs(a1)*(w3*w3)
+      right = abs(a3)*(w1*w1)
+      gap = left - right
+      o%gap(i) = gap
+      first = a1
+      third = a3
+      y1 = w1
+      y3 = w3
+      if (gap < 0.0_dp) then
+        first = a3
+        third = a1
+        y1 = w3
+        y3 = w1
+      end if
+      o%omega1(i) = y1
+      o%omega2(i) = w2
+      o%omega3(i) = y3
+      o%rate1(i) = first*w2*y3
+      o%rate2(i) = a2*y3*y1
+      o%rate3(i) = third*y1*w2
+      y1 = y1*y1
+      y2 = w2*w2
+      y3 = y3*y3
+      s1 = abs(first)
+      s2 = abs(a2)
+      s3 = abs(third)
+      o%modulus(i) = s1*(s3*y2 + s2*y3)
+      o%amplitude2(i) = s1*s3*y2
+      o%amplitude3(i) = s1*s2*y3
+      o%half_gap(i) = 0.5_dp*(s2*s3*y1 + s1*s3*y2)
+      gap = abs(gap)
+      o%a(i) = sqrt(o%modulus(i))
+      o%b(i) = sqrt(s2*gap)
+      ! What rounding makes of a small gap, it makes of the frequency.
+      o%error(i) = ERROR*(left + right)/gap
+      if (min(odd1, odd2, odd3) > 0.0_dp) o%error(i) = NEVER
+      if (.not. s2 > 0.0_dp) o%error(i) = NEVER
+      if (.not. (o%modulus(i) <= FAR .and. o%modulus(i) >= 1.0_dp/FAR)) o%error(i) = NEVER
+    end do
+  end subroutine begin
+
+  pure subroutine climb(m, o)
+    !! The arithmetic-geometric mean, as many levels for all.
+    integer, intent(in) :: m
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: mean
+    integer :: i, n
+
+    do n = 1, LEVELS
+      do i = 1, m
+        mean = 0.5_dp*(o%a(i) + o%b(i))
+        o%upper(i, n) = mean*o%a(i)
+        o%lower(i, n) = mean*o%b(i)
+        o%half(i) = 0.5_dp*(o%a(i) - o%b(i))
+        if (n < LEVELS) o%b(i) = sqrt(o%a(i)*o%b(i))
+        o%a(i) = mean
+      end do
+    end do
+  end subroutine climb
+
+  pure subroutine turn(m, t, o)
+    !! Sine and cosine of the phase, and what is left of a modulus: sn : cn is tan (1 + k**2/4),
+    !! dn is 1 - k**2/2 sin**2.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: t(LANES) !! s
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: inverse, square, error
+    integer :: i
+
+    do i = 1, m
+      inverse = 1.0_dp/o%a(i)
+      square = (o%half(i)*inverse)*(o%half(i)*inverse)
+      error = o%error(i)
+      if (.not. o%half(i) <= NEARLY_CIRCULAR*o%a(i)) error = NEVER
+      o%numerator(i) = 0.5_dp*square
+      o%denominator(i) = inverse*(1.0_dp + 0.25_dp*square)
+      ! One more level would take that off.
+      o%frequency(i) = (o%a(i) - 0.25_dp*square*o%a(i))*t(i)
+      if (.not. abs(t(i)) > 0.0_dp) error = NEVER ! omega as it is
+      o%error(i) = error + error*abs(o%frequency(i))
+    end do
+    call sine_cosine_lanes(m, o%frequency, o%sine, o%cosine)
+    do i = 1, m
+      o%numerator(i) = 1.0_dp - o%numerator(i)*(o%sine(i)*o%sine(i))
+      o%sine(i) = o%sine(i)*o%denominator(i)
+      o%denominator(i) = 1.0_dp
+    end do
+  end subroutine turn
+
+  pure subroutine descend(m, o)
+    !! Back to the modulus of the orbit. Sine and cosine have a factor in common at each level, so
+    !! that no level divides.
+    integer, intent(in) :: m
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: s2, c2
+    integer :: i, n
+
+    do n = LEVELS, 1, -1
+      do i = 1, m
+        c2 = o%cosine(i)*o%cosine(i)
+        s2 = o%sine(i)*o%sine(i)
+        o%cosine(i) = o%cosine(i)*o%numerator(i)
+        o%sine(i) = o%sine(i)*o%denominator(i)
+        o%numerator(i) = c2 + o%lower(i, n)*s2
+        o%denominator(i) = c2 + o%upper(i, n)*s2
+        o%square(i) = s2
+      end do
+    end do
+  end subroutine descend
+
+  pure subroutine finish(m, a, o, w)
+    !! The addition theorems, as in torque_free.f90, and the axes of the body.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: a(LANES, 3)
+    type(orbits_t), intent(in) :: o
+    real(dp), intent(inout) :: w(LANES, 3)
+    real(dp) :: s2, c2, both, inverse, dn, fallen, turn
+    real(dp) :: u1, u2, u3, near, odd2, odd3, first, third, x, y, z
+    integer :: i
+
+    do i = 1, m
+      c2 = o%cosine(i)*o%cosine(i)
+      s2 = o%sine(i)*o%sine(i)
+      ! One division for dn and for the common factor.
+      both = c2 + s2*o%amplitude3(i)
+      inverse = 1.0_dp/(both*o%denominator(i))
+      dn = o%numerator(i)*(both*inverse)
+      fallen = o%half_gap(i)*o%square(i)*(both*inverse)
+      inverse = o%denominator(i)*inverse
+      turn = sqrt(c2 + s2*o%modulus(i))*inverse
+      u1 = (o%cosine(i)*o%omega1(i) + (o%sine(i)*dn)*o%rate1(i))*turn
+      u2 = (o%cosine(i)*dn*o%omega2(i) + o%sine(i)*o%rate2(i))*turn
+      u3 = (s2*dn*o%amplitude2(i)*o%omega3(i) + o%sine(i)*o%cosine(i)*o%rate3(i))*inverse
+      near = o%omega3(i) + (u3 - fallen*o%omega3(i))
+      u3 = merge(near, dn*o%omega3(i) + u3, fallen < 0.5_dp)
+      first = u1
+      third = u3
+      if (o%gap(i) < 0.0_dp) then
+        first = u3
+        third = u1
+      end if
+      odd2 = max(a(i, 1)*a(i, 2), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 3))
+      odd3 = max(a(i, 1)*a(i, 3), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 2))
+      x = u2
+      y = third
+      z = first
+      if (odd3 <= 0.0_dp) then
+        x = third
+        y = first
+        z = u2
+      end if
+      if (odd2 <= 0.0_dp) then
+        x = first
+        y = u2
+        z = third
+      end if
+      w(i, 1) = x
+      w(i, 2) = y
+      w(i, 3) = z
+    end do
+  end subroutine finish
+
+end module many_free

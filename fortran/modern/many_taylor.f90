@@ -1,0 +1,464 @@
+module many_taylor
+  !! Many bodies under torque, side by side: Taylor series with a step of its own for each. A body
+  !! that has come to its end makes room for the next one. What a step leaves out is measured,
+  !! carried to the end and taken off there; where it, or what the motion makes of it, is too much
+  !! to be sure of, the body is left to the single kernel.
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
+  use bodies, only: bodies_t, columns_of, i1, LANES, LEFT, of_body
+  use interruption, only: interrupt_raised
+  use kinds, only: dp
+  use many_circular, only: sine_cosine_lanes
+  use many_free, only: coefficients_from
+  use statuses, only: COMPLETE
+  use taylor_plan, only: add_wave_rates, share_and_step, steady_rates
+  implicit none(type, external)
+  private
+
+  integer, parameter :: SLOTS = 16           ! bodies on their way
+  integer, parameter :: MOST_ORDER = 24
+  integer, parameter :: MOST_WAVES = 16      ! else the single kernel, for which no torque is many
+  integer, parameter :: BETWEEN_LOOKS = 100000 ! at the user, steps of all slots
+  ! A step may leave out so much more than that of a single march, whose order it does not choose:
+  ! what it leaves out is known and taken off.
+  real(dp), parameter :: MORE = 10.0_dp
+  real(dp), parameter :: TRUSTED = 0.3_dp    ! error that is taken off, in tolerances
+  real(dp), parameter :: MOST_GROWTH = 200.0_dp
+  real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  real(dp), parameter :: SURE = 0.03_dp      ! rounding times growth, in tolerances
+  real(dp), parameter :: A_STEP = 2.0_dp     ! radians about the body in a step
+  real(dp), parameter :: SHORTEST = 1e-7_dp  ! step over the time
+  real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! of each radian of a wave
+  real(dp), parameter :: FAR = 1e60_dp       ! from 1: products of such rates are numbers
+  ! None that a symmetry keeps from growing; of length 1 as growth takes it.
+  real(dp), parameter :: DIFFERENCE(3) = [0.48_dp, -0.31_dp, 0.21_dp]
+  real(dp), parameter :: RIDGE = 1.001_dp
+  real(dp), parameter :: LEAST = 1e-290_dp
+  real(dp), parameter :: MOST_BITS = 2.0_dp**57
+
+  type :: slots_t
+    real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding, rad/s
+    real(dp), dimension(SLOTS, 3) :: a        !! A, B, C
+    real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment
+    real(dp), dimension(SLOTS, 3) :: error    !! left out and carried so far, rad/s
+    real(dp), dimension(SLOTS, 3) :: small    !! a difference
+    real(dp), dimension(SLOTS) :: growth      !! its largest size
+    real(dp), dimension(SLOTS) :: t, rest     !! s
+    real(dp), dimension(SLOTS) :: h           !! the step before, s
+    real(dp), dimension(SLOTS) :: scale       !! largest omega so far, rad/s
+    real(dp), dimension(SLOTS) :: share       !! that the last terms may have of it
+    real(dp), dimension(SLOTS) :: farthest    !! A_STEP over the coupling
+    real(dp), dimension(SLOTS) :: going       !! above 0 where a body has a way to go
+    real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! what waves add to the terms, rad/s
+  end type slots_t
+
+  type :: ready_t
+    !! Bodies before their first step.
+    real(dp), dimension(LANES, 3) :: w, a, constant, rate
+    real(dp), dimension(LANES) :: rest, h, scale, share, farthest
+    real(dp), dimension(LANES) :: fits
+    integer :: there, taken
+  end type ready_t
+
+contains
+
+  subroutine many_taylor_solve(bodies_at, omega, status, interrupted) bind(c, name="solve_many_taylor_level")
+    !! Angular velocity of each body at its time; status is COMPLETE or LEFT.
+    type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
+    real(c_double), intent(inout) :: omega(3, *)          !! rad/s
+    integer(i1), intent(inout) :: status(*)
+    integer(c_int), intent(out) :: interrupted            !! 1: by the user
+    type(bodies_t), pointer :: bodies
+    type(slots_t) :: s
+    real(dp) :: waves(4, MOST_WAVES, SLOTS)
+    integer :: body(SLOTS)   ! in each slot; 0: none
+    type(ready_t) :: ready
+    real(dp) :: ready_waves(4, MOST_WAVES, LANES)
+    integer :: n_sines, n_waves, order, first, active, i, j, unseen
+
+    call c_f_pointer(bodies_at, bodies)
+    interrupted = 0
+    n_sines = size(bodies%sines, 2)
+    n_waves = n_sines + size(bodies%cosines, 2)
+    if (n_waves > MOST_WAVES) then
+      status(:bodies%n) = LEFT
+      return
+    end if
+    order = order_for(bodies%tolerance)
+    call fill(s)
+    body = 0
+    first = 0
+    call make_ready(bodies, first, ready_waves, ready)
+    active = 0
+    unseen = 0
+    do
+      if (.not. minval(s%going) > 0.0_dp) then
+        do i = 1, SLOTS
+          if (s%going(i) > 0.0_dp) cycle
+          if (body(i) > 0) then
+            call take_out(bodies%tolerance, s, i, omega(:, body(i)), status(body(i)))
+            active = active - 1
+          end if
+          body(i) = 0
+          do
+            if (ready%taken == ready%there) then
+              if (first + ready%there >= bodies%n) exit
+              first = first + LANES
+              call make_ready(bodies, first, ready_waves, ready)
+            end if
+            j = ready%taken + 1
+            ready%taken = j
+            status(first + j) = LEFT
+            if (ready%fits(j) < 0.0_dp) cycle
+            call put_in(ready, j, s, i)
+            if (n_waves > 0) waves(:, :n_waves, i) = ready_waves(:, :n_waves, j)
+            body(i) = first + j
+            active = active + 1
+            exit
+          end do
+        end do
+      end if
+      if (active == 0) exit
+      if (n_waves > 0) call wave_terms(order, n_sines, n_waves, waves, s)
+      call step(order, n_waves > 0, SLOTS, s)
+      unseen = unseen + 1
+      if (unseen >= BETWEEN_LOOKS) then
+        unseen = 0
+        interrupted = merge(1, 0, interrupt_raised() /= 0)
+        if (interrupted /= 0) return
+      end if
+    end do
+  end subroutine many_taylor_solve
+
+  pure integer function order_for(tolerance)
+    !! One of unroll_many.py: the same for all, so that a body's result does not depend on others.
+    real(dp), intent(in) :: tolerance
+
+    if (tolerance >= 1e-4_dp) then
+      order_for = 8
+    else if (tolerance >= 3e-8_dp) then
+      order_for = 12
+    else if (tolerance >= 3e-13_dp) then
+      order_for = 18
+    else
+      order_for = 24
+    end if
+  end function order_for
+
+  pure subroutine fill(s)
+    !! A body at rest in each slot.
+    type(slots_t), intent(inout) :: s
+
+    s%w = 0.0_dp
+    s%low = 0.0_dp
+    s%a = 0.0_dp
+    s%constant = 0.0_dp
+    s%rate = 0.0_dp
+    s%error = 0.0_dp
+    s%small = 0.0_dp
+    s%growth = 0.0_dp
+    s%t = 0.0_dp
+    s%rest = 0.0_dp
+    s%h = 1.0_dp
+    s%scale = 1.0_dp
+    s%share = 1.0_dp
+    s%farthest = 1.0_dp
+    s%going = 0.0_dp
+  end subroutine fill
+
+  subroutine make_ready(bodies, first, waves, r)
+    !! The next bodies, as many as there are lanes; r%fits is below 0 of one that is none for here.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: first
+    real(dp), intent(inout) :: waves(4, MOST_WAVES, LANES)
+    type(ready_t), intent(inout) :: r
+    real(dp), dimension(LANES, 3) :: moments
+    real(dp), dimension(LANES) :: coupling, gain, rate, turned, fastest
+    real(dp) :: push, ramp, tolerance
+    integer :: i, n, n_sines, n_waves
+
+    r%there = min(LANES, bodies%n - first)
+    r%taken = 0
+    tolerance = bodies%tolerance
+    call columns_of(bodies%omega0, first, LANES, r%w)
+    call columns_of(bodies%constant, first, LANES, r%constant)
+    call columns_of(bodies%rate, first, LANES, r%rate)
+    call columns_of(bodies%body, first, LANES, r%a)
+    moments = 1.0_dp
+    if (bodies%by_moments) then
+      moments = r%a
+      call coefficients_from(moments, LANES, r%a)
+      r%constant = r%constant/moments
+      r%rate = r%rate/moments
+    end if
+    if (size(bodies%times) == 1) then
+      r%rest = bodies%times(1)
+    else
+      r%rest(:r%there) = bodies%times(first + 1:first + r%there)
+      r%rest(r%there + 1:) = r%rest(r%there)
+    end if
+    do i = 1, LANES
+      coupling(i) = max(abs(r%a(i, 1)), abs(r%a(i, 2)), abs(r%a(i, 3)))
+      push = max(abs(r%constant(i, 1)), abs(r%constant(i, 2)), abs(r%constant(i, 3)))
+      ramp = max(abs(r%rate(i, 1)), abs(r%rate(i, 2)), abs(r%rate(i, 3)))
+      r%scale(i) = max(abs(r%w(i, 1)), abs(r%w(i, 2)), abs(r%w(i, 3)))
+      call steady_rates(coupling(i), r%scale(i), push, ramp, r%rest(i), gain(i), rate(i))
+      ! Of numbers that are none, or not far from the end of the range, a product may be.
+      r%fits(i) = 1.0_dp
+      if (.not. (r%scale(i) <= FAR .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
+      if (.not. (abs(r%rest(i)) <= FAR .and. abs(r%rest(i)) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
+      if (.not. (coupling(i) <= FAR .and. push <= FAR .and. ramp <= FAR)) r%fits(i) = -1.0_dp
+      if (.not. min(moments(i, 1), moments(i, 2), moments(i, 3)) > 0.0_dp) r%fits(i) = -1.0_dp
+    end do
+    turned = 0.0_dp
+    n_sines = size(bodies%sines, 2)
+    n_waves = n_sines + size(bodies%cosines, 2)
+    if (n_waves > 0) then
+      fastest = 0.0_dp
+      do n = 1, n_waves
+        do i = 1, r%there
+          if (n <= n_sines) then
+            waves(:, n, i) = bodies%sines(:, n, of_body(size(bodies%sines, 3), first + i))
+          else
+            waves(:, n, i) = bodies%cosines(:, n - n_sines, &
+                                            of_body(size(bodies%cosines, 3), first + i))
+          end if
+          waves(:3, n, i) = waves(:3, n, i)/moments(i, :)
+          call add_wave_rates(waves(:, n, i), n <= n_sines, coupling(i), r%rest(i), gain(i), &
+                              rate(i), turned(i))
+          fastest(i) = max(fastest(i), abs(waves(4, n, i)))
+          if (.not. all(abs(waves(:, n, i)) <= FAR)) r%fits(i) = -1.0_dp
+        end do
+      end do
+      do i = 1, r%there
+        if (.not. fastest(i)*abs(r%rest(i))*WAVES_ERR <= SURE*tolerance) r%fits(i) = -1.0_dp
+      end do
+    end if
+    do i = 1, LANES
+      call share_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
+                          r%rest(i), r%share(i), r%h(i))
+      r%share(i) = MORE*r%share(i)
+      push = sqrt(abs(r%a(i, 1)))
+      ramp = sqrt(abs(r%a(i, 2)))
+      rate(i) = sqrt(abs(r%a(i, 3)))
+      r%farthest(i) = A_STEP/max(push*ramp, ramp*rate(i), rate(i)*push, LEAST)
+      if (.not. abs(r%h(i)) > SHORTEST*abs(r%rest(i))) r%fits(i) = -1.0_dp
+    end do
+  end subroutine make_ready
+
+  pure subroutine put_in(r, j, s, i)
+    !! Body j of those that are ready into slot i.
+    type(ready_t), intent(in) :: r
+    integer, intent(in) :: j, i
+    type(slots_t), intent(inout) :: s
+    integer :: axis
+
+    do axis = 1, 3
+      s%w(i, axis) = r%w(j, axis)
+      s%low(i, axis) = 0.0_dp
+      s%a(i, axis) = r%a(j, axis)
+      s%constant(i, axis) = r%constant(j, axis)
+      s%rate(i, axis) = r%rate(j, axis)
+      s%error(i, axis) = 0.0_dp
+      s%small(i, axis) = DIFFERENCE(axis)
+    end do
+    s%growth(i) = 1.0_dp
+    s%t(i) = 0.0_dp
+    s%rest(i) = r%rest(j)
+    s%h(i) = r%h(j)
+    s%scale(i) = r%scale(j)
+    s%share(i) = r%share(j)
+    s%farthest(i) = r%farthest(j)
+    s%going(i) = 1.0_dp
+  end subroutine put_in
+
+  pure real(dp) function going(rest, h, t, growth)
+    !! Above 0 where a body has a way to go, and is none that is left to the single kernel.
+    real(dp), intent(in) :: rest, h, t !! s
+    real(dp), intent(in) :: growth
+
+    going = abs(rest)
+    if (.not. growth <= MOST_GROWTH) going = 0.0_dp
+    if (.not. abs(h) > SHORTEST*abs(t + rest)) going = 0.0_dp
+  end function going
+
+  pure subroutine take_out(tolerance, s, i, omega, status)
+    !! What has come of a slot's body.
+    real(dp), intent(in) :: tolerance
+    type(slots_t), intent(in) :: s
+    integer, intent(in) :: i
+    real(dp), intent(inout) :: omega(3)
+    integer(i1), intent(out) :: status
+    real(dp) :: error, scale
+
+    omega = s%w(i, :) + (s%low(i, :) - s%error(i, :))
+    error = max(abs(s%error(i, 1)), abs(s%error(i, 2)), abs(s%error(i, 3)))
+    scale = max(s%scale(i), abs(omega(1)), abs(omega(2)), abs(omega(3)))
+    status = LEFT
+    if (.not. abs(s%rest(i)) > 0.0_dp .and. scale <= FAR .and. error <= TRUSTED*tolerance*scale &
+        .and. s%growth(i) <= min(MOST_GROWTH, SURE*tolerance/ROUNDING)) then
+      status = COMPLETE
+    end if
+  end subroutine take_out
+
+  subroutine wave_terms(order, n_sines, n_waves, waves, s)
+    !! What waves of torque add to the terms of a step as long as the one before.
+    integer, intent(in) :: order, n_sines, n_waves
+    real(dp), intent(in) :: waves(4, MOST_WAVES, SLOTS)
+    type(slots_t), intent(inout) :: s
+    real(dp), dimension(LANES) :: angle, sine, cosine
+    real(dp), dimension(SLOTS) :: turn, power, even, odd
+    integer :: axis, i, k, n
+
+    s%torque(:, :, :order) = 0.0_dp
+    do n = 1, n_waves
+      do i = 1, SLOTS
+        angle(i) = waves(4, n, i)*s%t(i)
+        turn(i) = waves(4, n, i)*s%h(i)
+        power(i) = s%h(i)
+      end do
+      call sine_cosine_lanes(SLOTS, angle, sine, cosine)
+      ! The derivatives of a wave run value, slope, -value, -slope.
+      if (n <= n_sines) then
+        even = sine(:SLOTS)
+        odd = cosine(:SLOTS)
+      else
+        even = cosine(:SLOTS)
+        odd = -sine(:SLOTS)
+      end if
+      do k = 1, order
+        do axis = 1, 3
+          do i = 1, SLOTS
+            s%torque(i, axis, k) = s%torque(i, axis, k) + waves(axis, n, i)*(power(i)*even(i))
+          end do
+        end do
+        do i = 1, SLOTS
+          power(i) = power(i)*turn(i)*(1.0_dp/real(k + 1, dp))
+          angle(i) = -even(i)
+          even(i) = odd(i)
+          odd(i) = angle(i)
+        end do
+      end do
+    end do
+  end subroutine wave_terms
+
+  pure real(dp) function ratio(order, allowed, last)
+    !! Of the step with which the last terms would be as large as allowed: the bits of a positive
+    !! number, read as an integer, are its logarithm to 6 %.
+    integer, intent(in) :: order
+    real(dp), intent(in) :: allowed, last
+    integer(int64) :: bits
+    real(dp) :: power
+
+    bits = transfer(allowed, bits) - transfer(max(last, LEAST), bits)
+    power = real(bits, dp)*(1.0_dp/real(order, dp))
+    bits = transfer(1.0_dp, bits) + int(max(-MOST_BITS, min(MOST_BITS, power)), int64)
+    ratio = transfer(bits, 1.0_dp)
+  end function ratio
+
+  ! unroll: many_step
+  pure subroutine step(order, waves, m, s)
+    !! One step of each slot.
+    integer, intent(in) :: order, m
+    logical, intent(in) :: waves !! else the torque has none
+    type(slots_t), intent(inout) :: s
+    integer :: i
+
+    do i = 1, m
+      call step_of(order, waves, i, s)
+    end do
+  end subroutine step
+
+  pure subroutine step_of(order, waves, i, s)
+    !! The terms with the step before, their ratio to it, the sum, what is left out.
+    integer, intent(in) :: order, i
+    logical, intent(in) :: waves
+    type(slots_t), intent(inout) :: s
+    integer, parameter :: CARRIED = 7, MOMENTS = 8
+    real(dp) :: terms(3, 0:MOST_ORDER), f(3), products(3), change(3), total(3), part(3)
+    real(dp) :: mean(3), moment(3), c(3), o(3, 3), d(3), e(3), left(3), last4(3, 4)
+    real(dp) :: h, r, next, scale, allowed, uu, vv, uv, p, q, determinant
+    integer :: j, k
+
+    h = s%h(i)
+    f = h*s%a(i, :)
+    terms(:, 0) = s%w(i, :)
+    do k = 1, order
+      products = 0.0_dp
+      do j = 0, k - 1
+        products = products + cshift(terms(:, j), 1)*cshift(terms(:, k - 1 - j), 2)
+      end do
+      terms(:, k) = (f/real(k, dp))*products
+      if (k == 1) terms(:, k) = terms(:, k) + h*(s%constant(i, :) + s%rate(i, :)*s%t(i))
+      if (k == 2) terms(:, k) = terms(:, k) + (0.5_dp*h)*(h*s%rate(i, :))
+      if (waves) terms(:, k) = terms(:, k) + s%torque(i, :, k)
+    end do
+    scale = max(s%scale(i), maxval(abs(terms(:, 0))))
+    allowed = s%share(i)*scale
+    r = ratio(order, allowed, sum(abs(terms(:, order))) + sum(abs(terms(:, order - 1))))
+    next = h*r
+    if (abs(next)*scale > s%farthest(i)) next = sign(s%farthest(i)/scale, h)
+    r = next
+    if (abs(s%rest(i)) < 2.0_dp*abs(next)) r = 0.5_dp*s%rest(i)
+    if (abs(s%rest(i)) <= abs(next)) r = s%rest(i)
+    next = r
+    r = next/h
+    do k = 1, order
+      terms(:, k) = terms(:, k)*r**k
+    end do
+    f = f*r
+    change = s%low(i, :)
+    do k = order, 1, -1
+      change = change + terms(:, k)
+    end do
+    total = terms(:, 0) + change
+    part = total - terms(:, 0)
+    s%low(i, :) = (terms(:, 0) - (total - part)) + (change - part)
+    s%w(i, :) = total
+    ! As leave_out of taylor_error.f90.
+    last4 = terms(:, order - 3:order)/max(allowed, LEAST)
+    uu = RIDGE*(sum(last4(:, 3)**2) + sum(last4(:, 2)**2))
+    vv = RIDGE*(sum(last4(:, 2)**2) + sum(last4(:, 1)**2))
+    uv = sum(last4(:, 3)*last4(:, 2)) + sum(last4(:, 2)*last4(:, 1))
+    p = sum(last4(:, 3)*last4(:, 4)) + sum(last4(:, 2)*last4(:, 3))
+    q = sum(last4(:, 2)*last4(:, 4)) + sum(last4(:, 1)*last4(:, 3))
+    determinant = uu*vv - uv*uv
+    r = vv*p - uv*q
+    q = uv*p - uu*q
+    determinant = max((determinant - r) + q, abs(r - q), abs(q), LEAST)
+    left = allowed*(((r - q)/determinant)*last4(:, 4) - (q/determinant)*last4(:, 3))
+    ! As carry of taylor_series.f90.
+    mean = terms(:, 0)
+    moment = 0.0_dp
+    do k = 1, MOMENTS
+      mean = mean + terms(:, k)/real(k + 1, dp)
+      moment = moment + terms(:, k)*(real(k, dp)/real(2*(k + 1)*(k + 2), dp))
+    end do
+    c = cshift(mean, 1)*cshift(moment, 2) - cshift(mean, 2)*cshift(moment, 1)
+    o = 0.0_dp
+    o(1, 2) = f(1)*(mean(3) + f(3)*c(3))
+    o(1, 3) = f(1)*(mean(2) - f(2)*c(2))
+    o(2, 1) = f(2)*(mean(3) - f(3)*c(3))
+    o(2, 3) = f(2)*(mean(1) + f(1)*c(1))
+    o(3, 1) = f(3)*(mean(2) + f(2)*c(2))
+    o(3, 2) = f(3)*(mean(1) - f(1)*c(1))
+    do j = 1, 2
+      d = merge(s%error(i, :), s%small(i, :), j == 1)
+      e = d
+      do k = CARRIED, 1, -1
+        e = [o(1, 2)*e(2) + o(1, 3)*e(3), o(2, 1)*e(1) + o(2, 3)*e(3), &
+             o(3, 1)*e(1) + o(3, 2)*e(2)]/real(k, dp) + d
+      end do
+      if (j == 1) s%error(i, :) = e - left
+      if (j == 2) s%small(i, :) = e
+    end do
+    s%growth(i) = max(s%growth(i), sum(abs(s%small(i, :))))
+    s%t(i) = s%t(i) + next
+    s%rest(i) = s%rest(i) - next
+    s%h(i) = next
+    s%scale(i) = scale
+    s%going(i) = going(s%rest(i), next, s%t(i), s%growth(i))
+  end subroutine step_of
+  ! end unroll
+
+end module many_taylor

@@ -1,0 +1,168 @@
+"""Write out the step of many series side by side: one loop over the lanes for each order."""
+
+import itertools
+from collections.abc import Iterator
+
+ORDERS = (8, 12, 18, 24)
+CARRIED = 7  # order of the exponential that carries differences
+MOMENTS = 8  # terms that count in the mean of omega over a step
+FACTORS = (("x", "y", "z", "fa"), ("y", "x", "z", "fb"), ("z", "x", "y", "fc"))
+BEGINNING = """h = s%h(i)
+fa = h*s%a(i, 1)
+fb = h*s%a(i, 2)
+fc = h*s%a(i, 3)
+x0 = s%w(i, 1)
+y0 = s%w(i, 2)
+z0 = s%w(i, 3)"""
+LENGTH = """scale = max(s%scale(i), abs(x0), abs(y0), abs(z0))
+allowed = s%share(i)*scale
+r = ratio({order}, allowed, last)
+rest = s%rest(i)
+next = h*r
+if (abs(next)*scale > s%farthest(i)) next = sign(s%farthest(i)/scale, h)
+r = next
+if (abs(rest) < 2.0_dp*abs(next)) r = 0.5_dp*rest
+if (abs(rest) <= abs(next)) r = rest
+next = r
+r = next/h"""
+# Of the terms left out, as leave_out of taylor_error.f90 has them.
+POLES = """uu = RIDGE*((ux*ux + uy*uy + uz*uz) + (vx*vx + vy*vy + vz*vz))
+vv = RIDGE*((vx*vx + vy*vy + vz*vz) + (wx*wx + wy*wy + wz*wz))
+uv = (ux*vx + uy*vy + uz*vz) + (vx*wx + vy*wy + vz*wz)
+p = (ux*lx + uy*ly + uz*lz) + (vx*ux + vy*uy + vz*uz)
+q = (vx*lx + vy*ly + vz*lz) + (wx*ux + wy*uy + wz*uz)
+determinant = uu*vv - uv*uv
+r = vv*p - uv*q
+q = uv*p - uu*q
+determinant = max((determinant - r) + q, abs(r - q), abs(q), LEAST)
+p = (r - q)*(allowed/determinant)
+q = q*(allowed/determinant)"""
+MATRIX = """cx = my*nz - mz*ny
+cy = mz*nx - mx*nz
+cz = mx*ny - my*nx
+oxy = fa*(mz + fc*cz)
+oxz = fa*(my - fb*cy)
+oyx = fb*(mz - fc*cz)
+oyz = fb*(mx + fa*cx)
+ozx = fc*(my + fb*cy)
+ozy = fc*(mx - fa*cx)"""
+END = """rest = rest - next
+s%t(i) = s%t(i) + next
+s%rest(i) = rest
+s%h(i) = next
+s%scale(i) = scale
+next = going(rest, next, s%t(i), s%growth(i))
+s%going(i) = next"""
+
+
+def many_steps() -> Iterator[str]:
+    """Yield a procedure for each order, and the one that chooses."""
+    yield "pure subroutine step(order, waves, m, s)"
+    yield "  integer, intent(in) :: order, m"
+    yield "  logical, intent(in) :: waves"
+    yield "  type(slots_t), intent(inout) :: s"
+    yield "  select case (merge(order, -order, waves))"
+    for order in ORDERS:
+        yield f"  case ({order})"
+        yield f"    call waves_{order}(m, s)"
+        yield f"  case (-{order})"
+        yield f"    call steady_{order}(m, s)"
+    yield "  end select"
+    yield "end subroutine step"
+    for name, order in itertools.product(("waves", "steady"), ORDERS):
+        lines = list(one_step(order, name == "waves"))
+        names = sorted({line.split(" = ")[0] for line in lines if _is_local(line)})
+        yield ""
+        yield f"pure subroutine {name}_{order}(m, s)"
+        yield "  integer, intent(in) :: m"
+        yield "  type(slots_t), intent(inout) :: s"
+        yield from (f"  real(dp) :: {name}" for name in names)
+        yield "  integer :: i"
+        yield "  do i = 1, m"
+        yield from (f"    {line}" for line in lines)
+        yield "  end do"
+        yield f"end subroutine {name}_{order}"
+
+
+def _is_local(line: str) -> bool:
+    return " = " in line and line.split(" = ")[0].isidentifier()
+
+
+def one_step(order: int, waves: bool) -> Iterator[str]:
+    """Yield the statements for one lane."""
+    yield from BEGINNING.splitlines()
+    for k in range(1, order + 1):
+        yield from term(k, waves)
+    last = " + ".join(f"(abs({x}{order}) + abs({x}{order - 1}))" for x in "xyz")
+    yield f"last = {last}"
+    yield from LENGTH.format(order=order).splitlines()
+    for axis, x in enumerate("xyz", 1):
+        yield f"change = {x}{order}*r"
+        yield from (f"change = (change + {x}{k})*r" for k in range(order - 1, 0, -1))
+        yield f"change = change + s%low(i, {axis})"
+        yield f"total = {x}0 + change"
+        yield f"part = total - {x}0"
+        yield f"s%low(i, {axis}) = ({x}0 - (total - part)) + (change - part)"
+        yield f"s%w(i, {axis}) = total"
+    # The last four terms of the step, over what they may come to.
+    yield f"power = {' * '.join(['r'] * (order - 3))}".replace(" * ", "*")
+    yield "power = power/max(allowed, LEAST)"
+    for k, name in zip(range(order - 3, order + 1), "wvul", strict=True):
+        yield from (f"{name}{x} = {x}{k}*power" for x in "xyz")
+        if k < order:
+            yield "power = power*r"
+    for name, weights in (("m", mean_weight), ("n", moment_weight)):
+        for x in "xyz":
+            yield f"{name}{x} = ({x}{MOMENTS}*{weights(MOMENTS)})*r"
+            for k in range(MOMENTS - 1, 0, -1):
+                yield f"{name}{x} = ({name}{x} + {x}{k}*{weights(k)})*r"
+            if name == "m":
+                yield f"m{x} = m{x} + {x}0"
+    yield from (f"{factor} = {factor}*r" for factor in ("fa", "fb", "fc"))
+    yield from POLES.splitlines()
+    yield from MATRIX.splitlines()
+    for name in ("error", "small"):
+        for axis, x in enumerate("xyz", 1):
+            yield f"d{x} = s%{name}(i, {axis})"
+            yield f"e{x} = d{x}"
+        for k in range(CARRIED, 0, -1):
+            yield f"gx = (oxy*ey + oxz*ez)*(1.0_dp/{k}.0_dp) + dx"
+            yield f"gy = (oyx*ex + oyz*ez)*(1.0_dp/{k}.0_dp) + dy"
+            yield f"ez = (ozx*ex + ozy*ey)*(1.0_dp/{k}.0_dp) + dz"
+            yield from ("ex = gx", "ey = gy")
+        for axis, x in enumerate("xyz", 1):
+            # What it leaves out, the step takes away.
+            left = f" - (p*l{x} - q*u{x})" if name == "error" else ""
+            yield f"s%{name}(i, {axis}) = e{x}{left}"
+    yield "s%growth(i) = max(s%growth(i), abs(ex) + abs(ey) + abs(ez))"
+    yield from END.splitlines()
+
+
+def term(k: int, waves: bool) -> Iterator[str]:
+    """Yield term k of the three unknowns: two sums, so that one need not wait for itself."""
+    steady = {
+        1: "h*(s%constant(i, {axis}) + s%rate(i, {axis})*s%t(i))",
+        2: "(0.5_dp*h)*(h*s%rate(i, {axis}))",
+    }.get(k)
+    pairs = sorted(((j, k - 1 - j) for j in range(k)), key=max)
+    for axis, (x, u, v, factor) in enumerate(FACTORS, 1):
+        sums = ("p", "q") if len(pairs) > 4 else ("p",)
+        for n, (i, j) in enumerate(pairs):
+            place = sums[n % len(sums)]
+            more = f" + {place}" if n >= len(sums) else ""
+            yield f"{place} = {u}{i}*{v}{j}{more}"
+        if len(sums) > 1:
+            yield "p = p + q"
+        more = f" + {steady.format(axis=axis)}" if steady else ""
+        more += f" + s%torque(i, {axis}, {k})" if waves else ""
+        yield f"{x}{k} = ({factor}*(1.0_dp/{k}.0_dp))*p{more}"
+
+
+def mean_weight(k: int) -> str:
+    """Return the integral of term k over the step."""
+    return f"(1.0_dp/{k + 1}.0_dp)"
+
+
+def moment_weight(k: int) -> str:
+    """Return the same times the time from the middle."""
+    return f"({k}.0_dp/{2 * (k + 1) * (k + 2)}.0_dp)"

@@ -116,7 +116,6 @@ def _client(workers: int, address: str | None) -> Iterator[Any]:
         with _connected(dask, address) as client:
             yield client
         return
-    settings = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
     with _deaf_to_interrupts():
         cluster = dask.LocalCluster(
             n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50

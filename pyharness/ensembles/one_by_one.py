@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.ensembles.loads import Load
-from pyharness.methods.prepared import PREPARED, prepare
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.codes import Statuses
@@ -47,27 +46,16 @@ def solve_each(load: Load, method: str, tolerance: float, t_end: Array, omega0: 
     """Return the ends by a method, one scene after the other."""
     ends = np.full((len(omega0), 3), np.nan)
     status = np.full(len(omega0), Statuses.REFUSED, dtype=np.int8)
-    tolerance = max(tolerance, METHODS[method].finest) if method in METHODS else tolerance
-    solver = None
     for i, scene in enumerate(_scenes(load, omega0)):
         if scene is None:
             continue
         try:
-            if method in PREPARED:
-                # One body under one torque is prepared once.
-                if solver is None or not _is_one_body(load):
-                    solver = prepare(scene, method, tolerance)
-                ends[i] = solver(omega0[i], float(t_end[i]))
-                status[i] = STATUSES[solver.status]
-            elif t_end[i] == 0.0:
-                ends[i], status[i] = omega0[i], Statuses.COMPLETE
-            else:
-                found = solve(scene, float(t_end[i]), method, tolerance)
-                status[i] = STATUSES[found.ended]
-                if found.has_all_rows:
-                    ends[i] = found.omega[-1]
+            found = solve(scene, float(t_end[i]), method, max(tolerance, METHODS[method].finest))
         except InputError:
-            status[i] = Statuses.REFUSED
+            continue
+        status[i] = STATUSES[found.ended]
+        if found.has_all_rows:
+            ends[i] = found.omega[-1]
     return Ends(ends, status)
 
 
@@ -94,13 +82,6 @@ def run_each(load: Load, omega0: Array, at: list[int]) -> ProgramRows:
         reached = [k for k, step in enumerate(at) if step <= n_rows[i]]
         omega[i, reached] = found.omega[[at[k] - 1 for k in reached]]
     return ProgramRows(omega, n_rows, status, variable)
-
-
-def _is_one_body(load: Load) -> bool:
-    return all(
-        each is None
-        for each in (load.moments, load.coefficients, load.torque_constant, load.torque_rate)
-    )
 
 
 def _scenes(load: Load, omega0: Array) -> Iterator[Scene | None]:

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from pyharness.ensembles.loads import Load
 from pyharness.ensembles.one_by_one import Ends, ProgramRows, run_each, solve_each
+from pyharness.methods.many import solve_many
+from pyharness.methods.prepared import PREPARED
+from pyharness.methods.registry import REGISTRY
 from pyharness.model.trajectory import Array
 
 
@@ -95,8 +98,21 @@ class Solved:
 
 
 def many_ends(load: Load, method: str, tolerance: float, t_end: Array, omega0: Array) -> Ends:
-    """Return the ends of all scenes by a method."""
-    return solve_each(load, method, tolerance, t_end, omega0)
+    """Return the ends of all scenes by a method: in one call where it takes arrays."""
+    if method not in PREPARED:
+        return solve_each(load, method, tolerance, t_end, omega0)
+    found = solve_many(
+        load.scene,
+        t_end,
+        omega0=omega0,
+        moments=load.moments,
+        coefficients=load.coefficients,
+        torque_constant=load.torque_constant,
+        torque_rate=load.torque_rate,
+        method=method,
+        tolerance=max(tolerance, REGISTRY[method].finest),
+    )
+    return Ends(found.omega, found.status)
 
 
 def many_rows(load: Load, omega0: Array, at: list[int]) -> ProgramRows:

@@ -136,9 +136,10 @@ def points(sweep: Sweep, box: tuple[slice, ...]) -> list[Indices]:
 
 def spread(sweep: Sweep, count: int) -> list[Indices]:
     """Return the indices of some `count` scenes from all over the grid, the ends among them."""
-    total = sweep.n_scenes
     # Python's whole numbers: a grid may have more scenes than 64 bits count.
-    flat = sorted({i * (total - 1) // max(1, count - 1) for i in range(min(count, total))})
+    total = sweep.n_scenes
+    count = min(count, total)
+    flat = [i * (total - 1) // max(1, count - 1) for i in range(count)]
     found: list[list[int]] = []
     rest = flat
     for length in reversed(sweep.shape):

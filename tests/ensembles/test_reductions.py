@@ -61,9 +61,7 @@ def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:
     for each in found:
         assert (each["on-the-way"] >= each["error"] * 0.9).all()
     assert found[1]["drift"].max() > 10.0 * found[0]["drift"].max()
-    scene = Scene(
-        "", (np.sin(1.0), np.cos(1.0), 0.0), moments=(1, 2, 3), step_size=0.2, steps=50
-    )
+    scene = Scene("", (np.sin(1.0), np.cos(1.0), 0.0), moments=(1, 2, 3), step_size=0.2, steps=50)
     step = solve(scene, 10.0, "rk4", 1.0).omega[-1]
     truth = solve(scene, 10.0, "reference", 1e-12).omega[-1]
     expected = np.abs(step - truth).max()

@@ -25,12 +25,12 @@ def _beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_report_says_what_was_found_and_the_estimate_came_before(capsys: Capture) -> None:
-    assert main("sweep sweep.toml --out store".split()) == 0
+    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
     captured = capsys.readouterr()
     assert captured.err.startswith("pyharness: 30 scenes in 1 chunks: about ")
     for words in ("growth", "complete", "body.square.1", "30 scenes"):
         assert words in captured.out
-    assert main("sweep sweep.toml --out store".split()) == 0
+    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
     again = capsys.readouterr()
     assert again.err == ""
     assert "all 1 chunks were there" in again.out
@@ -93,7 +93,7 @@ def test_mistake_is_one_line_and_loses_nothing(
     written(tmp_path, text(HUGE), "huge.toml")
     written(tmp_path, text(TILT.replace("tilt", "omega1")), "axis.toml")
     written(tmp_path, text(TILT, top='reductions = ["stop-step"]'), "stop.toml")
-    assert main("sweep other.toml --out made".split()) == 0
+    assert main(["sweep", "other.toml", "--out", "made"]) == 0
     before = files(tmp_path)
     capsys.readouterr()
     assert main(command.split()) == 2
@@ -110,5 +110,5 @@ def test_missing_package_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     more = ["--executor", options] if options else []
-    assert main([*"sweep sweep.toml --out store".split(), *more]) == 2
+    assert main([*["sweep", "sweep.toml", "--out", "store"], *more]) == 2
     assert "pip install 'pyharness[sweep]'" in capsys.readouterr().err

@@ -74,9 +74,9 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
 ) -> None:
     from zarr.storage import _local
 
-    sweep = read_sweep(written(tmp_path, PROGRAM))
+    sweep = read_sweep(written(tmp_path, PROGRAM.replace("chunk = 20", "chunk = 4")))
     run_sweep(sweep, str(tmp_path / "whole"))
-    put, room = _local._put, [40]
+    put, room = _local._put, [70]
 
     def full(path: Path, value: Any, *more: Any, **options: Any) -> Any:
         room[0] -= 1

@@ -43,10 +43,12 @@ class Store:
         import zarr
 
         self.sweep, self.folder = sweep, folder
-        self._group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
-        self._arrays: dict[str, Any] = {
-            asked.name: self._group[asked.name] for asked in sweep.reductions
-        }
+        group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
+        # A chunk may hold nothing but what stands for nothing, and is kept all the same.
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            self._arrays: dict[str, Any] = {
+                asked.name: group[asked.name] for asked in sweep.reductions
+            }
 
     def done(self) -> list[bool]:
         """Return for each chunk whether it is whole."""
@@ -57,12 +59,8 @@ class Store:
 
     def write(self, chunk: int, found: Arrays) -> None:
         """Keep a chunk; OSError where the disk does not take it, and then it is not done."""
-        import zarr
-
-        # An array may hold nothing but what stands for nothing, and is kept all the same.
-        with zarr.config.set({"array.write_empty_chunks": True}):
-            for name, array in self._arrays.items():
-                array[self.sweep.box(chunk)] = found[name]
+        for name, array in self._arrays.items():
+            array[self.sweep.box(chunk)] = found[name]
 
     def read(self, name: str, chunk: int) -> Any:
         """Return a chunk of a reduction."""

@@ -165,3 +165,11 @@ def test_what_is_not_computed_yet_is_no_number(tmp_path: Path) -> None:
         assert np.isnan(store.array("end")[...]).all()
         assert (store.array("status")[...] == -1).all()
         assert not any(store.done())
+
+
+def test_chunk_without_a_number_in_it_is_done_all_the_same(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM))
+    run_sweep(sweep, str(tmp_path / "store"))
+    with opened(sweep, str(tmp_path / "store")) as store:
+        assert np.isnan(store.array("overflow-time")[...]).all()
+        assert all(store.done())

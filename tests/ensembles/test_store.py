@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.ensembles import run as runs
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.store import opened
 from pyharness.ensembles.sweep_file import read_sweep
@@ -153,7 +152,7 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     with pytest.raises(InputError, match=r"1e\+15 scenes .* take up to 25 PB"):
         run_sweep(sweep, str(tmp_path / "store"))
     small = read_sweep(written(tmp_path, text(TILT)))
-    monkeypatch.setattr(runs.os, "sysconf", lambda name: 10)
+    monkeypatch.setattr(os, "sysconf", lambda name: 10)
     with pytest.raises(InputError, match="of memory at once"):
         run_sweep(small, str(tmp_path / "store"))
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]

@@ -145,3 +145,9 @@ def test_scene_may_be_a_file_beside_and_is_part_of_the_fingerprint(tmp_path: Pat
     assert read_sweep(path).fingerprint != before.fingerprint
     case = read_sweep(written(tmp_path, text(TILT, scene="[scene]\ncase = 5")))
     assert case.scene == case_scene(5)
+
+
+def test_sweep_of_the_documents_is_one() -> None:
+    sweep = read_sweep(Path(__file__).parent.parent.parent / "docs/tumbling.toml")
+    assert sweep.n_scenes == 2000
+    assert sweep.n_chunks == 1

@@ -13,6 +13,7 @@ module many_fixed
   implicit none(type, external)
   private
 
+  integer, parameter :: PAIR = 2*A_GROUP
   real(dp), parameter :: EXCESS = 1e-6_dp   ! of a step, rather than one step more
   real(dp), parameter :: MOST_STEPS = 1e8_dp
   integer(int64), parameter :: BETWEEN_LOOKS = 100000_int64 ! at the user, steps of a block
@@ -58,7 +59,7 @@ contains
     last = bodies%times(1) - h*(n_steps - 1.0_dp)
     do first = 0, bodies%n - 1, LANES
       there = min(LANES, bodies%n - first)
-      m = A_GROUP*((there + A_GROUP - 1)/A_GROUP)
+      m = PAIR*((there + PAIR - 1)/PAIR)
       call columns_of(bodies%body, first, m, a)
       call columns_of(bodies%constant, first, m, constant)
       if (bodies%by_moments) then
@@ -223,13 +224,15 @@ contains
     end select
   end subroutine advance
 
+  ! unroll: paired
   pure subroutine runge_kutta_steps(m, n_steps, s)
-    !! Eq. 31: as many sums as products, so that neither kind waits for the other.
+    !! Eq. 31: as many sums as products, so that neither kind waits for the other; two halves of the
+    !! lanes in turn. What a step adds is not read off the stages, in whose roundings, alike from
+    !! step to step, many steps drown.
     integer, intent(in) :: m
     integer(int64), intent(in) :: n_steps
     type(scaled_t), intent(inout) :: s
-    real(dp) :: x, y, z, u, v, w
-    real(dp) :: p1, q1, r1, p2, q2, r2, p3, q3, r3
+    real(dp) :: x, y, z, u, v, w, p1, q1, r1, p2, q2, r2, p3, q3, r3
     integer(int64) :: n
     integer :: i
 
@@ -256,9 +259,9 @@ contains
         p2 = p2 + p3
         q2 = q2 + q3
         r2 = r2 + r3
-        u = x + (p3 + p3)
-        v = y + (q3 + q3)
-        w = z + (r3 + r3)
+        u = (x + p3) + p3
+        v = (y + q3) + q3
+        w = (z + r3) + r3
         p1 = p1 + (s%mx(i) + v*w)
         q1 = q1 + (s%my(i) - u*w)
         r1 = r1 + (s%mz(i) + u*v)
@@ -268,6 +271,7 @@ contains
       end do
     end do
   end subroutine runge_kutta_steps
+  ! end unroll
 
   pure subroutine improved_euler_steps(m, n_steps, s)
     !! Eq. 29.

@@ -1,6 +1,7 @@
 """Write out the step of many series side by side: one loop over the lanes for each order."""
 
 import itertools
+import re
 from collections.abc import Iterator
 
 ORDERS = (8, 12, 18, 24)
@@ -53,6 +54,33 @@ s%h(i) = next
 s%scale(i) = scale
 next = going(rest, next, s%t(i), s%growth(i))
 s%going(i) = next"""
+
+
+def paired(text: str) -> Iterator[str]:
+    """Yield a procedure whose loop over m lanes does two halves in turn, three statements each.
+
+    What one half waits for, the other does meanwhile: the processor looks ahead less far than that.
+    """
+    head, rest = text.split("do i = 1, m\n")
+    body, end = rest.split("end do\n", 1)
+    declared = re.findall(r"^ *real\(dp\) :: (.*)$", head, flags=re.MULTILINE)
+    names = {name for line in declared for name in line.split(", ")}
+    lines = [line.strip() for line in body.splitlines() if line.strip()]
+    for line in head.rstrip().splitlines():
+        yield line
+        if "real(dp) ::" in line:
+            yield re.sub(r"\w+(?=,|$)", r"\g<0>_2", line.replace("(dp)", "(kind=dp)"))
+    yield "do i = 1, m/2"
+    for place in range(0, len(lines), 3):
+        stage = lines[place : place + 3]
+        yield from stage
+        yield from (_of_other_half(line, names) for line in stage)
+    yield from ("end do\n" + end).replace("\n\n", "\n").splitlines()
+
+
+def _of_other_half(line: str, names: set[str]) -> str:
+    line = re.sub(r"(?<!%)\b[a-z]\w*\b", lambda n: n[0] + "_2" * (n[0] in names), line)
+    return line.replace("(i)", "(i + m/2)")
 
 
 def many_steps() -> Iterator[str]:

@@ -15,8 +15,9 @@ from pyharness.ensembles.sweep import Sweep, solve_points, spread
 from pyharness.model.errors import InputError
 
 # Of a sample: scenes from all over the grid, first a few.
-_SAMPLES = (8, 256)
+_SAMPLES = (8, 256, 8192)
 _ENOUGH = 0.2  # s
+_PACE = 3e8  # bytes that are compressed and written in a second
 # Chunks that a process holds at once, with what it takes to compute them.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
@@ -158,7 +159,7 @@ def _filled(
         return Outcome(None, n_before, 0, 0.0)
     size = check_size(sweep, str(store.folder), own.workers, len(missing))
     share = len(missing) / sweep.n_chunks
-    seconds = seconds_per_scene(sweep) * sweep.n_scenes * share / own.workers
+    seconds = seconds_per_scene(sweep) * sweep.n_scenes * share / own.workers + size[0] / _PACE
     estimate = Estimate(sweep.n_scenes, sweep.n_chunks, len(missing), *size, seconds)
     before(estimate)
     begin = time.monotonic()

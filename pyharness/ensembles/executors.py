@@ -46,11 +46,18 @@ def engine(
     if executor == "here":
         yield Engine(1, _here)
     elif executor == "processes":
-        count = workers or len(os.sched_getaffinity(0))
+        count = workers or _processors()
         yield Engine(count, partial(_by_processes, count))
     else:
-        with _client(workers or len(os.sched_getaffinity(0)), address) as client:
+        with _client(workers or _processors(), address) as client:
             yield Engine(max(1, sum(client.nthreads().values())), partial(_by_client, client))
+
+
+def _processors() -> int:
+    # Those that this process may use, where the system tells.
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _here(sweep: Sweep, chunks: list[int]) -> Results:

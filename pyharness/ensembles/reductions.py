@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from pyharness.ensembles.one_by_one import STATUSES
 from pyharness.ensembles.solved import Solved
 from pyharness.ensembles.sweep import Asked
-from pyharness.methods.registry import METHODS
 from pyharness.model.codes import Statuses
-from pyharness.model.errors import InputError, unknown
 from pyharness.model.trajectory import STOP_VARIABLES, Array
-from pyharness.model.values import number, whole
 
 Found = NDArray[Any]
-_MOST_SAMPLES = 10_000
+# The axes of a body, by their moments.
+RANKS = ("least", "middle", "largest")
 # What an integer array holds where no scene has been computed yet.
 _NOT_YET = -1
 
@@ -129,6 +127,18 @@ def _largest_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
     return largest
 
 
+def _axis_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
+    squares = solved.attitudes(given["samples"]) ** 2
+    axis = np.argsort(solved.load.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
+    column = np.broadcast_to(axis, (len(squares),))
+    is_own = np.arange(3) == column[:, None, None]
+    # The squares of the half angle's cosine and sine.
+    along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
+    across = np.where(is_own, 0.0, squares[:, :, 1:]).sum(axis=2)
+    largest: Found = 2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)).max(axis=1)
+    return largest
+
+
 def _flips(solved: Solved, given: Mapping[str, Any]) -> Found:
     middle = np.argsort(solved.load.bodies, axis=1, kind="stable")[:, 1]
     column = np.broadcast_to(middle, (len(solved.omega0),))
@@ -211,6 +221,14 @@ REDUCTIONS = {
         _largest_tilt,
         parameters=_SAMPLES,
     ),
+    "axis-tilt": Reduction(
+        "largest angle in space of a body's axis from where it was",
+        "rad",
+        _axis_tilt,
+        only="method",
+        needs=("moments", "attitude"),
+        parameters={**_SAMPLES, "of": "middle"},
+    ),
     "flips": Reduction(
         "changes of sign of the component about the middle axis",
         "1",
@@ -241,39 +259,3 @@ def reduced(asked: Asked, solved: Solved) -> Found:
     # What left the range of numbers stays what it is.
     with np.errstate(all="ignore"):
         return REDUCTIONS[asked.reduction].compute(solved, given)
-
-
-def asked_of(entry: object, claims: Mapping[str, str]) -> Asked:
-    """Return the reduction that a sweep file asks for: its name, or a table of name and parameters.
-
-    `claims` says where the function of each claim stands.
-    """
-    table = {"name": entry} if isinstance(entry, str) else entry
-    if not isinstance(table, dict) or "name" not in table:
-        raise InputError("reductions: allowed: names, and tables with name and parameters")
-    name = table["name"]
-    if not isinstance(name, str) or name not in REDUCTIONS:
-        raise unknown("reduction", name, REDUCTIONS, "reductions")
-    where, defaults = f"reductions: {name}", REDUCTIONS[name].parameters
-    for key in table:
-        if key not in ("name", "as", *defaults):
-            raise unknown("parameter", key, ("as", *defaults), where)
-    given = {key: table.get(key, default) for key, default in defaults.items()}
-    if "samples" in given and not 1 <= whole(f"{where} samples", given["samples"]) <= _MOST_SAMPLES:
-        raise InputError(f"{where} samples {given['samples']}; allowed: 1 to {_MOST_SAMPLES}")
-    if "offset" in given and not 0.0 < number(f"{where} offset", given["offset"]) <= 1.0:
-        raise InputError(f"{where} offset {given['offset']:g}; allowed: above 0, to 1")
-    if "against" in given:
-        if not isinstance(given["against"], str) or given["against"] not in METHODS:
-            raise unknown("method", given["against"], METHODS, f"{where} against")
-        if not 0.0 < number(f"{where} tolerance", given["tolerance"]) <= 1.0:
-            raise InputError(f"{where} tolerance {given['tolerance']:g}; allowed: above 0, to 1")
-    function, title = "", name
-    if "id" in given:
-        if not isinstance(given["id"], str) or given["id"] not in claims:
-            raise unknown("claim", given["id"], claims or ["none"], f"{where} id")
-        function, title = claims[given["id"]], f"claim-{given['id']}"
-    title = table.get("as", title)
-    if not isinstance(title, str) or not title.replace("-", "").replace("_", "").isalnum():
-        raise InputError(f"{where} as: allowed: a name of letters, digits and '-'")
-    return Asked(title, name, tuple(given.items()), function)

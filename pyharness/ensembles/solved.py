@@ -1,15 +1,17 @@
 """What a reduction may ask of a load: its ends, rows on the way, other starts. Each solved once."""
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.ensembles.loads import Load
 from pyharness.ensembles.one_by_one import Ends, ProgramRows, run_each, solve_each
-from pyharness.methods.many import solve_many
+from pyharness.methods.many import Ensemble, solve_many
 from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import REGISTRY
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.trajectory import Array
 
 
@@ -72,6 +74,12 @@ class Solved:
             self._rows[samples] = found
         return self._rows[samples]
 
+    def attitudes(self, samples: int) -> Array:
+        """Return quaternions at the same times, (n, samples, 4), from (1, 0, 0, 0) at the start."""
+        parts = [(i + 1) / samples for i in range(samples)]
+        ends = [self._turned(self.load.t_end * part) for part in parts]
+        return np.stack(ends, axis=1)
+
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
         """Return omega (n, 3) by another method, after a `part` of the way."""
         return many_ends(self.load, method, tolerance, self.load.t_end * part, self.omega0).omega
@@ -93,6 +101,15 @@ class Solved:
         assert solver.method is not None
         return many_ends(self.load, solver.method, solver.tolerance, t_end, self.omega0)
 
+    def _turned(self, t_end: Array) -> Array:
+        solver = self.load.solver
+        assert solver.method is not None
+        found = _many(
+            self.load, solver.method, solver.tolerance, t_end, self.omega0, attitude0=IDENTITY
+        )
+        assert found.attitude is not None
+        return found.attitude
+
     def _run(self, at: list[int]) -> ProgramRows:
         return many_rows(self.load, self.omega0, at)
 
@@ -101,7 +118,14 @@ def many_ends(load: Load, method: str, tolerance: float, t_end: Array, omega0: A
     """Return the ends of all scenes by a method: in one call where it takes arrays."""
     if method not in PREPARED:
         return solve_each(load, method, tolerance, t_end, omega0)
-    found = solve_many(
+    found = _many(load, method, tolerance, t_end, omega0)
+    return Ends(found.omega, found.status)
+
+
+def _many(
+    load: Load, method: str, tolerance: float, t_end: Array, omega0: Array, **more: Any
+) -> Ensemble:
+    return solve_many(
         load.scene,
         t_end,
         omega0=omega0,
@@ -111,8 +135,8 @@ def many_ends(load: Load, method: str, tolerance: float, t_end: Array, omega0: A
         torque_rate=load.torque_rate,
         method=method,
         tolerance=max(tolerance, REGISTRY[method].finest),
+        **more,
     )
-    return Ends(found.omega, found.status)
 
 
 def many_rows(load: Load, omega0: Array, at: list[int]) -> ProgramRows:

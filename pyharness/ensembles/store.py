@@ -92,9 +92,9 @@ def opened(sweep: Sweep, path: str) -> Iterator[Store]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
-                raise
-            raise InputError(f"--out '{path}': another sweep is writing to it") from None
+            # A file system that knows no locks has none to respect.
+            if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+                raise InputError(f"--out '{path}': another sweep is writing to it") from None
         for left in folder.rglob(_UNFINISHED):
             left.unlink()
         yield Store(sweep, folder)

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from pyharness.ensembles.asked import asked_of
 from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
 from pyharness.ensembles.loads import listing_of
-from pyharness.ensembles.reductions import REDUCTIONS, asked_of
+from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import Solver, Sweep
+from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import REGISTRY
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
@@ -26,6 +28,8 @@ _SOLVE = (
 CHUNK = 100_000
 _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
+# What carries attitudes of many bodies.
+_WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = None) -> Sweep:
@@ -192,6 +196,12 @@ def _check_reductions(sweep: Sweep) -> None:
                 f"reductions: {asked.reduction} is not what a {kind} can give; allowed with a "
                 f"{kind}: {', '.join(_given_by(kind))}"
             )
+        for method in _choices(sweep, "method", sweep.solver.method):
+            if "attitude" in reduction.needs and method not in _WITH_ATTITUDE:
+                raise InputError(
+                    f"reductions: {asked.reduction} is not what {method} can give; allowed: "
+                    f"{', '.join(_WITH_ATTITUDE)}"
+                )
         if "moments" in reduction.needs and sweep.scene.moments is None:
             raise InputError(f"reductions: {asked.reduction} takes a body of moments")
         torque = any(axis.field.startswith("torque") for axis in sweep.axes)

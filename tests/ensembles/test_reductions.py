@@ -51,6 +51,21 @@ def test_reductions_say_what_the_motion_does(tmp_path: Path) -> None:
     assert 0.0 < found["drift"].max() < 1e-12
 
 
+def test_axis_tilts_in_space_as_the_body_turns(tmp_path: Path) -> None:
+    asked = ", ".join(
+        f'{{name = "axis-tilt", of = "{axis}", samples = 50, as = "{axis}"}}'
+        for axis in ("least", "middle", "largest")
+    )
+    sweep, found = _found(tmp_path, text(TILT, top=f"reductions = [{asked}]"))
+    times = [10.0 * (i + 1) / 50 for i in range(50)]
+    for i, scene in enumerate(_tilted(sweep)):
+        matrices = solve(scene, times, attitude=True).rotation().as_matrix()
+        for axis, name in enumerate(("least", "middle", "largest")):
+            expected = np.arccos(np.clip(matrices[:, axis, axis], -1.0, 1.0)).max()
+            assert found[name][i] == pytest.approx(expected, abs=1e-6)
+    assert found["middle"].max() > 3.0
+
+
 def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:
     top = 'reductions = ["drift", "error", {name = "error", samples = 4, as = "on-the-way"}]'
     axis = '[[axis]]\nfield = "method"\nvalues = ["rk4", "improved-euler", "rk45"]'

@@ -35,6 +35,8 @@ MISTAKES = {
         '[[axis]]\nfield = "omega.2"\nvalues = [1.0, 2.0]\ndimension = "both"',
     ): "allowed: as many",
     text(TILT, top='reductions = ["stop-step"]'): "not what a method can give",
+    text(TILT, "[solve]\nmethod = 'rk4'", top='reductions = ["axis-tilt"]'): "what rk4 can give",
+    text(TILT, top='reductions = [{name = "axis-tilt", of = "long"}]'): "unknown axis 'long'",
     text(TILT, top='reductions = ["ending"]'): "did you mean 'end'?",
     text(TILT, top='reductions = ["end", "end"]'): "give one another 'as'",
     text(TILT, top='reductions = [{name = "claim", id = "no"}]'): "unknown claim 'no'",

@@ -378,3 +378,21 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   bodies%times => times
   call solve_bodies(bodies, code, effort, packed, attitude0, omega, attitude, status, raised)
 end subroutine solve_ensemble
+
+subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, omega, status, raised)
+  ! Many starts of a prepared solver: as solve_packed, and called as that is.
+  !f2py threadsafe
+  use ensemble, only: solve_packed_bodies
+  implicit none
+  integer(4), intent(in) :: n_packed
+  real(8), intent(in) :: packed(n_packed)
+  integer(4), intent(in) :: n
+  real(8), intent(in) :: omega0(3, n)  ! rad/s
+  integer(4), intent(in) :: n_times
+  real(8), intent(in) :: times(n_times) ! 1 or n, s
+  real(8), intent(inout) :: omega(3, n)
+  integer(1), intent(inout) :: status(n)
+  integer(4), intent(out) :: raised
+
+  call solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, raised)
+end subroutine solve_packed_many

@@ -2,22 +2,54 @@ module ensemble
   !! Many bodies in one call: side by side where that will do, and each by itself what is left.
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: bodies_t, coefficients_of, has_torque, i1, LEFT, of_body, single_of
+  use bodies, only: bodies_t, has_torque, i1, LEFT, of_body, single_of
   use kinds, only: dp
   use levels, only: many_fixed, many_free, many_taylor
-  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, RK4, TAYLOR
+  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, QUICK_OR_TAYLOR, RK4, &
+                     TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
                     N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use prepared, only: solve_prepared, solve_prepared_attitude
   use problem, only: problem_t
-  use statuses, only: INTERRUPTED
+  use statuses, only: INTERRUPTED, REFUSED
   use two_words, only: two_product, two_sum
   implicit none(type, external)
   private
 
-  public :: solve_bodies
+  public :: solve_bodies, solve_packed_bodies
 
 contains
+
+  subroutine solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, raised)
+    !! Many starts of one prepared scene.
+    integer, intent(in) :: n_packed, n, n_times
+    real(dp), intent(in), target :: packed(0:n_packed - 1)
+    real(dp), intent(in), target :: omega0(3, n)
+    real(dp), intent(in), target :: times(n_times)
+    real(dp), intent(inout) :: omega(3, n)
+    integer(i1), intent(inout) :: status(n)
+    integer, intent(out) :: raised
+    type(bodies_t) :: bodies
+    real(dp) :: no_attitude(4, 0)
+    integer :: code, middle
+
+    code = int(packed(METHOD))
+    if (code == QUICK_OR_TAYLOR) code = TAYLOR
+    bodies%by_moments = .false.
+    bodies%tolerance = packed(TOLERANCE)
+    bodies%step = packed(STEP)
+    bodies%n = n
+    bodies%body(1:3, 1:1) => packed(COEFFICIENTS:COEFFICIENTS + 2)
+    bodies%constant(1:3, 1:1) => packed(CONSTANT:CONSTANT + 2)
+    bodies%rate(1:3, 1:1) => packed(RATE:RATE + 2)
+    middle = WAVES + 4*int(packed(N_SINES))
+    bodies%sines(1:4, 1:int(packed(N_SINES)), 1:1) => packed(WAVES:middle - 1)
+    bodies%cosines(1:4, 1:int(packed(N_COSINES)), 1:1) => packed(middle:n_packed - 1)
+    bodies%omega0 => omega0
+    bodies%times => times
+    call solve_bodies(bodies, code, packed(EFFORT), packed, no_attitude, omega, no_attitude, &
+                      status, raised)
+  end subroutine solve_packed_bodies
 
   subroutine solve_bodies(bodies, code, effort_, packed, attitude0, omega, attitude, status, raised)
     !! Angular velocity of each body at its time, and its attitude where that is given.
@@ -35,7 +67,8 @@ contains
     raised = 0
     if (bodies%n == 0) return
     with_torque = has_torque(bodies)
-    if (size(attitude0) > 0) then
+    ! A body alone takes less time by itself.
+    if (size(attitude0) > 0 .or. bodies%n == 1) then
       status = LEFT
     else if (code == CLOSED_FORM .or. (code == CLOSED_FORM_OR_TAYLOR .and. .not. with_torque)) then
       call many_free(c_loc(bodies), omega, status)
@@ -80,6 +113,11 @@ contains
                             steps, found)
       else
         call pack(bodies, i, code, with_torque, effort_, own)
+        if (.not. is_body(bodies, i, own)) then
+          status(i) = int(REFUSED, i1)
+          omega(:, i) = transfer(huge(0_int64), 1.0_dp)
+          cycle
+        end if
         call solve_prepared(own, size(own), bodies%omega0(:, i), &
                             bodies%times(of_body(size(bodies%times), i)), omega(:, i), ended, &
                             steps, found)
@@ -110,6 +148,12 @@ contains
     raised = 0
     do i = 1, bodies%n
       call pack(bodies, i, code, with_torque, effort_, own)
+      if (.not. is_body(bodies, i, own)) then
+        status(i) = int(REFUSED, i1)
+        omega(:, i) = transfer(huge(0_int64), 1.0_dp)
+        attitude(:, i) = omega(1, i)
+        cycle
+      end if
       start(:3) = bodies%omega0(:, i)
       start(4:) = attitude0(:, of_body(size(attitude0, 2), i))
       call solve_prepared_attitude(own, size(own), start, &
@@ -122,6 +166,18 @@ contains
       if (raised /= 0) return
     end do
   end subroutine solve_left_with_attitude
+
+  pure logical function is_body(bodies, i, packed)
+    !! Whether a body has moments above 0, and all its numbers are finite.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i
+    real(dp), intent(in) :: packed(0:) !! the same as single kernels take it
+
+    is_body = all(abs(packed) <= huge(1.0_dp))
+    if (bodies%by_moments) then
+      is_body = is_body .and. all(bodies%body(:, of_body(size(bodies%body, 2), i)) > 0.0_dp)
+    end if
+  end function is_body
 
   subroutine pack(bodies, i, code, with_torque, effort_, packed)
     !! Body i for prepared.f90.

@@ -88,10 +88,15 @@ contains
     real(dp), intent(in) :: moments(LANES, 3)
     integer, intent(in) :: m
     real(dp), intent(inout) :: a(LANES, 3)
+    real(dp) :: least
     integer :: i
 
     do i = 1, m
-      a(i, 1) = (moments(i, 2) - moments(i, 3))/moments(i, 1)
+      ! No body: NaN, which every look at a body finds.
+      least = min(moments(i, 1), moments(i, 2), moments(i, 3))
+      if (.not. least > 0.0_dp) least = 0.0_dp
+      least = least/least
+      a(i, 1) = least*((moments(i, 2) - moments(i, 3))/moments(i, 1))
       a(i, 2) = (moments(i, 3) - moments(i, 1))/moments(i, 2)
       a(i, 3) = (moments(i, 1) - moments(i, 2))/moments(i, 3)
     end do

@@ -26,7 +26,7 @@ module many_taylor
   real(dp), parameter :: MOST_GROWTH = 200.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: SURE = 0.03_dp      ! rounding times growth, in tolerances
-  real(dp), parameter :: A_STEP = 2.0_dp     ! radians about the body in a step
+  real(dp), parameter :: A_STEP = 3.0_dp     ! norm up to which an exponential is taken at once
   real(dp), parameter :: SHORTEST = 1e-7_dp  ! step over the time
   real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! of each radian of a wave
   real(dp), parameter :: FAR = 1e60_dp       ! from 1: products of such rates are numbers
@@ -47,7 +47,7 @@ module many_taylor
     real(dp), dimension(SLOTS) :: h           !! the step before, s
     real(dp), dimension(SLOTS) :: scale       !! largest omega so far, rad/s
     real(dp), dimension(SLOTS) :: share       !! that the last terms may have of it
-    real(dp), dimension(SLOTS) :: farthest    !! A_STEP over the coupling
+    real(dp), dimension(SLOTS) :: spin        !! of small differences, 1/s
     real(dp), dimension(SLOTS) :: going       !! above 0 where a body has a way to go
     real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! what waves add to the terms, rad/s
   end type slots_t
@@ -55,7 +55,7 @@ module many_taylor
   type :: ready_t
     !! Bodies before their first step.
     real(dp), dimension(LANES, 3) :: w, a, constant, rate
-    real(dp), dimension(LANES) :: rest, h, scale, share, farthest
+    real(dp), dimension(LANES) :: rest, h, scale, share, spin
     real(dp), dimension(LANES) :: fits
     integer :: there, taken
   end type ready_t
@@ -162,7 +162,7 @@ contains
     s%h = 1.0_dp
     s%scale = 1.0_dp
     s%share = 1.0_dp
-    s%farthest = 1.0_dp
+    s%spin = 1.0_dp
     s%going = 0.0_dp
   end subroutine fill
 
@@ -208,7 +208,7 @@ contains
       if (.not. (r%scale(i) <= FAR .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
       if (.not. (abs(r%rest(i)) <= FAR .and. abs(r%rest(i)) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
       if (.not. (coupling(i) <= FAR .and. push <= FAR .and. ramp <= FAR)) r%fits(i) = -1.0_dp
-      if (.not. min(moments(i, 1), moments(i, 2), moments(i, 3)) > 0.0_dp) r%fits(i) = -1.0_dp
+      if (.not. abs(r%a(i, 1)) <= FAR) r%fits(i) = -1.0_dp
     end do
     turned = 0.0_dp
     n_sines = size(bodies%sines, 2)
@@ -241,7 +241,7 @@ contains
       push = sqrt(abs(r%a(i, 1)))
       ramp = sqrt(abs(r%a(i, 2)))
       rate(i) = sqrt(abs(r%a(i, 3)))
-      r%farthest(i) = A_STEP/max(push*ramp, ramp*rate(i), rate(i)*push, LEAST)
+      r%spin(i) = r%scale(i)*max(push*ramp, ramp*rate(i), rate(i)*push)
       if (.not. abs(r%h(i)) > SHORTEST*abs(r%rest(i))) r%fits(i) = -1.0_dp
     end do
   end subroutine make_ready
@@ -268,7 +268,7 @@ contains
     s%h(i) = r%h(j)
     s%scale(i) = r%scale(j)
     s%share(i) = r%share(j)
-    s%farthest(i) = r%farthest(j)
+    s%spin(i) = r%spin(j)
     s%going(i) = 1.0_dp
   end subroutine put_in
 
@@ -397,7 +397,7 @@ contains
     allowed = s%share(i)*scale
     r = ratio(order, allowed, sum(abs(terms(:, order))) + sum(abs(terms(:, order - 1))))
     next = h*r
-    if (abs(next)*scale > s%farthest(i)) next = sign(s%farthest(i)/scale, h)
+    if (abs(next)*s%spin(i) > A_STEP) next = sign(A_STEP/s%spin(i), h)
     r = next
     if (abs(s%rest(i)) < 2.0_dp*abs(next)) r = 0.5_dp*s%rest(i)
     if (abs(s%rest(i)) <= abs(next)) r = s%rest(i)
@@ -442,6 +442,9 @@ contains
     o(2, 3) = f(2)*(mean(1) + f(1)*c(1))
     o(3, 1) = f(3)*(mean(2) + f(2)*c(2))
     o(3, 2) = f(3)*(mean(1) - f(1)*c(1))
+    ! In units in which the matrix of a body is symmetric but for signs.
+    s%spin(i) = sqrt(abs(o(1, 2)*o(2, 1)) + abs(o(1, 3)*o(3, 1)) + abs(o(2, 3)*o(3, 2))) &
+                /max(abs(next), LEAST)
     do j = 1, 2
       d = merge(s%error(i, :), s%small(i, :), j == 1)
       e = d

@@ -20,7 +20,7 @@ allowed = s%share(i)*scale
 r = ratio({order}, allowed, last)
 rest = s%rest(i)
 next = h*r
-if (abs(next)*scale > s%farthest(i)) next = sign(s%farthest(i)/scale, h)
+if (abs(next)*s%spin(i) > A_STEP) next = sign(A_STEP/s%spin(i), h)
 r = next
 if (abs(rest) < 2.0_dp*abs(next)) r = 0.5_dp*rest
 if (abs(rest) <= abs(next)) r = rest
@@ -46,7 +46,9 @@ oxz = fa*(my - fb*cy)
 oyx = fb*(mz - fc*cz)
 oyz = fb*(mx + fa*cx)
 ozx = fc*(my + fb*cy)
-ozy = fc*(mx - fa*cx)"""
+ozy = fc*(mx - fa*cx)
+p2 = abs(oxy*oyx) + abs(oxz*ozx) + abs(oyz*ozy)
+s%spin(i) = sqrt(p2)/max(abs(next), LEAST)"""
 END = """rest = rest - next
 s%t(i) = s%t(i) + next
 s%rest(i) = rest

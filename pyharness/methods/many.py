@@ -4,13 +4,20 @@ The blocks and the threads change no bit of a result: each body is solved by its
 """
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.methods.many_starts import (
+    buffer_of,
+    for_each_piece,
+    numbers_of,
+    rows_of,
+    threads_of,
+    times_of,
+)
 from pyharness.methods.plan import FINEST
 from pyharness.methods.prepared import CODES, PREPARED
 from pyharness.methods.registry import REGISTRY, check_attitude
@@ -20,11 +27,8 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import ENDS, extension
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array
-from pyharness.model.values import Number, finite, tolerance_of, whole
+from pyharness.model.values import Number, finite, tolerance_of
 
-# A thread's piece: some milliseconds, after which it looks at the user.
-_PIECE = 1 << 18
-_MOST_THREADS = 1024
 _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 
 
@@ -149,7 +153,7 @@ def solve_many(
     bodies = _Bodies(given, t_end, code, tolerance_of(tolerance, FINEST), checked_effort(effort))
     if bodies.attitude.size:
         check_attitude(method)
-    return bodies.solve(_threads(threads), out)
+    return bodies.solve(threads_of(threads), out)
 
 
 class _Bodies:
@@ -160,18 +164,15 @@ class _Bodies:
     ) -> None:
         self.by_moments = bool(given["by_moments"])
         body = "moments" if self.by_moments else "coefficients"
-        self.body = _rows(body, given["body"], 3)
-        self.constant = _rows("torque_constant", given["constant"], 3)
-        self.rate = _rows("torque_rate", given["rate"], 3)
+        self.body = rows_of(body, given["body"], 3)
+        self.constant = rows_of("torque_constant", given["constant"], 3)
+        self.rate = rows_of("torque_rate", given["rate"], 3)
         self.sines = _waves("sines", given["sines"])
         self.cosines = _waves("cosines", given["cosines"])
-        self.omega0 = _rows("omega0", given["omega0"], 3)
+        self.omega0 = rows_of("omega0", given["omega0"], 3)
         attitude = given["attitude"]
         self.attitude = np.empty((0, 4)) if attitude is None else _units(attitude)
-        self.times = _numbers("t_end", t_end)
-        if self.times.ndim > 1:
-            raise InputError(f"t_end: shape {self.times.shape}; allowed: one number, or shape (n,)")
-        self.times = np.ascontiguousarray(np.atleast_1d(self.times))
+        self.times = times_of(t_end)
         named = {
             "omega0": self.omega0, body: self.body, "torque_constant": self.constant,
             "torque_rate": self.rate, "sines": self.sines, "cosines": self.cosines,
@@ -183,7 +184,9 @@ class _Bodies:
             self.n = 0
         for name, count in counts.items():
             if count not in (1, self.n):
-                raise InputError(f"{name}: {count} rows; allowed: 1, or as many as there are bodies, {self.n}")
+                raise InputError(
+                    f"{name}: {count} rows; allowed: 1, or as many as there are bodies, {self.n}"
+                )
         if len(self.omega0) != self.n:
             self.omega0 = np.ascontiguousarray(np.broadcast_to(self.omega0, (self.n, 3)))
         self.step = given["step"]
@@ -197,15 +200,7 @@ class _Bodies:
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
         """Return the ends."""
         found = self._place(out)
-        pieces = [slice(first, min(first + _PIECE, self.n)) for first in range(0, self.n, _PIECE)]
-        if threads > 1 and self.n > 1:
-            size = min(_PIECE, -(-self.n // threads))
-            pieces = [slice(first, min(first + size, self.n)) for first in range(0, self.n, size)]
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(lambda piece: self._enter(piece, found), pieces))
-        else:
-            for piece in pieces:
-                self._enter(piece, found)
+        for_each_piece(lambda piece: self._enter(piece, found), self.n, threads)
         return found
 
     def _enter(self, piece: slice, found: Ensemble) -> None:
@@ -226,17 +221,17 @@ class _Bodies:
         """Return arrays for the results."""
         shape = (self.n, 3)
         if out is None or isinstance(out, np.ndarray):
-            omega = np.empty(shape) if out is None else _buffer("out", out, shape, "d")
+            omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")
             attitude = np.empty((self.n, 4)) if self.attitude.size else None
             return Ensemble(omega, np.empty(self.n, np.int8), attitude)
         if not isinstance(out, Ensemble):
             raise InputError("out: allowed: an Ensemble, or an array of float64")
-        _buffer("out.omega", out.omega, shape, "d")
-        _buffer("out.status", out.status, (self.n,), "b")
+        buffer_of("out.omega", out.omega, shape, "d")
+        buffer_of("out.status", out.status, (self.n,), "b")
         if (out.attitude is None) != (not self.attitude.size):
             raise InputError("out.attitude: allowed: an array where attitude0 is given, else None")
         if out.attitude is not None:
-            _buffer("out.attitude", out.attitude, (self.n, 4), "d")
+            buffer_of("out.attitude", out.attitude, (self.n, 4), "d")
         return out
 
 
@@ -244,7 +239,9 @@ def _from_scene(scene: Scene) -> dict[str, Any]:
     """Return a scene as arrays of one row."""
     law = checked_scene(scene, any_torque=True).torque
     if law.in_space:
-        raise InputError(SPACE_TORQUE.replace("methods auto and taylor, with the attitude", "solve"))
+        raise InputError(
+            SPACE_TORQUE.replace("methods auto and taylor, with the attitude", "solve")
+        )
     law = scene.body_torque
     return {
         "by_moments": scene.moments is not None,
@@ -291,52 +288,18 @@ def _code(method: str, tolerance: Number) -> int:
     return Methods.CLOSED_FORM_OR_TAYLOR if method == "auto" else CODES[method]
 
 
-def _threads(threads: int) -> int:
-    found = whole("threads", threads)
-    if not 1 <= found <= _MOST_THREADS:
-        raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
-    return found
-
-
-def _numbers(where: str, values: Any) -> Array:
-    """Return an array of float64; InputError where it holds anything but real numbers."""
-    try:
-        found = np.asarray(values)
-    except ValueError:
-        raise InputError(f"{where}: rows of different lengths; allowed: an array") from None
-    if found.dtype.kind not in "iuf" and found.size:
-        raise InputError(f"{where}: an array of {found.dtype}; allowed: real numbers")
-    return found.astype(float, copy=False)
-
-
-def _rows(where: str, values: Any, width: int) -> Array:
-    found = _numbers(where, values)
-    if found.ndim not in (1, 2) or found.shape[-1] != width:
-        raise InputError(f"{where}: shape {found.shape}; allowed: ({width},) or (n, {width})")
-    return np.ascontiguousarray(found.reshape(-1, width))
-
-
-def _waves(where: str, values: Any) -> Array:
-    found = _numbers(where, values)
-    if not found.size:
-        return np.empty((1, 0, 4))
-    if found.ndim not in (2, 3) or found.shape[-1] != 4:
-        raise InputError(f"{where}: shape {found.shape}; allowed: (k, 4) or (n, k, 4)")
-    return np.ascontiguousarray(found.reshape(-1, *found.shape[-2:]))
-
-
 def _units(values: Any) -> Array:
     """Return quaternions of length 1; NaN, which has no attitude, where there is none."""
-    found = _rows("attitude0", values, 4)
+    found = rows_of("attitude0", values, 4)
     with np.errstate(all="ignore"):
         found = found / np.abs(found).max(axis=1, keepdims=True)
         return found / np.sqrt((found * found).sum(axis=1, keepdims=True))
 
 
-def _buffer(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
-    if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
-        raise InputError(
-            f"{where}: allowed: a writable array of {np.dtype(kind)}, shape {shape}, in one piece"
-        )
-    return array
+def _waves(where: str, values: Any) -> Array:
+    found = numbers_of(where, values)
+    if not found.size:
+        return np.empty((1, 0, 4))
+    if found.ndim not in (2, 3) or found.shape[-1] != 4:
+        raise InputError(f"{where}: shape {found.shape}; allowed: (k, 4) or (n, k, 4)")
+    return np.ascontiguousarray(found.reshape(-1, *found.shape[-2:]))

@@ -6,11 +6,13 @@ three arguments and enters the kernel.
 
 import reprlib
 from dataclasses import replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal, Self, overload
 
 import numpy as np
 
 from pyharness.methods.last_call import LastCall
+from pyharness.methods.many_starts import many_starts
 from pyharness.methods.packed import packed_scene
 from pyharness.methods.plan import EITHER, FINEST, Plan, plan
 from pyharness.methods.registry import check_torque
@@ -19,7 +21,7 @@ from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import extension
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.values import (
     Number,
     Numbers,
@@ -31,6 +33,7 @@ from pyharness.model.values import (
 )
 
 if TYPE_CHECKING:
+    from pyharness._many import ManyStarts
     from pyharness._solver import BoundKernel
     from pyharness.methods.prepared_attitude import AttitudeSolver
 else:
@@ -77,6 +80,8 @@ class Solver(LastCall, BoundKernel):
         What was decided, and why.
     """
 
+    _packed: Array
+
     # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
     # Python between, which would cost as much as an easy solve.
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
@@ -90,8 +95,24 @@ class Solver(LastCall, BoundKernel):
             brief[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
         solver = super().__new__(cls, kernel, packed, _check, brief)
         solver.plan = chosen
+        solver._packed = packed
         solver._given = tolerance, asked, effort
         return solver
+
+    @cached_property
+    def many(self) -> "ManyStarts":
+        """Solve many starts in one call: ``solver.many(omega0, t_end, threads=1, out=None)``.
+
+        `omega0` has shape (n, 3), `t_end` is a number or has shape (n,); returned are omega, shape
+        (n, 3), which may be `out`, and the status of each, int8: see `Ensemble`. For the same
+        tolerance, but not to the bit what a call for each gives; each is solved as if alone,
+        whatever the others and the threads. What is none of these is refused with an InputError.
+        """
+        from pyharness._many import ManyStarts
+
+        is_brief = bool(self.plan.closed_form) and not self.plan.scene.torque.varies
+        slowly = partial(many_starts, self._packed)
+        return ManyStarts(extension().solve_packed_many, self._packed, slowly, is_brief)
 
     @property
     def method(self) -> str:

@@ -70,7 +70,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
     while left:
         before = len(left)
         try:
-            for chunk, found in _by_pool(sweep, left, workers):
+            for chunk, found in _by_pool(sweep, list(left), workers):
                 left.remove(chunk)
                 yield chunk, found
         except BrokenProcessPool:

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from pyharness.ensembles import executors
 from pyharness.ensembles.executors import engine
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep import Sweep, solve_chunk
@@ -62,6 +63,20 @@ def test_killed_worker_of_dask_costs_its_chunks_and_nothing_else(
     with pytest.raises(ProcessLookupError):
         os.kill(victim, 0)
     assert files(tmp_path / "here") == files(tmp_path / "dask")
+
+
+def test_processes_are_started_once(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
+    by_pool, started = executors._by_pool, []
+
+    def counted(sweep: Sweep, chunks: list[int], workers: int) -> Any:
+        started.append(chunks)
+        return by_pool(sweep, chunks, workers)
+
+    monkeypatch.setattr(executors, "_by_pool", counted)
+    with engine("processes", 2) as own:
+        found = [chunk for chunk, _ in own.computed(sweep, list(range(sweep.n_chunks)))]
+    assert sorted(found) == started[0] == list(range(sweep.n_chunks))
+    assert len(started) == 1
 
 
 def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:

@@ -22,6 +22,7 @@ VERBS = {
     "plan": "what a scene needs, what is therefore not computed, and why",
     "rotations": "the steady rotations of a scene, their stability, and the time between flips",
     "bench": "run time against error: ours, the programs, and other people's integrators",
+    "sweep": "a grid of scenes, solved here or by a cluster, in a store that resumes",
     "verify": "bits between languages, error against the truth, and what changed since recorded",
     "stress": "numerical stability tried to breaking, each trial with a bound derived beforehand",
     "doctor": "what is built, with what, and what is missing",

@@ -21,7 +21,7 @@ from pyharness.methods.many_starts import (
 from pyharness.methods.plan import FINEST
 from pyharness.methods.prepared import CODES, PREPARED
 from pyharness.methods.registry import REGISTRY, check_attitude
-from pyharness.model.codes import Methods, Statuses
+from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import ENDS, extension
@@ -293,7 +293,8 @@ def _units(values: Any) -> Array:
     found = rows_of("attitude0", values, 4)
     with np.errstate(all="ignore"):
         found = found / np.abs(found).max(axis=1, keepdims=True)
-        return found / np.sqrt((found * found).sum(axis=1, keepdims=True))
+        units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))
+    return units
 
 
 def _waves(where: str, values: Any) -> Array:

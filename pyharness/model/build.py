@@ -8,7 +8,11 @@ from dataclasses import asdict, dataclass
 
 from pyharness.model.report import Line, Report
 
-OPTIONAL = {"matplotlib": "pictures: --plot"}
+OPTIONAL = {
+    "matplotlib": "pictures: --plot",
+    "zarr": "stores: sweep",
+    "distributed": "clusters: sweep --executor dask",
+}
 
 
 @dataclass(frozen=True)

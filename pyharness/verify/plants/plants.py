@@ -19,7 +19,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pyharness.methods.prepared import _CODES
+from pyharness.methods.prepared import CODES as _CODES
 from pyharness.methods.registry import METHODS
 from pyharness.model import extension
 from pyharness.model.codes import Methods, Places

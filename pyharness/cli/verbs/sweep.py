@@ -1,0 +1,84 @@
+"""`sweep`: a grid of scenes, solved chunk by chunk and kept in a store that resumes."""
+
+import argparse
+from functools import partial
+
+from pyharness.cli import options as shared
+from pyharness.cli import say
+from pyharness.ensembles.executors import EXECUTORS, check_dask
+from pyharness.ensembles.run import run_sweep, said
+from pyharness.ensembles.store import check_zarr, opened
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.errors import InputError
+
+# Where the array version of a claim stands, by the claim's name.
+CLAIMS: dict[str, str] = {}
+_MOST_WORKERS = 1024
+OPTIONS = {
+    "file FILE.toml": "the sweep file: a scene, axes, what solves, reductions",
+    "--out STORE": "the store, a folder (Zarr); one that is there goes on where it ended",
+    "--executor E": f"{', '.join(EXECUTORS)} (default: here)",
+    "--workers N": "processes, of processes and dask (default: as many as processors)",
+    "--scheduler ADDRESS": "of a Dask cluster, as in tcp://host:8786 (default: one of our own)",
+    "--quantity NAME": "the reduction to draw (default: the first)",
+    **{key: told for key, told in shared.outputs().items() if key != "--out FILE"},
+}
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute what the store lacks, and show what it holds."""
+    if options.file is None:
+        raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")
+    if options.out is None:
+        raise InputError("sweep: give --out STORE, the folder that keeps the results")
+    check_zarr()
+    executor = options.executor or EXECUTORS[0]
+    shared.check_known("executor", executor, EXECUTORS)
+    if options.scheduler is not None and executor != "dask":
+        raise InputError(f"--scheduler has no meaning with --executor {executor}; allowed: dask")
+    if executor == "dask":
+        check_dask()
+    workers = _workers(options, executor)
+    sweep = read_sweep(options.file, CLAIMS)
+    quantity = None
+    # What `show` gets: the report goes to the terminal, the store is what --out names.
+    shown = argparse.Namespace(**{**vars(options), "out": None})
+    if options.plot is not None:
+        from pyharness.ensembles.picture import chosen_quantity
+
+        quantity = chosen_quantity(sweep, options.quantity)
+    elif options.quantity is not None:
+        raise InputError("--quantity has no meaning without --plot")
+    shared.check_outputs(shown)
+    outcome = run_sweep(
+        sweep,
+        options.out,
+        executor,
+        workers,
+        options.scheduler,
+        before=lambda estimate: say(f"pyharness: {said(estimate)}\n"),
+        progress=shared.progress,
+    )
+    shared.progress("")
+    from pyharness.ensembles.report import sweep_report
+
+    with opened(sweep, options.out) as store:
+        report = sweep_report(store, outcome, options.out)
+        if quantity is not None:
+            from pyharness.ensembles.picture import sweep_picture
+
+            report = report._replace(pictures={"sweep": partial(sweep_picture, store, quantity)})
+        shared.show(report, shown)
+    return 0
+
+
+def _workers(options: argparse.Namespace, executor: str) -> int | None:
+    if options.workers is None:
+        return None
+    if executor == "here" or options.scheduler is not None:
+        chosen = "--executor here" if executor == "here" else "--scheduler"
+        raise InputError(f"--workers has no meaning with {chosen}")
+    count = shared.whole(options.workers, "--workers")
+    if not 1 <= count <= _MOST_WORKERS:
+        raise InputError(f"--workers: {count}; allowed: 1 to {_MOST_WORKERS}")
+    return count

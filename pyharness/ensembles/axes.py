@@ -1,0 +1,198 @@
+"""Axes: what varies over a grid, and the values that it takes."""
+
+import math
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.ensembles.fields import CHOICES, NUMBERS, field_names
+from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.scene_file import check_keys
+from pyharness.model.values import finite, whole
+
+# Of one axis: its values are held in memory.
+MOST_VALUES = 100_000_000
+SPACINGS = ("linear", "log")
+# Distributions, and the keys that say where they lie.
+DRAWS = {
+    "uniform": ("from", "to"),
+    "log-uniform": ("from", "to"),
+    "normal": ("mean", "deviation"),
+    # Angles from an axis, of directions that prefer none.
+    "sphere": (),
+}
+_KEYS = (
+    *("field", "dimension", "values", "count", "spacing", "from", "to"),
+    *("draw", "mean", "deviation", "seed"),
+)
+_SAMPLE = "sample"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What varies, and how; axes of one dimension go along it together.
+
+    Attributes
+    ----------
+    field : str
+        What of a scene, or of what solves it, takes the values.
+    dimension : str
+        Of the store's arrays: the field's name where nothing else is said, `sample` where drawn.
+    count : int
+        How many values.
+    how : str
+        `listed`, a spacing, or a distribution.
+    values : tuple of float or str
+        Those listed; else the two numbers of a spacing or a distribution.
+    seed : int
+        Of a distribution.
+    """
+
+    field: str
+    dimension: str
+    count: int
+    how: str
+    values: tuple[Any, ...]
+    seed: int = 0
+
+    @property
+    def is_choice(self) -> bool:
+        """Whether its values are words."""
+        return self.field in CHOICES
+
+    def coordinates(self) -> NDArray[Any]:
+        """Return all values: floats, or words as objects. Callers must not change them."""
+        return _coordinates(self)
+
+
+@lru_cache(maxsize=32)
+def _coordinates(axis: Axis) -> NDArray[Any]:
+    if axis.is_choice:
+        return np.array(axis.values, dtype=object)
+    found: NDArray[np.float64]
+    if axis.how == "listed":
+        found = np.array(axis.values, dtype=np.float64)
+    elif axis.how == "linear":
+        found = np.linspace(axis.values[0], axis.values[1], axis.count)
+    elif axis.how == "log":
+        found = np.geomspace(axis.values[0], axis.values[1], axis.count)
+    else:
+        found = _drawn(axis)
+    if NUMBERS[axis.field].whole:
+        found = np.rint(found)
+    found.setflags(write=False)
+    return found
+
+
+def _drawn(axis: Axis) -> NDArray[np.float64]:
+    # All at once, so that no chunk has a say in it; each field has numbers of its own.
+    seeds = np.random.SeedSequence([axis.seed, zlib.crc32(axis.field.encode())])
+    source = np.random.Generator(np.random.Philox(seeds))
+    if axis.how == "sphere":
+        return np.arccos(source.uniform(-1.0, 1.0, axis.count))
+    first, second = axis.values
+    if axis.how == "normal":
+        return source.normal(first, second, axis.count)
+    if axis.how == "uniform":
+        return source.uniform(first, second, axis.count)
+    return np.exp(source.uniform(math.log(first), math.log(second), axis.count))
+
+
+def axis_of(table: object, number: int) -> Axis:
+    """Return the axis that a table of a sweep file describes, the `number`-th, from 1."""
+    where = f"[[axis]] {number}"
+    if not isinstance(table, dict):
+        raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")
+    check_keys(table, _KEYS, where)
+    if "field" not in table:
+        raise InputError(f"{where}: field is missing; allowed: {', '.join(field_names())}")
+    field = table["field"]
+    if not isinstance(field, str) or field not in field_names():
+        raise unknown("field", field, field_names(), where)
+    where = f"{where} ({field})"
+    dimension = table.get("dimension", _SAMPLE if "draw" in table else field)
+    if not isinstance(dimension, str) or not dimension or not dimension.isprintable():
+        raise InputError(f"{where}: dimension: allowed: a name")
+    if "/" in dimension or dimension.startswith((".", "_")):
+        raise InputError(f"{where}: dimension '{dimension}'; allowed: letters, digits, dots within")
+    if "values" in table:
+        return _listed(where, table, field, dimension)
+    if field in CHOICES:
+        raise InputError(f"{where}: values is missing; a list of names belongs here")
+    return _spread(where, table, field, dimension)
+
+
+def _listed(where: str, table: dict[str, Any], field: str, dimension: str) -> Axis:
+    _refuse(where, table, "values", [*_KEYS[3:]])
+    values = table["values"]
+    if not isinstance(values, list) or not values:
+        raise InputError(f"{where}: values is {kind_of(values)}; allowed: a list, not empty")
+    if field in CHOICES:
+        for each in values:
+            if not isinstance(each, str):
+                raise InputError(f"{where}: {kind_of(each)} where a name belongs")
+        if len(set(values)) < len(values):
+            raise InputError(f"{where}: a name stands twice; allowed: each once")
+        return Axis(field, dimension, len(values), "listed", tuple(values))
+    floats = tuple(finite(where, each) for each in values)
+    return _checked(where, Axis(field, dimension, len(values), "listed", floats))
+
+
+def _spread(where: str, table: dict[str, Any], field: str, dimension: str) -> Axis:
+    if "count" not in table:
+        raise InputError(f"{where}: give either values, or from, to and count, or draw and count")
+    count = whole(f"{where} count", table["count"])
+    if not 1 <= count <= MOST_VALUES:
+        shown = str(count) if abs(count) < 10**18 else "of more than 18 digits"
+        raise InputError(f"{where}: count {shown}; allowed: 1 to {MOST_VALUES} on one axis")
+    keys: tuple[str, ...] = ("from", "to")
+    if "draw" in table:
+        how = table["draw"]
+        if not isinstance(how, str) or how not in DRAWS:
+            raise unknown("distribution", how, DRAWS, f"{where} draw")
+        _refuse(where, table, "draw", ("spacing",))
+        keys = DRAWS[how]
+        if "seed" not in table:
+            raise InputError(f"{where}: seed is missing; a whole number from 0 belongs here")
+    else:
+        how = table.get("spacing", "linear")
+        if not isinstance(how, str) or how not in SPACINGS:
+            raise unknown("spacing", how, SPACINGS, f"{where} spacing")
+    used = {*keys, "seed"} if "draw" in table else {*keys}
+    spare = {"from", "to", "mean", "deviation", "seed"} - used
+    _refuse(where, table, how, sorted(spare))
+    for key in keys:
+        if key not in table:
+            raise InputError(f"{where}: {key} is missing; {how} takes {' and '.join(keys)}")
+    ends = tuple(finite(f"{where} {key}", table[key]) for key in keys)
+    if how.startswith("log") and not all(each > 0.0 for each in ends):
+        raise InputError(f"{where}: {how} from {ends[0]:g} to {ends[1]:g}; allowed: above 0")
+    if how == "normal" and ends[1] < 0.0:
+        raise InputError(f"{where}: deviation {ends[1]:g}; allowed: a number from 0")
+    seed = whole(f"{where} seed", table.get("seed", 0))
+    if not 0 <= seed < 2**63:
+        raise InputError(f"{where}: seed; allowed: a whole number from 0 to 2^63")
+    return _checked(where, Axis(field, dimension, count, how, ends, seed))
+
+
+def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str]) -> None:
+    for key in keys:
+        if key in table:
+            raise InputError(f"{where}: {key} has no meaning with {chosen}")
+
+
+def _checked(where: str, axis: Axis) -> Axis:
+    """Refuse values that the field can't take; the ends say it, where there are any."""
+    field = NUMBERS[axis.field]
+    if axis.how == "sphere":
+        return axis
+    ends = axis.coordinates() if axis.how == "normal" else axis.values
+    for value in (float(np.min(ends)), float(np.max(ends))):
+        if not (math.isfinite(value) and field.takes(value)):
+            raise InputError(f"{where}: {value:g}; allowed: {field.allowed}")
+    return axis

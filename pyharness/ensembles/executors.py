@@ -1,0 +1,213 @@
+"""Executors: who computes the chunks; all of them compute the same."""
+
+import asyncio
+import contextlib
+import logging
+import multiprocessing
+import os
+import re
+import signal
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from pyharness.ensembles.sweep import Arrays, Sweep, solve_chunk
+from pyharness.model.errors import InputError
+
+EXECUTORS = ("here", "processes", "dask")
+Results = Iterator[tuple[int, Arrays]]
+
+_ATTEMPTS = 3  # of a chunk whose process dies
+_AHEAD = 2  # chunks for each process, so that none waits for the disk
+_ANSWER = 4.0  # s, until a scheduler must have answered, and until it must have a worker
+_ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
+
+
+class Engine(NamedTuple):
+    """Who computes: how many at once, and what yields chunks of a sweep as they are computed."""
+
+    workers: int
+    computed: Callable[[Sweep, list[int]], Results]
+
+
+@contextlib.contextmanager
+def engine(
+    executor: str, workers: int | None = None, address: str | None = None
+) -> Iterator[Engine]:
+    """Start what computes, and end it; InputError where a scheduler's address has none.
+
+    Its results raise InputError where nobody is left to compute them.
+    """
+    if executor == "here":
+        yield Engine(1, _here)
+    elif executor == "processes":
+        count = workers or _processors()
+        yield Engine(count, partial(_by_processes, count))
+    else:
+        with _client(workers or _processors(), address) as client:
+            yield Engine(max(1, sum(client.nthreads().values())), partial(_by_client, client))
+
+
+def _processors() -> int:
+    # Those that this process may use, where the system tells.
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _here(sweep: Sweep, chunks: list[int]) -> Results:
+    return ((chunk, solve_chunk(sweep, chunk)) for chunk in chunks)
+
+
+def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
+    left = list(chunks)
+    deaths = 0
+    while left:
+        before = len(left)
+        try:
+            for chunk, found in _by_pool(sweep, list(left), workers):
+                left.remove(chunk)
+                yield chunk, found
+        except BrokenProcessPool:
+            # Someone killed a process: its chunks are lost, and those that waited beside it.
+            deaths = 1 if len(left) < before else deaths + 1
+            if deaths == _ATTEMPTS:
+                raise InputError(
+                    f"--executor processes: a process died {_ATTEMPTS} times; is there enough "
+                    "memory? The same command goes on with what is missing"
+                ) from None
+
+
+def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
+    # A fork of a process with threads, as those of NumPy and Zarr, may never wake up.
+    context = multiprocessing.get_context("spawn")
+    # A Ctrl-C goes to all of them, and is the business of this one.
+    pool = ProcessPoolExecutor(workers, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    waiting: dict[Future[Arrays], int] = {}
+    rest = iter(chunks)
+    try:
+        while True:
+            while len(waiting) < _AHEAD * workers and (chunk := next(rest, None)) is not None:
+                waiting[pool.submit(solve_chunk, sweep, chunk)] = chunk
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                yield waiting.pop(future), future.result()
+    finally:
+        # What they still compute is lost; to wait for it may be to wait for ever.
+        processes = list((pool._processes or {}).values())
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.kill()
+
+
+def check_dask() -> None:
+    """Refuse where Dask is missing."""
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        raise InputError("--executor dask needs dask: pip install 'pyharness[sweep]'") from None
+
+
+@contextlib.contextmanager
+def _client(workers: int, address: str | None) -> Iterator[Any]:
+    dask: Any = import_module("distributed")
+    # What it logs, of workers that come and go, is for those who look after a cluster.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    if address is not None:
+        with _connected(dask, address) as client:
+            yield client
+        return
+    with _deaf_to_interrupts():
+        cluster = dask.LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+        )
+    with cluster, dask.Client(cluster) as client:
+        yield client
+
+
+@contextlib.contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C here, and in every process started meanwhile for as long as it lives."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _connected(dask: Any, address: str) -> Any:
+    """Return a client of the scheduler at an address; InputError where nobody answers."""
+    found = _ADDRESS.fullmatch(address)
+    allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
+    where = f"--scheduler '{address}'"
+    if found is None or int(found["port"]) > 65535:
+        raise InputError(f"{where}: no address; {allowed}")
+    place = found["host"].strip("[]"), int(found["port"])
+    answered: list[bool] = []
+    try:
+        # Whoever is not there says so at once; Dask would ask again and again.
+        socket.create_connection(place, timeout=_ANSWER).close()
+        asyncio.run(asyncio.wait_for(_has_workers(dask, address, answered), _ANSWER))
+        return dask.Client(address, timeout=_ANSWER, set_as_default=False)
+    except Exception as error:  # what answers there may make anything of the question
+        reason = "no Dask scheduler answers there"
+        if answered:
+            reason = "it has no worker"
+        elif isinstance(error, ConnectionError | socket.gaierror):
+            reason = f"nobody answers: {error.strerror or error}"
+        raise InputError(f"{where}: {reason}; {allowed}") from None
+
+
+async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
+    """Return once a scheduler has workers, and say when it has answered; wait without end."""
+    # A client waits for half a minute where something takes the connection and says nothing.
+    async with dask.rpc(address) as scheduler:
+        while not (await scheduler.identity())["workers"]:
+            answered.append(True)
+            await asyncio.sleep(0.1)
+
+
+def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
+    """Keep every worker busy; what dies with one is computed again by another, as Dask does."""
+    dask: Any = import_module("distributed")
+    n_threads = sum(client.nthreads().values())
+    rest = iter(chunks)
+    running = dask.as_completed(loop=client.loop)
+    chunk_of = {}
+
+    def submit() -> None:
+        if (chunk := next(rest, None)) is not None:
+            # The sweep with each: what is sent once may be lost with the workers that have it.
+            future = client.submit(solve_chunk, sweep, chunk, pure=False)
+            chunk_of[future.key] = chunk
+            running.add(future)
+
+    for _ in range(_AHEAD * max(1, n_threads)):
+        submit()
+    for future in running:
+        try:
+            found = future.result()
+        except dask.KilledWorker:
+            raise InputError(
+                "--executor dask: the workers that took a chunk died, one after the other; is "
+                "there enough memory? The same command goes on with what is missing"
+            ) from None
+        except InputError:
+            raise
+        except Exception as error:  # of a worker that lacks something, or a scheduler that is gone
+            raise InputError(
+                f"--executor dask: chunk {chunk_of[future.key]}: {type(error).__name__}: {error}; "
+                "the same command goes on with what is missing"
+            ) from None
+        yield chunk_of.pop(future.key), found
+        future.release()
+        submit()

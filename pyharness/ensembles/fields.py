@@ -1,0 +1,89 @@
+"""What an axis may vary: numbers of a scene or its solver, and words that choose a solver."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+# Words: the program or method, and how the program reads.
+CHOICES = {
+    "program": "a program of the appendix",
+    "method": "a method",
+    "listing": "original, corrected, or fix:NAME+NAME, keep:NAME+NAME",
+    "reading": "adopted, or readings that are not, as NAME+NAME",
+}
+
+
+@dataclass(frozen=True)
+class Field:
+    """A number of a scene, or of what solves it.
+
+    `looped` says that scenes of one call share it.
+    """
+
+    units: str
+    title: str
+    allowed: str = "a finite number"
+    takes: Callable[[float], bool] = lambda value: True
+    looped: bool = False
+    whole: bool = False
+
+
+def _above_zero(value: float) -> bool:
+    return value > 0.0
+
+
+def _from_zero_to_one(value: float) -> bool:
+    return 0.0 < value <= 1.0
+
+
+def _three(name: str, units: str, title: str, positive: bool = False) -> dict[str, Field]:
+    if positive:
+        taken = Field(units, title, "a number above 0", _above_zero)
+    else:
+        taken = Field(units, title)
+    return {f"{name}.{number}": taken for number in (1, 2, 3)}
+
+
+NUMBERS = {
+    **_three("omega", "rad/s", "initial angular velocity"),
+    "omega.magnitude": Field("rad/s", "its length", "a number from 0", lambda value: value >= 0.0),
+    "tilt": Field("rad", "its angle from the axis of the middle moment"),
+    "azimuth": Field("rad", "its angle about that axis, from the axis of the least moment"),
+    **_three("body.moments", "kg m2", "moments", positive=True),
+    **_three("body.coefficients", "1", "coefficients A, B, C"),
+    "body.ratio.1": Field("1", "I1 over I3", "a number above 0", _above_zero),
+    "body.ratio.2": Field("1", "I2 over I3", "a number above 0", _above_zero),
+    "body.square.1": Field(
+        "1", "middle second moment over largest", "0 to 1, not 0", _from_zero_to_one
+    ),
+    "body.square.2": Field(
+        "1", "least second moment over middle", "0 to 1", lambda v: 0.0 <= v <= 1.0
+    ),
+    **_three("torque.constant", "N m", "constant torque"),
+    **_three("torque.rate", "N m/s", "torque that grows with time"),
+    "t_end": Field("s", "time of the end"),
+    "tolerance": Field("1", "tolerance", "above 0, to 1", _from_zero_to_one, looped=True),
+    "step_size": Field("s", "step", "a number above 0", _above_zero, looped=True),
+    "steps": Field("1", "steps", "1 and above", lambda v: v >= 1.0, looped=True, whole=True),
+    "lipschitz": Field(
+        "1/s", "constant of the stop test", "a number from 0", lambda v: v >= 0.0, looped=True
+    ),
+}
+# Ways to say one thing, of which a sweep takes one.
+RIVALS = (
+    (("omega.1", "omega.2", "omega.3"), ("omega.magnitude", "tilt", "azimuth")),
+    (("body.moments",), ("body.coefficients", "body.ratio", "body.square")),
+    (("body.coefficients",), ("body.ratio", "body.square")),
+    (("body.ratio",), ("body.square",)),
+    (("program",), ("method", "t_end", "tolerance")),
+    (("listing", "reading", "lipschitz"), ("method", "t_end", "tolerance")),
+)
+
+
+def field_names() -> list[str]:
+    """Return all that an axis may vary."""
+    return [*NUMBERS, *CHOICES]
+
+
+def units_of(field: str) -> str:
+    """Return the unit of a field; nothing for words."""
+    return NUMBERS[field].units if field in NUMBERS else ""

@@ -1,0 +1,150 @@
+"""Loads: scenes of a sweep that one call solves, as arrays."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.ensembles.fields import CHOICES, NUMBERS
+from pyharness.ensembles.sweep import Indices, Solver, Sweep, groups, value_columns
+from pyharness.model.listing import Listing, subset
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+Columns = dict[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Scenes that share what solves them; an array is None where the scene says it for all.
+
+    `scene` has their step size and steps, `listing` is None for a method.
+    """
+
+    scene: Scene
+    solver: Solver
+    listing: Listing | None
+    omega0: Array  # (n, 3)
+    t_end: Array  # (n,)
+    moments: Array | None = None
+    coefficients: Array | None = None
+    torque_constant: Array | None = None
+    torque_rate: Array | None = None
+
+    @property
+    def bodies(self) -> Array:
+        """Moments, (n, 3), or (1, 3) where all have the same."""
+        return np.array([self.scene.moments]) if self.moments is None else self.moments
+
+    @property
+    def n_scenes(self) -> int:
+        """How many scenes."""
+        return len(self.omega0)
+
+
+def listing_of(program: str, listing: str, reading: str) -> Listing:
+    """Return a listing from the words of a sweep; InputError for names that it does not have."""
+    how, _, names = listing.partition(":")
+    readings = [] if reading == "adopted" else reading.split("+")
+    if names and how == "fix":
+        return subset(program, fix=names.split("+"), readings=readings)
+    if names and how == "keep":
+        return subset(program, keep=names.split("+"), readings=readings)
+    return subset(program, listing, readings=readings)
+
+
+def loads(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Load]]:
+    """Yield which of the scenes a load has, and the load."""
+    columns = value_columns(sweep, where)
+    looped = [name for name in columns if name in CHOICES or NUMBERS[name].looped]
+    for members, values in groups([columns[name] for name in looped], len(where[0])):
+        own = {name: c[members] for name, c in columns.items() if name not in looped}
+        shared: dict[str, Any] = dict(zip(looped, values, strict=True))
+        yield members, _load(sweep, shared, own, len(members))
+
+
+def _load(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Load:
+    scene = sweep.scene
+    if "step_size" in shared or "steps" in shared:
+        step_size = float(shared.pop("step_size", scene.step_size))
+        scene = replace(scene, step_size=step_size, steps=int(shared.pop("steps", scene.steps)))
+    solver = replace(sweep.solver, **shared)
+    listing = None
+    if solver.program is not None:
+        listing = listing_of(solver.program, solver.listing, solver.reading)
+    if "t_end" in own:
+        t_end = own["t_end"]
+    else:
+        given = scene.step_size * scene.steps if solver.t_end is None else solver.t_end
+        t_end = np.full(n, given)
+    body, values = _body(scene, own, n)
+    law = scene.torque
+    return Load(
+        scene,
+        solver,
+        listing,
+        omega0=_omega(scene, own, values if body == "moments" else None, n),
+        t_end=t_end,
+        torque_constant=_three("torque.constant", law.constant, own, n),
+        torque_rate=_three("torque.rate", law.rate, own, n),
+        **({body: values} if body else {}),
+    )
+
+
+def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
+    """Return three numbers for each scene; None where the base has them for all."""
+    fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
+    if not any(field in own for field in fields):
+        return None
+    columns = [own.get(field, np.full(n, base[axis])) for axis, field in enumerate(fields)]
+    return np.stack(columns, axis=1)
+
+
+def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
+    """Return by what the bodies are given, and how; nothing where it is the scene's for all."""
+    if scene.coefficients is not None:
+        found = _three("body.coefficients", scene.coefficients, own, n)
+        return ("coefficients", found) if found is not None else ("", None)
+    assert scene.moments is not None
+    first, second, third = scene.moments
+    if "body.ratio.1" in own or "body.ratio.2" in own:
+        ratio1 = own.get("body.ratio.1", np.full(n, first / third))
+        ratio2 = own.get("body.ratio.2", np.full(n, second / third))
+        return "moments", np.stack([ratio1 * third, ratio2 * third, np.full(n, third)], axis=1)
+    if "body.square.1" in own or "body.square.2" in own:
+        middle = own.get("body.square.1", np.ones(n))
+        least = own.get("body.square.2", np.ones(n))
+        # Integrals of x^2, y^2, z^2 over the mass, the largest 1; every real body has three.
+        x2, y2, z2 = np.ones(n), middle, middle * least
+        size = max(scene.moments) / (x2 + y2)
+        return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
+    found = _three("body.moments", scene.moments, own, n)
+    return ("moments", found) if found is not None else ("", None)
+
+
+def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
+    cartesian = _three("omega", scene.omega, own, n)
+    if cartesian is not None:
+        return cartesian
+    start = np.array(scene.omega)
+    length = float(np.linalg.norm(start))
+    magnitude = own.get("omega.magnitude", np.full(n, length))
+    if "tilt" in own or "azimuth" in own:
+        zero = np.zeros(n)
+        unit = _tilted(scene, moments, own.get("tilt", zero), own.get("azimuth", zero))
+        return magnitude[:, None] * unit
+    if "omega.magnitude" in own:
+        return magnitude[:, None] * (start / length)
+    return np.tile(start, (n, 1))
+
+
+def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
+    """Return unit vectors at angles from the axis of the middle moment."""
+    bodies = np.array([scene.moments]) if moments is None else moments
+    order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
+    sine = np.sin(tilt)
+    found = np.empty((len(tilt), 3))
+    for rank, column in enumerate((sine * np.cos(azimuth), np.cos(tilt), sine * np.sin(azimuth))):
+        np.put_along_axis(found, order[:, rank : rank + 1], column[:, None], axis=1)
+    return found

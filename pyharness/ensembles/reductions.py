@@ -1,0 +1,261 @@
+"""Reductions: what is kept of each scene. One function each, and what is so of it."""
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.ensembles.one_by_one import STATUSES
+from pyharness.ensembles.solved import Solved
+from pyharness.ensembles.sweep import Asked
+from pyharness.model.codes import Statuses
+from pyharness.model.trajectory import STOP_VARIABLES, Array
+
+Found = NDArray[Any]
+# The axes of a body, by their moments.
+RANKS = ("least", "middle", "largest")
+# What an integer array holds where no scene has been computed yet.
+_NOT_YET = -1
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What is kept of each scene, and who can give it.
+
+    Attributes
+    ----------
+    title, units : str
+        In words; the unit of its numbers.
+    compute : callable
+        From what was solved, and the parameters by name, to n values.
+    dtype : str
+        Of the array; NaN, or -1 in whole numbers, stands where nothing is computed yet.
+    labels : tuple of str
+        Of the last dimension, `dimension`, where a scene has several values.
+    only : str
+        `program` or `method` where the other can't give it.
+    needs : tuple of str
+        What of `moments` and `no torque` it needs.
+    parameters : mapping
+        Names, and their default values.
+    flags : mapping
+        Words for its values, by value.
+    """
+
+    title: str
+    units: str
+    compute: Callable[[Solved, Mapping[str, Any]], Found]
+    dtype: str = "f8"
+    labels: tuple[str, ...] = ()
+    dimension: str = ""
+    only: str = ""
+    needs: tuple[str, ...] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    flags: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def fill(self) -> Any:
+        """What stands where nothing is computed yet."""
+        return np.nan if self.dtype == "f8" else _NOT_YET
+
+
+def _end(solved: Solved, _: Mapping[str, Any]) -> Found:
+    return solved.omega
+
+
+def _status(solved: Solved, _: Mapping[str, Any]) -> Found:
+    return solved.status
+
+
+def _error(solved: Solved, given: Mapping[str, Any]) -> Found:
+    samples = given["samples"]
+    rows = solved.rows(samples)
+    steps = solved.load.scene.steps
+    largest = np.abs(solved.omega0).max(axis=1)
+    worst = np.zeros(len(rows))
+    for i in range(samples):
+        # A program's rows lie at whole steps.
+        part = solved.sample_steps(samples)[i] / steps if solved.is_program else (i + 1) / samples
+        truth = solved.by_method(given["against"], given["tolerance"], part)
+        largest = np.fmax(largest, np.abs(truth).max(axis=1))
+        worst = np.maximum(worst, np.abs(rows[:, i] - truth).max(axis=1))
+    found: Found = worst / largest
+    return found
+
+
+def _stop_step(solved: Solved, _: Mapping[str, Any]) -> Found:
+    return np.where(solved.status == Statuses.STOPPED, solved.n_rows, 0)
+
+
+def _stop_variable(solved: Solved, _: Mapping[str, Any]) -> Found:
+    return solved.stop_variable
+
+
+def _overflow_time(solved: Solved, _: Mapping[str, Any]) -> Found:
+    # Of the first step that gave no finite row.
+    time = (solved.n_rows + 1) * solved.load.scene.step_size
+    return np.where(solved.status == Statuses.OVERFLOW, time, np.nan)
+
+
+def _drift(solved: Solved, given: Mapping[str, Any]) -> Found:
+    bodies = solved.load.bodies[:, None, :]
+    start = solved.omega0[:, None, :]
+    rows = solved.rows(given["samples"])
+    found = []
+    for weight in (bodies, bodies**2):
+        then, before = (weight * rows**2).sum(axis=2), (weight * start**2).sum(axis=2)
+        found.append(np.abs(then - before).max(axis=1) / before[:, 0])
+    return np.stack(found, axis=1)
+
+
+def _claim(solved: Solved, given: Mapping[str, Any]) -> Found:
+    room, _, name = given["function"].partition(":")
+    judge = getattr(importlib.import_module(room), name)
+    return np.asarray(judge(solved))
+
+
+def _largest_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
+    start, rows = _unit(solved.omega0)[:, None, :], _unit(solved.rows(given["samples"]))
+    # Of two unit vectors; the arc cosine would lose half of the digits of a small angle.
+    angles: Found = 2.0 * np.arctan2(
+        np.linalg.norm(rows - start, axis=2), np.linalg.norm(rows + start, axis=2)
+    )
+    largest: Found = angles.max(axis=1)
+    return largest
+
+
+def _axis_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
+    squares = solved.attitudes(given["samples"]) ** 2
+    axis = np.argsort(solved.load.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
+    column = np.broadcast_to(axis, (len(squares),))
+    is_own = np.arange(3) == column[:, None, None]
+    # The squares of the half angle's cosine and sine.
+    along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
+    across = np.where(is_own, 0.0, squares[:, :, 1:]).sum(axis=2)
+    largest: Found = 2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)).max(axis=1)
+    return largest
+
+
+def _flips(solved: Solved, given: Mapping[str, Any]) -> Found:
+    middle = np.argsort(solved.load.bodies, axis=1, kind="stable")[:, 1]
+    column = np.broadcast_to(middle, (len(solved.omega0),))
+    rows = np.concatenate([solved.omega0[:, None, :], solved.rows(given["samples"])], axis=1)
+    component = np.take_along_axis(rows, column[:, None, None], axis=2)[:, :, 0]
+    below = component < 0.0
+    changes = (below[:, 1:] != below[:, :-1]) & np.isfinite(component[:, 1:])
+    count: Found = changes.sum(axis=1)
+    return count
+
+
+def _growth(solved: Solved, given: Mapping[str, Any]) -> Found:
+    start = solved.omega0
+    size = np.linalg.norm(start, axis=1, keepdims=True)
+    offset = given["offset"] * np.where(size > 0.0, size, 1.0)
+    moved = start + offset / np.sqrt(3.0)
+    before = np.linalg.norm(moved - start, axis=1)
+    after = np.linalg.norm(solved.from_start(moved).omega - solved.omega, axis=1)
+    rate: Found = np.log(after / before) / np.abs(solved.load.t_end)
+    return rate
+
+
+def _unit(vectors: Array) -> Array:
+    found: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return found
+
+
+_SAMPLES = {"samples": 100}
+REDUCTIONS = {
+    "end": Reduction(
+        "angular velocity at the end", "rad/s", _end, labels=("1", "2", "3"), dimension="component"
+    ),
+    "status": Reduction(
+        "how it ended", "1", _status, "i1", flags={code: name for name, code in STATUSES.items()}
+    ),
+    "error": Reduction(
+        "largest error of a component against a method, over the largest component",
+        "1",
+        _error,
+        parameters={"against": "auto", "tolerance": 1e-14, "samples": 1},
+    ),
+    "stop-step": Reduction(
+        "step at which the stop test ended it; 0: it did not",
+        "1",
+        _stop_step,
+        "i4",
+        only="program",
+    ),
+    "stop-variable": Reduction(
+        "variable that ended it",
+        "1",
+        _stop_variable,
+        "i1",
+        only="program",
+        flags={0: "none", **dict(enumerate(STOP_VARIABLES, 1))},
+    ),
+    "overflow-time": Reduction(
+        "time of the first step without a finite result", "s", _overflow_time, only="program"
+    ),
+    "drift": Reduction(
+        "largest change of energy and of squared angular momentum, relative",
+        "1",
+        _drift,
+        labels=("energy", "momentum"),
+        dimension="invariant",
+        needs=("moments", "no torque"),
+        parameters={"samples": 10},
+    ),
+    "claim": Reduction(
+        "whether a claim holds; 2: it says nothing of the scene",
+        "1",
+        _claim,
+        "i1",
+        parameters={"id": ""},
+        flags={0: "fails", 1: "holds", 2: "silent"},
+    ),
+    "largest-tilt": Reduction(
+        "largest angle of the angular velocity from where it was",
+        "rad",
+        _largest_tilt,
+        parameters=_SAMPLES,
+    ),
+    "axis-tilt": Reduction(
+        "largest angle in space of a body's axis from where it was",
+        "rad",
+        _axis_tilt,
+        only="method",
+        needs=("moments", "attitude"),
+        parameters={**_SAMPLES, "of": "middle"},
+    ),
+    "flips": Reduction(
+        "changes of sign of the component about the middle axis",
+        "1",
+        _flips,
+        "i4",
+        needs=("moments",),
+        parameters=_SAMPLES,
+    ),
+    "growth": Reduction(
+        "logarithm of the growth of a small difference, over the time",
+        "1/s",
+        _growth,
+        parameters={"offset": 1e-6},
+    ),
+}
+
+
+def empty(asked: Asked, n: int) -> Found:
+    """Return the array of n scenes of which nothing is computed yet."""
+    reduction = REDUCTIONS[asked.reduction]
+    shape = (n, len(reduction.labels)) if reduction.labels else (n,)
+    return np.full(shape, reduction.fill, dtype=reduction.dtype)
+
+
+def reduced(asked: Asked, solved: Solved) -> Found:
+    """Return what is kept of a load."""
+    given = {**dict(asked.parameters), "function": asked.function}
+    # What left the range of numbers stays what it is.
+    with np.errstate(all="ignore"):
+        return REDUCTIONS[asked.reduction].compute(solved, given)

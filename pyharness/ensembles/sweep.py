@@ -1,0 +1,194 @@
+"""A sweep: a scene, the axes of a grid, what solves it, what is kept, and how it is cut."""
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.ensembles.axes import Axis
+from pyharness.model.scene import Scene
+
+Arrays = dict[str, NDArray[Any]]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Solver:
+    """What solves, where no axis says so.
+
+    Exactly one of `method` and `program` is given. `t_end` is None where the scene's steps say it.
+    """
+
+    method: str | None = "auto"
+    program: str | None = None
+    tolerance: float = 1e-12
+    t_end: float | None = None
+    listing: str = "original"
+    reading: str = "adopted"
+    lipschitz: float = 500.0
+    may_stop: bool = True
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A reduction asked for, under the name of its array.
+
+    `function` is where the one of a claim stands, as in ``package.module:name``; else empty.
+    """
+
+    name: str
+    reduction: str
+    parameters: tuple[tuple[str, Any], ...] = ()
+    function: str = ""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """All of a sweep file.
+
+    Attributes
+    ----------
+    name : str
+        Of the sweep.
+    scene : Scene
+        What everything not on an axis is taken from.
+    axes : tuple of Axis
+        In the order of the file.
+    solver : Solver
+        What solves.
+    reductions : tuple of Asked
+        What is kept.
+    chunk : int
+        The most scenes in a chunk.
+    text, fingerprint : str
+        The file's text, and the SHA-256 of that and of what it refers to.
+    """
+
+    name: str
+    scene: Scene
+    axes: tuple[Axis, ...]
+    solver: Solver
+    reductions: tuple[Asked, ...]
+    chunk: int
+    text: str
+    fingerprint: str
+
+    @property
+    def dimensions(self) -> dict[str, int]:
+        """Name and length of each dimension of the grid, in the order of the file."""
+        return {axis.dimension: axis.count for axis in self.axes}
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the dimensions."""
+        return tuple(self.dimensions.values())
+
+    @property
+    def n_scenes(self) -> int:
+        """How many scenes."""
+        return math.prod(self.shape)
+
+    @property
+    def chunk_shape(self) -> tuple[int, ...]:
+        """Lengths of a chunk: the last dimensions whole, one cut, one by one before it.
+
+        A chunk never holds two programs, methods, listings or readings.
+        """
+        single = {axis.dimension for axis in self.axes if axis.is_choice}
+        room = self.chunk
+        lengths = []
+        for dimension, count in reversed(self.dimensions.items()):
+            length = 1 if dimension in single else min(count, room)
+            room = max(1, room // length) if length == count or dimension in single else 1
+            lengths.append(length)
+        return tuple(reversed(lengths))
+
+    @property
+    def chunk_counts(self) -> tuple[int, ...]:
+        """How many chunks along each dimension."""
+        return tuple(-(-n // c) for n, c in zip(self.shape, self.chunk_shape, strict=True))
+
+    @property
+    def n_chunks(self) -> int:
+        """How many chunks."""
+        return math.prod(self.chunk_counts)
+
+    def place(self, chunk: int) -> tuple[int, ...]:
+        """Return where a chunk stands among the chunks, from 0."""
+        return tuple(int(each) for each in np.unravel_index(chunk, self.chunk_counts))
+
+    def box(self, chunk: int) -> tuple[slice, ...]:
+        """Return the part of the grid that a chunk is."""
+        return tuple(
+            slice(at * length, min(n, (at + 1) * length))
+            for at, length, n in zip(self.place(chunk), self.chunk_shape, self.shape, strict=True)
+        )
+
+
+def points(sweep: Sweep, box: tuple[slice, ...]) -> list[Indices]:
+    """Return for each dimension the indices of all scenes of a box, the last running fastest."""
+    ranges = [np.arange(part.start, part.stop) for part in box]
+    return [each.ravel() for each in np.meshgrid(*ranges, indexing="ij")]
+
+
+def spread(sweep: Sweep, count: int) -> list[Indices]:
+    """Return the indices of some `count` scenes from all over the grid, the ends among them."""
+    # Python's whole numbers: a grid may have more scenes than 64 bits count.
+    total = sweep.n_scenes
+    count = min(count, total)
+    flat = [i * (total - 1) // max(1, count - 1) for i in range(count)]
+    found: list[list[int]] = []
+    rest = flat
+    for length in reversed(sweep.shape):
+        found.append([each % length for each in rest])
+        rest = [each // length for each in rest]
+    return [np.array(each, dtype=np.int64) for each in reversed(found)]
+
+
+def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
+    """Return the arrays of a chunk, by name: what a task of any executor is."""
+    box = sweep.box(chunk)
+    shape = tuple(part.stop - part.start for part in box)
+    found = solve_points(sweep, points(sweep, box))
+    return {name: each.reshape(*shape, *each.shape[1:]) for name, each in found.items()}
+
+
+def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
+    """Return the arrays of scenes, given by an array of indices for each dimension."""
+    from pyharness.ensembles.loads import loads
+    from pyharness.ensembles.reductions import empty, reduced
+    from pyharness.ensembles.solved import Solved
+
+    n = len(where[0])
+    found = {asked.name: empty(asked, n) for asked in sweep.reductions}
+    for members, load in loads(sweep, where):
+        solved = Solved(load)
+        for asked in sweep.reductions:
+            found[asked.name][members] = reduced(asked, solved)
+    return found
+
+
+def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
+    """Return the values of every axis at scenes, by field."""
+    at = dict(zip(sweep.dimensions, where, strict=True))
+    return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
+
+
+def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
+    """Return the members of each distinct row of columns, and the row; in order of appearance."""
+    if not columns:
+        return [(np.arange(n), ())]
+    numbered = [np.unique(column, return_inverse=True) for column in columns]
+    codes = np.stack([inverse for _, inverse in numbered])
+    rows, member_of = np.unique(codes, axis=1, return_inverse=True)
+    order = np.argsort(member_of.ravel(), kind="stable")
+    cuts = np.cumsum(np.bincount(member_of.ravel()))
+    starts = itertools.chain([0], cuts[:-1].tolist())
+    values = [tuple(u[code] for (u, _), code in zip(numbered, row, strict=True)) for row in rows.T]
+    return [
+        (order[start:stop], value)
+        for start, stop, value in zip(starts, cuts.tolist(), values, strict=True)
+    ]

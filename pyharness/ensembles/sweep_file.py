@@ -1,0 +1,245 @@
+"""Sweep files: TOML in, a sweep out, checked once."""
+
+import hashlib
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pyharness.ensembles.asked import asked_of
+from pyharness.ensembles.axes import Axis, axis_of
+from pyharness.ensembles.fields import CHOICES, RIVALS
+from pyharness.ensembles.loads import listing_of
+from pyharness.ensembles.reductions import REDUCTIONS
+from pyharness.ensembles.sweep import Solver, Sweep
+from pyharness.methods.prepared import PREPARED
+from pyharness.methods.registry import REGISTRY
+from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.scene_file import case_scene, check_keys, read_scene, read_toml, scene_of
+from pyharness.model.values import finite, number, truth, whole
+
+_KEYS = ("name", "scene", "axis", "solve", "reductions", "chunk")
+_SOLVE = (
+    *("method", "tolerance", "t_end"),
+    *("program", "listing", "reading", "lipschitz", "may_stop"),
+)
+CHUNK = 100_000
+_MOST_IN_CHUNK = 1_000_000
+_MOST_AXES = 12
+# What carries attitudes of many bodies.
+_WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
+
+
+def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = None) -> Sweep:
+    """Return the sweep of a TOML file.
+
+    Parameters
+    ----------
+    path : path
+        Of the file. A scene file named in it is looked for beside it.
+    claims : mapping, optional
+        Where the function of each claim stands, as in ``package.module:name``. It takes what was
+        `Solved` of n scenes, and returns 1 for each that the claim holds of, 0 where it fails, 2
+        where it says nothing.
+
+    Raises
+    ------
+    InputError
+        Where the file can't be read, or describes no sweep.
+    """
+    path = os.fsdecode(path)
+    where = f"sweep file '{path}'"
+    data = read_toml(path, where)
+    try:
+        text = Path(path).read_bytes().decode("utf-8-sig")
+        return _sweep(data, Path(path), text, claims or {})
+    except (InputError, OSError) as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str]) -> Sweep:
+    check_keys(data, _KEYS, "top level")
+    name = data.get("name", path.stem)
+    if not isinstance(name, str):
+        raise InputError(f"name is {kind_of(name)}; it must be text")
+    scene, more = _scene(data.get("scene", {}), path)
+    tables = data.get("axis", [])
+    if not isinstance(tables, list) or not tables:
+        raise InputError("axis is missing; give at least one table [[axis]]")
+    if len(tables) > _MOST_AXES:
+        raise InputError(f"axis: {len(tables)} of them; allowed: up to {_MOST_AXES}")
+    axes = tuple(axis_of(table, number) for number, table in enumerate(tables, 1))
+    solver = _solver(data.get("solve", {}), axes)
+    _check_axes(axes, scene, solver)
+    entries = data.get("reductions", ["end", "status"])
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"reductions is {kind_of(entries)}; allowed: a list, not empty")
+    reductions = tuple(asked_of(each, claims) for each in entries)
+    chunk = whole("chunk", data.get("chunk", CHUNK))
+    if not 1 <= chunk <= _MOST_IN_CHUNK:
+        raise InputError(f"chunk is {chunk}; allowed: 1 to {_MOST_IN_CHUNK} scenes")
+    digest = hashlib.sha256(text.encode() + more).hexdigest()
+    sweep = Sweep(name, scene, axes, solver, reductions, chunk, text, digest)
+    _check_reductions(sweep)
+    _check_solvers(sweep)
+    return sweep
+
+
+def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
+    """Return the scene that all others are made from, and what it was read from beside the file."""
+    if not isinstance(table, dict):
+        raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
+    given = [key for key in ("case", "file") if key in table]
+    if given and len(table) > 1:
+        raise InputError("[scene]: allowed: case, or file, or the tables of a scene file")
+    if given == ["case"]:
+        return case_scene(table["case"]), b""
+    if given == ["file"]:
+        if not isinstance(table["file"], str):
+            raise InputError(f"[scene] file is {kind_of(table['file'])}; it must be text")
+        beside = path.parent / table["file"]
+        scene = read_scene(beside)
+        return checked_scene(scene), b"\0" + beside.read_bytes()
+    if not table:
+        raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
+    return checked_scene(scene_of(table, path.stem)), b""
+
+
+def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
+    if not isinstance(table, dict):
+        raise InputError(f"solve is {kind_of(table)}; it must be a table [solve]")
+    check_keys(table, _SOLVE, "[solve]")
+    values = {axis.field: axis.values[0] for axis in axes if axis.is_choice}
+    for field in values:
+        if field in table:
+            raise InputError(f"[solve] {field}: an axis varies it; give it once")
+    given = {**table, **values}
+    fields = {axis.field for axis in axes}
+    for key in CHOICES:
+        if not isinstance(given.get(key, ""), str):
+            raise InputError(f"[solve] {key} is {kind_of(given[key])}; it must be text")
+    program = given.get("program")
+    if program is None:
+        for key in ("program", "listing", "reading", "lipschitz", "may_stop"):
+            if key in given or key in fields:
+                raise InputError(f"{key} has no meaning without a program; give [solve] program")
+        return Solver(
+            method=given.get("method", "auto"),
+            tolerance=number("[solve] tolerance", given.get("tolerance", 1e-12)),
+            t_end=finite("[solve] t_end", given["t_end"]) if "t_end" in given else None,
+        )
+    for key in ("method", "tolerance", "t_end"):
+        if key in given or key in fields:
+            raise InputError(f"{key} has no meaning with a program; it goes in the scene's steps")
+    lipschitz = number("[solve] lipschitz", given.get("lipschitz", 500.0))
+    if not lipschitz >= 0.0:
+        raise InputError(f"[solve] lipschitz is {lipschitz:g}; allowed: a number from 0")
+    return Solver(
+        method=None,
+        program=program,
+        listing=given.get("listing", "original"),
+        reading=given.get("reading", "adopted"),
+        lipschitz=lipschitz,
+        may_stop=truth("[solve] may_stop", given.get("may_stop", True)),
+    )
+
+
+def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
+    fields = [axis.field for axis in axes]
+    lengths: dict[str, Axis] = {}
+    for axis in axes:
+        if fields.count(axis.field) > 1:
+            raise InputError(f"{axis.field}: two axes vary it; give it one")
+        other = lengths.setdefault(axis.dimension, axis)
+        if other.count != axis.count:
+            raise InputError(
+                f"dimension {axis.dimension}: {other.field} has {other.count} values and "
+                f"{axis.field} {axis.count}; allowed: as many"
+            )
+        along = [each.field for each in axes if each.dimension == axis.dimension]
+        if axis.dimension in fields and axis.dimension not in along:
+            raise InputError(f"dimension {axis.dimension}: a field on another axis is called so")
+    for ours, theirs in RIVALS:
+        one = [each for each in fields if each.startswith(ours)]
+        two = [each for each in fields if each.startswith(theirs)]
+        if one and two:
+            raise InputError(f"{one[0]} beside {two[0]}: allowed: one of them")
+    for field in fields:
+        by_coefficients = scene.coefficients is not None
+        if field.startswith("body.") and by_coefficients != ("coefficients" in field):
+            has = "coefficients" if by_coefficients else "moments"
+            raise InputError(f"axis {field}: the scene's body is given by {has}")
+        if field in ("tilt", "azimuth") and scene.moments is None:
+            raise InputError(f"axis {field}: the body is given by coefficients; it takes moments")
+        if field == "omega.magnitude" and not any(scene.omega) and "tilt" not in fields:
+            raise InputError(f"axis {field}: the scene's omega is 0 and has no direction")
+        if field == "lipschitz" and solver.program is None:
+            raise InputError(f"axis {field} has no meaning without a program")
+
+
+def _check_reductions(sweep: Sweep) -> None:
+    kind = "method" if sweep.solver.program is None else "program"
+    names = [asked.name for asked in sweep.reductions]
+    taken = {*sweep.dimensions, *(axis.field for axis in sweep.axes)}
+    for asked in sweep.reductions:
+        if names.count(asked.name) > 1:
+            raise InputError(f"reductions: two are called {asked.name}; give one another 'as'")
+        reduction = REDUCTIONS[asked.reduction]
+        if asked.name in taken or asked.name in ("component", "invariant"):
+            raise InputError(f"reductions: {asked.name} is the name of an axis; give another 'as'")
+        if reduction.dimension in taken:
+            raise InputError(f"dimension {reduction.dimension}: {asked.name} has one called so")
+        if reduction.only not in ("", kind):
+            raise InputError(
+                f"reductions: {asked.reduction} is not what a {kind} can give; allowed with a "
+                f"{kind}: {', '.join(_given_by(kind))}"
+            )
+        for method in _choices(sweep, "method", sweep.solver.method):
+            if "attitude" in reduction.needs and method not in _WITH_ATTITUDE:
+                raise InputError(
+                    f"reductions: {asked.reduction} is not what {method} can give; allowed: "
+                    f"{', '.join(_WITH_ATTITUDE)}"
+                )
+        if "moments" in reduction.needs and sweep.scene.moments is None:
+            raise InputError(f"reductions: {asked.reduction} takes a body of moments")
+        torque = any(axis.field.startswith("torque") for axis in sweep.axes)
+        if "no torque" in reduction.needs and (torque or not sweep.scene.torque.is_zero):
+            raise InputError(
+                f"reductions: {asked.reduction} says nothing under a torque, which changes both"
+            )
+
+
+def _given_by(kind: str) -> list[str]:
+    return [name for name, each in REDUCTIONS.items() if each.only in ("", kind)]
+
+
+def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
+    for axis in sweep.axes:
+        if axis.field == field:
+            return [str(each) for each in axis.values]
+    return [] if default is None else [default]
+
+
+def _check_solvers(sweep: Sweep) -> None:
+    """Refuse a name that is no program, method, listing or reading, and what can't be combined."""
+    solver = sweep.solver
+    for program in _choices(sweep, "program", solver.program):
+        if program not in PROGRAMS:
+            raise unknown("program", program, PROGRAMS)
+        for listing in _choices(sweep, "listing", solver.listing):
+            for reading in _choices(sweep, "reading", solver.reading):
+                listing_of(program, listing, reading)
+    varied = [axis for axis in sweep.axes if axis.field == "tolerance"]
+    for method in _choices(sweep, "method", solver.method):
+        if method not in REGISTRY:
+            raise unknown("method", method, REGISTRY)
+        finest = REGISTRY[method].finest
+        given = [float(varied[0].coordinates().min())] if varied else [solver.tolerance]
+        if not REGISTRY[method].is_fixed_step and not all(finest <= each <= 1.0 for each in given):
+            raise InputError(f"tolerance is {given[0]:g}; allowed for {method}: {finest:.2g} to 1")
+    if solver.t_end == 0.0 or any(
+        axis.field == "t_end" and not axis.coordinates().all() for axis in sweep.axes
+    ):
+        raise InputError("t_end is 0; allowed: times on either side of it")

@@ -1,0 +1,114 @@
+"""`sweep`: its output, its picture, and mistakes in one line that lose nothing."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.cli.verbs import sweep as verb
+from tests.conftest import Printed
+from tests.ensembles.claims import CLAIMS
+from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, files, text, written
+
+Capture = pytest.CaptureFixture[str]
+HUGE = "\n".join(
+    f'[[axis]]\nfield = "omega.{axis}"\nfrom = 1.0\nto = 2.0\ncount = 100000' for axis in (1, 2, 3)
+)
+
+
+@pytest.fixture(autouse=True)
+def _beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, text(TILT, SQUARE, top='reductions = ["end", "status", "growth"]'))
+
+
+def test_report_says_what_was_found_and_the_estimate_came_before(capsys: Capture) -> None:
+    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err.startswith("pyharness: 30 scenes in 1 chunks: about ")
+    for words in ("growth", "complete", "body.square.1", "30 scenes"):
+        assert words in captured.out
+    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
+    again = capsys.readouterr()
+    assert again.err == ""
+    assert "all 1 chunks were there" in again.out
+
+
+def test_record_is_strict_json(printed: Printed) -> None:
+    record = json.loads(printed("sweep sweep.toml --out store --format json"))
+    assert record["schema"] == 1
+    assert record["scenes"] == 30
+    assert [each["field"] for each in record["axes"]] == ["tilt", "body.square.1"]
+    assert record["counts"] == [{"reduction": "status", "value": "complete", "scenes": 30}]
+    assert "reduction,of,scenes" in printed("sweep sweep.toml --out store --format csv")
+
+
+@pytest.mark.parametrize("content", [text(TILT, SQUARE), text(TILT), PROGRAM])
+def test_picture_is_drawn_with_its_numbers(content: str, printed: Printed, tmp_path: Path) -> None:
+    written(tmp_path, content)
+    printed("sweep sweep.toml --out store --plot map.svg")
+    assert (tmp_path / "map.svg").read_text().startswith("<?xml")
+    lines = (tmp_path / "map.csv").read_text().splitlines()
+    assert len(lines) > 6
+    assert "end" in lines[0]
+    printed("sweep sweep.toml --out store --plot status.png --quantity status")
+    assert "status" in (tmp_path / "status.csv").read_text().splitlines()[0]
+
+
+def test_claim_is_asked_by_its_name(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verb, "CLAIMS", CLAIMS)
+    top = 'reductions = [{name = "claim", id = "stays"}]'
+    written(Path(), text(TILT, top=top))
+    assert "holds" in printed("sweep sweep.toml --out store")
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    {
+        "sweep": "give a sweep file",
+        "sweep sweep.toml": "give --out STORE",
+        "sweep nowhere.toml --out store": "No such file",
+        "sweep sweep.toml --out nowhere/store": "can't be made",
+        "sweep sweep.toml --out sweep.toml": "is not a folder",
+        "sweep sweep.toml --out made": "is the store of another sweep file",
+        "sweep sweep.toml --out store --executor cluster": "unknown executor 'cluster'",
+        "sweep sweep.toml --out store --scheduler a:1": "no meaning with --executor here",
+        "sweep sweep.toml --out store --executor dask --scheduler 127.0.0.1:1": "nobody answers",
+        "sweep sweep.toml --out store --workers 2": "no meaning with --executor here",
+        "sweep sweep.toml --out store --executor processes --workers 0": "allowed: 1 to",
+        "sweep sweep.toml --out store --quantity end": "no meaning without --plot",
+        "sweep sweep.toml --out store --quantity x --plot a.png": "unknown reduction 'x'",
+        "sweep sweep.toml --out store --plot a.bmp": "unknown picture format",
+        "sweep huge.toml --out store": "1e+15 scenes",
+        "sweep axis.toml --out store": "did you mean 'omega.1'",
+        "sweep stop.toml --out store": "not what a method can give",
+    }.items(),
+)
+def test_mistake_is_one_line_and_loses_nothing(
+    command: str, words: str, tmp_path: Path, capsys: Capture
+) -> None:
+    written(tmp_path, text(TILT), "other.toml")
+    written(tmp_path, text(HUGE), "huge.toml")
+    written(tmp_path, text(TILT.replace("tilt", "omega1")), "axis.toml")
+    written(tmp_path, text(TILT, top='reductions = ["stop-step"]'), "stop.toml")
+    assert main(["sweep", "other.toml", "--out", "made"]) == 0
+    before = files(tmp_path)
+    capsys.readouterr()
+    assert main(command.split()) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert words in captured.err
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize(("package", "options"), [("zarr", ""), ("distributed", "dask")])
+def test_missing_package_is_named(
+    package: str, options: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    more = ["--executor", options] if options else []
+    assert main([*["sweep", "sweep.toml", "--out", "store"], *more]) == 2
+    assert "pip install 'pyharness[sweep]'" in capsys.readouterr().err

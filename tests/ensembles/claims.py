@@ -1,0 +1,17 @@
+"""What stands for a claim in the tests."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.ensembles.solved import Solved
+
+CLAIMS = {"stays": "tests.ensembles.claims:stays"}
+
+
+def stays(solved: Solved) -> NDArray[Any]:
+    """Whether the middle component is at the end what it was, to a tenth; silent where it was 0."""
+    before = solved.omega0[:, 1]
+    holds = np.abs(solved.omega[:, 1] - before) <= 0.1 * np.abs(before)
+    return np.where(before == 0.0, 2, holds)

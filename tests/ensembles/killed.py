@@ -1,0 +1,131 @@
+"""A sweep killed at half way and resumed: ``python -m tests.ensembles.killed 10000000``."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.ensembles.sweeps import files
+
+_PATIENCE = 600.0  # s
+_ATTEMPTS = 5
+SWEEP = """
+chunk = {chunk}
+reductions = ["end", "status", "growth"]
+[scene]
+case = 3
+[solve]
+t_end = {t_end}
+[[axis]]
+field = "omega.1"
+draw = "normal"
+mean = 0.0
+deviation = 1.0
+seed = 1
+count = {count}
+[[axis]]
+field = "omega.3"
+from = -10.0
+to = 10.0
+count = 100
+"""
+
+
+@dataclass(frozen=True)
+class Killed:
+    """What came of it: chunks in all, done when it was killed, and what was wrong then."""
+
+    n_chunks: int
+    n_done: int
+    written_again: list[str]
+    different: list[str]
+
+
+def kill_and_resume(
+    folder: Path, scenes: int, chunk: int, t_end: float = 1.0, executor: str = "here"
+) -> Killed:
+    """Sweep once undisturbed, and once killed at half way and resumed; compare the bytes."""
+    path = folder / "sweep.toml"
+    path.write_text(SWEEP.format(chunk=chunk, count=scenes // 100, t_end=t_end))
+    whole, killed = folder / "whole.zarr", folder / "killed.zarr"
+    _finish(path, whole)
+    n_chunks = len(_done(whole))
+    # On a busy machine it may have ended before anyone looked.
+    for _ in range(_ATTEMPTS):
+        shutil.rmtree(killed, ignore_errors=True)
+        if _killed(_start(path, killed, executor), killed, n_chunks // 2):
+            break
+    before = {path: path.stat().st_mtime_ns for path in killed.rglob("*") if path.is_file()}
+    done = set.intersection(*({*_done(killed, name)} for name in ("end", "status", "growth")))
+    _finish(path, killed)
+    again = [
+        str(path)
+        for path, when in before.items()
+        if "c" in path.parts[len(killed.parts) :] and _place(path, killed) in done
+        if path.stat().st_mtime_ns != when
+    ]
+    one, other = files(whole), files(killed)
+    different = [name for name in one.keys() | other.keys() if one.get(name) != other.get(name)]
+    return Killed(n_chunks, len(done), again, different)
+
+
+def _killed(process: "subprocess.Popen[bytes]", store: Path, count: int) -> bool:
+    """Kill a sweep when so many chunks are done; return whether it was still at work then."""
+    end = time.monotonic() + _PATIENCE
+    while len(_done(store)) < count and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.001)
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+    return process.wait() == -signal.SIGKILL
+
+
+def _start(path: Path, store: Path, executor: str = "here") -> "subprocess.Popen[bytes]":
+    command = [sys.executable, "-m", "pyharness", "sweep", str(path), "--out", str(store)]
+    # A group of its own, so that its workers die with it.
+    return subprocess.Popen(
+        [*command, "--executor", executor],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def _finish(path: Path, store: Path) -> None:
+    if _start(path, store).wait(_PATIENCE) != 0:
+        raise AssertionError(f"the sweep of {path} did not end well")
+
+
+def _done(store: Path, name: str = "growth") -> list[tuple[str, ...]]:
+    """Return the places of the chunks of an array that are there."""
+    found = (store / name / "c").rglob("*") if (store / name / "c").is_dir() else ()
+    chunks = (each for each in found if each.is_file() and each.suffix != ".partial")
+    return [_place(each, store) for each in chunks]
+
+
+def _place(path: Path, store: Path) -> tuple[str, ...]:
+    # After the array's name and "c": two dimensions of the grid, and perhaps the component's.
+    return path.relative_to(store).parts[2:4]
+
+
+def main() -> int:
+    """Do it with so many scenes, and say what was seen."""
+    scenes = int(float(sys.argv[1])) if len(sys.argv) > 1 else 10_000_000
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.monotonic()
+        found = kill_and_resume(Path(folder), scenes, min(100_000, max(100, scenes // 100)))
+        size = sum(map(len, files(Path(folder) / "killed.zarr").values()))
+        print(f"{scenes} scenes, {found.n_chunks} chunks, {size / 1e6:.0f} MB")
+        print(f"killed when {found.n_done} were done")
+        print(f"chunks written again: {len(found.written_again)}")
+        print(f"files that differ from those of a sweep undisturbed: {len(found.different)}")
+        print(f"{time.monotonic() - begin:.0f} s")
+    return 1 if found.written_again or found.different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

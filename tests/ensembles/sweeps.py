@@ -1,0 +1,60 @@
+"""Sweep files of the tests."""
+
+from pathlib import Path
+
+BASE = """
+[scene.body]
+moments = [1.0, 2.0, 3.0]
+[scene.initial]
+omega = [0.0, 1.0, 0.0]
+[scene.run]
+step_size = 0.1
+steps = 100
+"""
+TILT = '[[axis]]\nfield = "tilt"\nfrom = 0.001\nto = 1.0\nspacing = "log"\ncount = 6\n'
+SQUARE = '[[axis]]\nfield = "body.square.1"\nfrom = 0.2\nto = 1.0\ncount = 5\n'
+PROGRAM = """
+chunk = 20
+reductions = ["end", "status", "stop-step", "stop-variable", "overflow-time", "error"]
+[scene]
+case = 3
+[solve]
+program = "runge-kutta"
+[[axis]]
+field = "listing"
+values = ["original", "corrected"]
+[[axis]]
+field = "omega.1"
+draw = "normal"
+mean = 1.0
+deviation = 0.3
+count = 12
+seed = 4
+[[axis]]
+field = "omega.3"
+draw = "uniform"
+from = -10.0
+to = 10.0
+count = 12
+seed = 4
+[[axis]]
+field = "step_size"
+values = [0.01, 0.02]
+"""
+
+
+def text(*axes: str, top: str = 'reductions = ["end", "status"]', scene: str = BASE) -> str:
+    """Return a sweep file of these axes."""
+    return "\n".join([top, scene, *axes])
+
+
+def written(folder: Path, content: str, name: str = "sweep.toml") -> str:
+    """Write a sweep file and return its path."""
+    (folder / name).write_text(content)
+    return str(folder / name)
+
+
+def files(store: Path) -> dict[str, bytes]:
+    """Return the content of every file of a store, by its path in it."""
+    found = (each for each in store.rglob("*") if each.is_file())
+    return {str(each.relative_to(store)): each.read_bytes() for each in found}

@@ -1,0 +1,122 @@
+"""Executors: the same bytes from each, and from those whose workers die."""
+
+import os
+import signal
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pyharness.ensembles import executors
+from pyharness.ensembles.executors import engine
+from pyharness.ensembles.run import run_sweep
+from pyharness.ensembles.sweep import Sweep, solve_chunk
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.errors import InputError
+from tests.ensembles.sweeps import PROGRAM, files, written
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture
+def sweep(tmp_path: Path) -> Sweep:
+    """Return a sweep of 48 scenes in 12 chunks."""
+    return read_sweep(written(tmp_path, PROGRAM.replace("chunk = 20", "chunk = 4")))
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    """Yield a cluster of two workers."""
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+    ) as found:
+        yield found
+
+
+@pytest.mark.parametrize("executor", ["processes", "dask"])
+def test_every_executor_writes_the_same_bytes(executor: str, sweep: Sweep, tmp_path: Path) -> None:
+    run_sweep(sweep, str(tmp_path / "here"))
+    run_sweep(sweep, str(tmp_path / "other"), executor, workers=2)
+    assert files(tmp_path / "here") == files(tmp_path / "other")
+
+
+def test_killed_worker_of_dask_costs_its_chunks_and_nothing_else(
+    cluster: Any, sweep: Sweep, tmp_path: Path
+) -> None:
+    run_sweep(sweep, str(tmp_path / "here"))
+    with distributed.Client(cluster) as client:
+        victim = next(iter(client.run(os.getpid).values()))
+    told: list[str] = []
+
+    def progress(text: str) -> None:
+        told.append(text)
+        if len(told) == sweep.n_chunks // 3:
+            os.kill(victim, signal.SIGKILL)
+
+    outcome = run_sweep(
+        sweep, str(tmp_path / "dask"), "dask", address=cluster.scheduler_address, progress=progress
+    )
+    assert outcome.computed == sweep.n_chunks == len(told)
+    with pytest.raises(ProcessLookupError):
+        os.kill(victim, 0)
+    assert files(tmp_path / "here") == files(tmp_path / "dask")
+
+
+def test_processes_are_started_once(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
+    by_pool, started = executors._by_pool, []
+
+    def counted(sweep: Sweep, chunks: list[int], workers: int) -> Any:
+        started.append(chunks)
+        return by_pool(sweep, chunks, workers)
+
+    monkeypatch.setattr(executors, "_by_pool", counted)
+    with engine("processes", 2) as own:
+        found = [chunk for chunk, _ in own.computed(sweep, list(range(sweep.n_chunks)))]
+    assert sorted(found) == started[0] == list(range(sweep.n_chunks))
+    assert len(started) == 1
+
+
+def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:
+    import multiprocessing
+
+    found = {}
+    with engine("processes", 2) as own:
+        results = own.computed(sweep, list(range(sweep.n_chunks)))
+        for chunk, arrays in results:
+            assert chunk not in found
+            found[chunk] = arrays
+            if len(found) == 3:
+                victim = multiprocessing.active_children()[0]
+                victim.kill()
+                victim.join()
+    assert sorted(found) == list(range(sweep.n_chunks))
+    for chunk, arrays in found.items():
+        for name, values in solve_chunk(sweep, chunk).items():
+            assert values.tobytes() == arrays[name].tobytes()
+
+
+def test_address_where_nobody_answers_is_refused_soon(sweep: Sweep, tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        port = silent.getsockname()[1]
+        for address, words in (
+            (f"127.0.0.1:{port}", "no Dask scheduler answers there"),
+            ("tcp://127.0.0.1:1", "nobody answers: Connection refused"),
+            ("somewhere", "no address"),
+            ("127.0.0.1:99999", "no address"),
+        ):
+            begin = time.monotonic()
+            with pytest.raises(InputError, match=words):
+                run_sweep(sweep, str(tmp_path / "store"), "dask", address=address)
+            assert time.monotonic() - begin < 10.0
+    assert not (tmp_path / "store").exists()
+
+
+def test_scheduler_without_workers_is_refused(sweep: Sweep, tmp_path: Path) -> None:
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty,
+        pytest.raises(InputError, match="it has no worker"),
+    ):
+        run_sweep(sweep, str(tmp_path / "store"), "dask", address=empty.scheduler_address)

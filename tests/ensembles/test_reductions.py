@@ -1,0 +1,175 @@
+"""Reductions: each against the motion itself, solved one scene at a time."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import case_scene, run_program, solve
+from pyharness.ensembles.loads import listing_of
+from pyharness.ensembles.reductions import REDUCTIONS
+from pyharness.ensembles.sweep import Sweep, solve_chunk
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.codes import Statuses
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import STOP_VARIABLES
+from tests.ensembles.claims import CLAIMS
+from tests.ensembles.sweeps import PROGRAM, TILT, text, written
+
+SAMPLES = 400
+
+
+def _found(folder: Path, content: str) -> tuple[Sweep, dict[str, Any]]:
+    sweep = read_sweep(written(folder, content), CLAIMS)
+    assert sweep.n_chunks == 1
+    return sweep, solve_chunk(sweep, 0)
+
+
+def _tilted(sweep: Sweep) -> list[Scene]:
+    tilts = sweep.axes[0].coordinates()
+    return [Scene("", (np.sin(t), np.cos(t), 0.0), moments=(1.0, 2.0, 3.0)) for t in tilts]
+
+
+def test_reductions_say_what_the_motion_does(tmp_path: Path) -> None:
+    asked = ", ".join(
+        f'{{name = "{name}", samples = {SAMPLES}}}' for name in ("largest-tilt", "flips", "drift")
+    )
+    top = f'reductions = ["end", "status", "error", {asked}]'
+    sweep, found = _found(tmp_path, text(TILT, top=top))
+    assert (found["status"] == Statuses.COMPLETE).all()
+    times = [10.0 * (i + 1) / SAMPLES for i in range(SAMPLES)]
+    for i, scene in enumerate(_tilted(sweep)):
+        rows = solve(scene, times, tolerance=1e-13).omega
+        assert np.allclose(found["end"][i], rows[-1], atol=1e-11)
+        both = np.concatenate([[scene.omega], rows])
+        cosines = rows @ np.array(scene.omega) / np.linalg.norm(rows, axis=1)
+        assert found["largest-tilt"][i] == pytest.approx(np.arccos(cosines).max(), abs=1e-6)
+        assert found["flips"][i] == (np.diff(np.sign(both[:, 1])) != 0).sum()
+    assert found["flips"].max() > 0
+    assert found["error"].max() < 1e-12
+    assert 0.0 < found["drift"].max() < 1e-12
+
+
+def test_axis_tilts_in_space_as_the_body_turns(tmp_path: Path) -> None:
+    asked = ", ".join(
+        f'{{name = "axis-tilt", of = "{axis}", samples = 50, as = "{axis}"}}'
+        for axis in ("least", "middle", "largest")
+    )
+    sweep, found = _found(tmp_path, text(TILT, top=f"reductions = [{asked}]"))
+    times = [10.0 * (i + 1) / 50 for i in range(50)]
+    for i, scene in enumerate(_tilted(sweep)):
+        matrices = solve(scene, times, attitude=True).rotation().as_matrix()
+        for axis, name in enumerate(("least", "middle", "largest")):
+            expected = np.arccos(np.clip(matrices[:, axis, axis], -1.0, 1.0)).max()
+            assert found[name][i] == pytest.approx(expected, abs=1e-6)
+    assert found["middle"].max() > 3.0
+
+
+def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:
+    top = 'reductions = ["drift", "error", {name = "error", samples = 4, as = "on-the-way"}]'
+    axis = '[[axis]]\nfield = "method"\nvalues = ["rk4", "improved-euler", "rk45"]'
+    sweep = read_sweep(written(tmp_path, text(axis, TILT, top=top, scene=_COARSE)))
+    found = [solve_chunk(sweep, chunk) for chunk in range(sweep.n_chunks)]
+    errors = [each["error"].max() for each in found]
+    assert errors[1] > 10.0 * errors[0] > 100.0 * errors[2] > 0.0
+    for each in found:
+        assert (each["on-the-way"] >= each["error"] * 0.9).all()
+    assert found[1]["drift"].max() > 10.0 * found[0]["drift"].max()
+    scene = Scene("", (np.sin(1.0), np.cos(1.0), 0.0), moments=(1, 2, 3), step_size=0.2, steps=50)
+    step = solve(scene, 10.0, "rk4", 1.0).omega[-1]
+    truth = solve(scene, 10.0, "reference", 1e-12).omega[-1]
+    expected = np.abs(step - truth).max()
+    assert found[0]["error"][0, -1] == pytest.approx(expected, rel=0.2)
+
+
+_COARSE = """
+[scene.body]
+moments = [1.0, 2.0, 3.0]
+[scene.initial]
+omega = [0.0, 1.0, 0.0]
+[scene.run]
+step_size = 0.2
+steps = 50
+[solve]
+tolerance = 1e-10
+"""
+
+
+def test_growth_is_that_of_the_middle_axis(tmp_path: Path) -> None:
+    axis = '[[axis]]\nfield = "t_end"\nvalues = [10.0, 15.0]'
+    _, found = _found(tmp_path, text(axis, top='reductions = ["growth"]'))
+    logarithms = found["growth"] * [10.0, 15.0]
+    # A small difference grows in the long run with the rate sqrt((I2 - I1) (I3 - I2) / (I1 I3)).
+    assert np.diff(logarithms) / 5.0 == pytest.approx(3.0**-0.5, rel=1e-3)
+
+
+def test_programs_stop_where_they_stop_alone(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM.replace("chunk = 20", "")))
+    kinds = set()
+    for chunk in range(sweep.n_chunks):
+        found = solve_chunk(sweep, chunk)
+        names = sweep.axes[0].coordinates()
+        listing = listing_of("runge-kutta", names[sweep.box(chunk)[0].start], "adopted")
+        for sample in (0, 5, 11):
+            for number, step_size in enumerate((0.01, 0.02)):
+                omega = (
+                    sweep.axes[1].coordinates()[sample],
+                    case_scene(3).omega[1],
+                    sweep.axes[2].coordinates()[sample],
+                )
+                scene = Scene("", omega, moments=case_scene(3).moments, step_size=step_size)
+                alone = run_program(scene, listing)
+                at = (0, sample, number)
+                stop = alone.stop
+                assert found["stop-step"][at] == (stop.step if stop else 0)
+                variable = 1 + STOP_VARIABLES.index(stop.variable) if stop else 0
+                assert found["stop-variable"][at] == variable
+                kinds.add(alone.ended)
+                if alone.ended == "complete":
+                    assert (found["end"][at] == alone.omega[-1]).all()
+                else:
+                    assert np.isnan(found["end"][at]).all()
+    assert kinds == {"complete", "stopped"}
+
+
+def test_overflow_has_its_time(tmp_path: Path) -> None:
+    scene = """
+[scene.body]
+coefficients = [1.0, 1.0, 1.0]
+[scene.initial]
+omega = [1.0, 1.0, 1.0]
+[scene.run]
+steps = 500
+[solve]
+program = "two-term"
+listing = "corrected"
+"""
+    axis = '[[axis]]\nfield = "omega.1"\nvalues = [1.0, 2.0]'
+    steps = '[[axis]]\nfield = "step_size"\nvalues = [0.001, 0.01]'
+    top = 'reductions = ["overflow-time", "status"]'
+    _, found = _found(tmp_path, text(axis, steps, top=top, scene=scene))
+    overflown = found["status"] == Statuses.OVERFLOW
+    assert overflown.tolist() == [[False, True], [False, True]]
+    assert (np.isfinite(found["overflow-time"]) == overflown).all()
+    assert found["overflow-time"][1, 1] < found["overflow-time"][0, 1]
+    # omega = 1 / (1 - t): the step sees it somewhat late.
+    assert 1.0 < found["overflow-time"][0, 1] < 1.3
+
+
+def test_claims_are_asked_by_name(tmp_path: Path) -> None:
+    top = 'reductions = [{name = "claim", id = "stays"}]'
+    axis = '[[axis]]\nfield = "omega.2"\nvalues = [0.0, 1.0, 5.0]'
+    other = '[[axis]]\nfield = "omega.1"\nvalues = [0.0, 0.5]'
+    _, found = _found(tmp_path, text(axis, other, top=top))
+    judged = found["claim-stays"]
+    assert judged.dtype == np.int8
+    assert judged[:, 0].tolist() == [2, 1, 1]
+    assert 0 in judged[:, 1]
+
+
+def test_every_reduction_has_words_for_people() -> None:
+    for reduction in REDUCTIONS.values():
+        assert reduction.title
+        assert reduction.units
+        assert bool(reduction.labels) == bool(reduction.dimension)

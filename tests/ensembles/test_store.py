@@ -1,0 +1,174 @@
+"""Stores: the same to the bit whatever interrupts, and nobody else's."""
+
+import errno
+import os
+import resource
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness.ensembles.run import run_sweep
+from pyharness.ensembles.store import opened
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.errors import InputError
+from tests.ensembles.killed import kill_and_resume
+from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, files, text, written
+
+
+@pytest.mark.parametrize("executor", ["here", "processes"])
+def test_killed_at_half_way_it_resumes_and_does_nothing_twice(
+    executor: str, tmp_path: Path
+) -> None:
+    found = kill_and_resume(tmp_path, 20_000, 200, t_end=3.0, executor=executor)
+    assert found.n_chunks == 100
+    assert found.n_chunks // 2 <= found.n_done < found.n_chunks
+    assert found.written_again == []
+    assert found.different == []
+
+
+def test_xarray_opens_it_without_a_warning(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    sweep = read_sweep(written(tmp_path, PROGRAM))
+    run_sweep(sweep, str(tmp_path / "store"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = xarray.open_zarr(tmp_path / "store")
+    assert found["end"].dims == ("listing", "sample", "step_size", "component")
+    assert found["listing"].values.tolist() == ["original", "corrected"]
+    assert found["omega.1"].dims == ("sample",)
+    assert "omega.1" in found.coords
+    assert found["omega.1"].attrs["units"] == "rad/s"
+    assert found["status"].attrs["flag_meanings"].split()[0] == "complete"
+    assert found.attrs["schema"] == 1
+    assert found.attrs["sweep"] == PROGRAM
+    one = found["stop-step"].sel(listing="original", step_size=0.01).values
+    assert one.shape == (12,)
+    assert (one >= 0).all()
+
+
+def test_draws_and_results_do_not_depend_on_the_chunks(tmp_path: Path) -> None:
+    found = []
+    for chunk in (20, 7, 1000):
+        content = PROGRAM.replace("chunk = 20", f"chunk = {chunk}")
+        sweep = read_sweep(written(tmp_path, content))
+        with opened_after(sweep, tmp_path / str(chunk)) as store:
+            found.append({name: store.array(name)[...] for name in ("end", "stop-step", "error")})
+    for other in found[1:]:
+        for name, values in found[0].items():
+            assert values.tobytes() == other[name].tobytes()
+
+
+def opened_after(sweep: Any, path: Path) -> Any:
+    run_sweep(sweep, str(path))
+    return opened(sweep, str(path))
+
+
+def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from zarr.storage import _local
+
+    sweep = read_sweep(written(tmp_path, PROGRAM.replace("chunk = 20", "chunk = 4")))
+    run_sweep(sweep, str(tmp_path / "whole"))
+    put, room = _local._put, [70]
+
+    def full(path: Path, value: Any, *more: Any, **options: Any) -> Any:
+        room[0] -= 1
+        if room[0] < 0:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.with_suffix(".0.partial").write_bytes(b"half")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return put(path, value, *more, **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(_local, "_put", full)
+        with pytest.raises(InputError, match="No space left on device; what is done stays"):
+            run_sweep(sweep, str(tmp_path / "full"))
+    with opened(sweep, str(tmp_path / "full")) as store:
+        done = store.done()
+    assert any(done)
+    assert not all(done)
+    outcome = run_sweep(sweep, str(tmp_path / "full"))
+    assert outcome.before == sum(done)
+    assert files(tmp_path / "full") == files(tmp_path / "whole")
+
+
+def test_files_that_may_not_grow_end_in_a_line(tmp_path: Path) -> None:
+    path = written(tmp_path, text(SQUARE, TILT.replace("count = 6", "count = 2000")))
+    command = [sys.executable, "-m", "pyharness", "sweep", path, "--out", str(tmp_path / "store")]
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+
+    found = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, check=False)
+    assert found.returncode == 2
+    assert "File too large; what is done stays" in found.stderr.splitlines()[-1]
+    assert "Traceback" not in found.stderr
+    subprocess.run(command, capture_output=True, check=True)
+
+
+def test_store_of_another_sweep_stays_as_it_was(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, text(TILT)))
+    run_sweep(sweep, str(tmp_path / "store"))
+    before = files(tmp_path / "store")
+    other = read_sweep(written(tmp_path, text(TILT) + "\n# other\n"))
+    with pytest.raises(InputError, match="is the store of another sweep file"):
+        run_sweep(other, str(tmp_path / "store"))
+    assert files(tmp_path / "store") == before
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "letter").write_text("dear")
+    with pytest.raises(InputError, match="is not empty, and no store"):
+        run_sweep(sweep, str(tmp_path / "folder"))
+    assert files(tmp_path / "folder") == {"letter": b"dear"}
+    with pytest.raises(InputError, match="is not a folder"):
+        run_sweep(sweep, str(tmp_path / "sweep.toml"))
+
+
+def test_two_sweeps_do_not_write_to_one_store(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, text(TILT)))
+    with (
+        opened(sweep, str(tmp_path / "store")),
+        pytest.raises(InputError, match="another sweep is writing"),
+    ):
+        run_sweep(sweep, str(tmp_path / "store"))
+    assert run_sweep(sweep, str(tmp_path / "store")).computed == 1
+    assert run_sweep(sweep, str(tmp_path / "store")).computed == 0
+
+
+def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    long = "\n".join(
+        f'[[axis]]\nfield = "omega.{axis}"\nfrom = 1.0\nto = 2.0\ncount = 100000'
+        for axis in (1, 2, 3)
+    )
+    sweep = read_sweep(written(tmp_path, text(long)))
+    assert sweep.n_scenes == 10**15
+    with pytest.raises(InputError, match=r"1e\+15 scenes .* take up to 25 PB"):
+        run_sweep(sweep, str(tmp_path / "store"))
+    small = read_sweep(written(tmp_path, text(TILT)))
+    monkeypatch.setattr(os, "sysconf", lambda name: 10)
+    with pytest.raises(InputError, match="of memory at once"):
+        run_sweep(small, str(tmp_path / "store"))
+    assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
+
+
+def test_what_is_not_computed_yet_is_no_number(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM))
+    with opened(sweep, str(tmp_path / "store")) as store:
+        assert np.isnan(store.array("end")[...]).all()
+        assert (store.array("status")[...] == -1).all()
+        assert not any(store.done())
+
+
+def test_chunk_without_a_number_in_it_is_done_all_the_same(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM))
+    run_sweep(sweep, str(tmp_path / "store"))
+    with opened(sweep, str(tmp_path / "store")) as store:
+        assert np.isnan(store.array("overflow-time")[...]).all()
+        assert all(store.done())

@@ -1,0 +1,155 @@
+"""Sweep files: what they say, and every mistake in a line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pyharness.ensembles.axes import axis_of
+from pyharness.ensembles.loads import loads
+from pyharness.ensembles.sweep import points, spread
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.errors import InputError
+from pyharness.model.scene_file import case_scene
+from tests.ensembles.sweeps import BASE, PROGRAM, SQUARE, TILT, text, written
+
+MISTAKES = {
+    text(): "axis is missing",
+    text('[[axis]]\nfield = "omega.4"\nvalues = [1.0]'): "did you mean 'omega.",
+    text("[[axis]]\nvalues = [1.0]"): "field is missing",
+    text('[[axis]]\nfield = "omega.1"'): "give either values, or from, to and count",
+    text('[[axis]]\nfield = "omega.1"\nvalues = []'): "a list, not empty",
+    text('[[axis]]\nfield = "omega.1"\nvalues = [1.0]\ncount = 3'): "count has no meaning",
+    text('[[axis]]\nfield = "omega.1"\nfrom = 0\nto = 1\ncount = 1000000000000000'): "on one axis",
+    text('[[axis]]\nfield = "omega.1"\nfrom = 0\nto = 1\ncount = 3\nspacing = "log"'): "above 0",
+    text('[[axis]]\nfield = "omega.1"\ndraw = "normal"\ncount = 3\nseed = 1'): "mean is missing",
+    text('[[axis]]\nfield = "omega.1"\ndraw = "sphere"\ncount = 3'): "seed is missing",
+    text('[[axis]]\nfield = "omega.1"\ndraw = "cauchy"\ncount = 3\nseed = 1'): "distribution",
+    text('[[axis]]\nfield = "body.moments.1"\nvalues = [0.0]'): "allowed: a number above 0",
+    text('[[axis]]\nfield = "body.coefficients.1"\nvalues = [0.1]'): "given by moments",
+    text('[[axis]]\nfield = "listing"\nvalues = ["original"]'): "without a program",
+    text('[[axis]]\nfield = "omega.1"\nvalues = [1.0]', TILT): "omega.1 beside tilt",
+    text(TILT, TILT): "two axes vary it",
+    text(
+        '[[axis]]\nfield = "omega.1"\nvalues = [1.0]\ndimension = "both"',
+        '[[axis]]\nfield = "omega.2"\nvalues = [1.0, 2.0]\ndimension = "both"',
+    ): "allowed: as many",
+    text(TILT, top='reductions = ["stop-step"]'): "not what a method can give",
+    text(TILT, "[solve]\nmethod = 'rk4'", top='reductions = ["axis-tilt"]'): "what rk4 can give",
+    text(TILT, top='reductions = [{name = "axis-tilt", of = "long"}]'): "unknown axis 'long'",
+    text(TILT, top='reductions = ["ending"]'): "did you mean 'end'?",
+    text(TILT, top='reductions = ["end", "end"]'): "give one another 'as'",
+    text(TILT, top='reductions = [{name = "claim", id = "no"}]'): "unknown claim 'no'",
+    text(TILT, top='reductions = [{name = "flips", samples = 0}]'): "allowed: 1 to",
+    text(TILT, top='reductions = [{name = "error", against = "guess"}]'): "unknown method 'guess'",
+    text(TILT, '[[axis]]\nfield = "torque.constant.1"\nvalues = [0.1]',
+         top='reductions = ["drift"]'): "under a torque",
+    text(TILT, top="chunk = 0"): "chunk is 0",
+    text(TILT, "[solve]\ntolerance = 1e-20"): "tolerance is 1e-20",
+    text(TILT, '[solve]\nmethod = "tailor"'): "did you mean 'taylor'?",
+    text(TILT, "[solve]\nt_end = 0.0"): "t_end is 0",
+    text(TILT, scene=""): "scene is missing",
+    text(TILT, scene="[scene]\ncase = 9"): "unknown case '9'",
+    PROGRAM.replace('"corrected"', '"fix:nothing"'): "unknown defect 'nothing'",
+    PROGRAM + '[[axis]]\nfield = "tolerance"\nvalues = [0.1]': "no meaning with a program",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "words"), MISTAKES.items(), ids=range(len(MISTAKES)))
+def test_mistake_is_one_line(content: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        read_sweep(written(tmp_path, content))
+    assert words in str(caught.value)
+    assert str(caught.value).startswith("sweep file '")
+
+
+def test_chunks_cover_the_grid_once_and_hold_one_listing(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM))
+    assert sweep.shape == (2, 12, 2)
+    assert sweep.chunk_shape == (1, 10, 2)
+    count = np.zeros(sweep.shape, dtype=int)
+    for chunk in range(sweep.n_chunks):
+        count[sweep.box(chunk)] += 1
+        (held,) = {load.listing for _, load in loads(sweep, points(sweep, sweep.box(chunk)))}
+        assert held is not None
+    assert (count == 1).all()
+
+
+def test_sample_reaches_the_ends_of_any_grid(tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM))
+    where = spread(sweep, 7)
+    assert [int(each[0]) for each in where] == [0, 0, 0]
+    assert [int(each[-1]) for each in where] == [n - 1 for n in sweep.shape]
+    assert len(spread(sweep, 1000)[0]) == sweep.n_scenes
+
+
+@pytest.mark.parametrize("how", ["uniform", "log-uniform", "normal", "sphere"])
+def test_draws_are_what_they_are_called(how: str) -> None:
+    table = {"field": "tilt", "draw": how, "count": 20_000, "seed": 3}
+    more = {"normal": {"mean": 2.0, "deviation": 0.5}, "sphere": {}}.get(how, {"from": 1, "to": 4})
+    values = axis_of({**table, **more}, 1).coordinates()
+    again = axis_of({**table, **more}, 2).coordinates()
+    other = axis_of({**table, **more, "seed": 4}, 1).coordinates()
+    assert (values == again).all()
+    assert (values != other).any()
+    expected = {
+        "uniform": 2.5,
+        "log-uniform": 3.0 / np.log(4.0),
+        "normal": 2.0,
+        "sphere": np.pi / 2.0,
+    }
+    assert abs(values.mean() - expected[how]) < 0.05
+
+
+def test_every_body_of_the_square_is_real_and_as_asked(tmp_path: Path) -> None:
+    other = SQUARE.replace("square.1", "square.2").replace("0.2", "0.0")
+    sweep = read_sweep(written(tmp_path, text(SQUARE, other, TILT)))
+    where = points(sweep, sweep.box(0))
+    ((_, load),) = loads(sweep, where)
+    assert load.moments is not None
+    low, middle, high = load.moments.T
+    assert (low <= middle).all()
+    assert (middle <= high).all()
+    assert (high <= low + middle + 1e-12).all()
+    assert np.allclose(high, 3.0)
+    tilts = sweep.axes[2].coordinates()[where[2]]
+    found = np.arccos(load.omega0[:, 1] / np.linalg.norm(load.omega0, axis=1))
+    assert np.allclose(found, tilts, atol=1e-7)
+
+
+def test_fields_reach_the_scenes(tmp_path: Path) -> None:
+    axes = [
+        '[[axis]]\nfield = "body.ratio.1"\nvalues = [0.5, 0.25]',
+        '[[axis]]\nfield = "torque.constant.2"\nvalues = [0.0, 3.0]',
+        '[[axis]]\nfield = "omega.magnitude"\nvalues = [2.0]',
+        '[[axis]]\nfield = "t_end"\nvalues = [1.0, -2.0]',
+        '[[axis]]\nfield = "tolerance"\nvalues = [1e-6, 1e-9]',
+    ]
+    sweep = read_sweep(written(tmp_path, text(*axes)))
+    found = list(loads(sweep, points(sweep, sweep.box(0))))
+    assert [load.solver.tolerance for _, load in found] == [1e-9, 1e-6]
+    load = found[0][1]
+    assert load.n_scenes == 8
+    assert load.moments is not None
+    assert load.torque_constant is not None
+    assert sorted({tuple(row) for row in load.moments.tolist()}) == [(0.75, 2, 3), (1.5, 2, 3)]
+    assert sorted(set(load.torque_constant[:, 1])) == [0.0, 3.0]
+    assert (load.omega0 == [0.0, 2.0, 0.0]).all()
+    assert sorted(set(load.t_end)) == [-2.0, 1.0]
+
+
+def test_scene_may_be_a_file_beside_and_is_part_of_the_fingerprint(tmp_path: Path) -> None:
+    (tmp_path / "base.toml").write_text(BASE.replace("scene.", ""))
+    path = written(tmp_path, text(TILT, scene='[scene]\nfile = "base.toml"'))
+    before = read_sweep(path)
+    assert before.scene.moments == (1.0, 2.0, 3.0)
+    (tmp_path / "base.toml").write_text(BASE.replace("scene.", "").replace("3.0", "2.5"))
+    assert read_sweep(path).fingerprint != before.fingerprint
+    case = read_sweep(written(tmp_path, text(TILT, scene="[scene]\ncase = 5")))
+    assert case.scene == case_scene(5)
+
+
+def test_sweep_of_the_documents_is_one() -> None:
+    sweep = read_sweep(Path(__file__).parent.parent.parent / "docs/tumbling.toml")
+    assert sweep.n_scenes == 2000
+    assert sweep.n_chunks == 1

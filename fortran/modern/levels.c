@@ -14,16 +14,20 @@
 
 typedef void solver(ARGUMENTS);
 typedef void quick_solver(QUICK_ARGUMENTS);
+typedef void runner(void *ensemble);
 
 solver taylor_solve_plain;
 quick_solver quick_solve_plain;
+runner run_lanes_plain;
 #ifdef WITH_LEVELS
 solver taylor_solve_avx2, taylor_solve_avx512;
 quick_solver quick_solve_avx2, quick_solve_avx512;
+runner run_lanes_avx2, run_lanes_avx512;
 #endif
 
 static solver *chosen = taylor_solve_plain;
 static quick_solver *chosen_quick = quick_solve_plain;
+static runner *chosen_lanes = run_lanes_plain;
 static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
 
 /* All of x86-64-v3 that a processor with AVX2 may lack, or that a virtual machine may hide. */
@@ -40,16 +44,19 @@ int choose_level(int highest)
 {
   chosen = taylor_solve_plain;
   chosen_quick = quick_solve_plain;
+  chosen_lanes = run_lanes_plain;
   level = 0;
 #ifdef WITH_LEVELS
   __builtin_cpu_init();
   if (highest >= 2 && HAS_AVX512) {
     chosen = taylor_solve_avx512;
     chosen_quick = quick_solve_avx512;
+    chosen_lanes = run_lanes_avx512;
     level = 2;
   } else if (highest >= 1 && HAS_AVX2) {
     chosen = taylor_solve_avx2;
     chosen_quick = quick_solve_avx2;
+    chosen_lanes = run_lanes_avx2;
     level = 1;
   }
 #endif
@@ -70,3 +77,5 @@ void quick_solve(QUICK_ARGUMENTS)
 {
   chosen_quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps, error);
 }
+
+void run_lanes(void *ensemble) { chosen_lanes(ensemble); }

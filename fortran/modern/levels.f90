@@ -1,11 +1,11 @@
 module levels
   !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a problem_t
-  !! on as it is, and knows no more of it than its address.
+  !! or an ensemble_t on as it is, and knows no more of it than its address.
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   implicit none(type, external)
   private
 
-  public :: choose_level, quick_solve, taylor_solve
+  public :: choose_level, quick_solve, run_lanes, taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -45,6 +45,12 @@ module levels
       integer(c_int), intent(out) :: status, steps
       real(c_double), intent(out) :: error
     end subroutine quick_solve
+
+    subroutine run_lanes(ensemble) bind(c, name="run_lanes")
+      !! As in many_programs.f90.
+      implicit none(type, external)
+      type(*), intent(in) :: ensemble
+    end subroutine run_lanes
   end interface
 
 end module levels

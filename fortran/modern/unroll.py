@@ -24,6 +24,11 @@ MODULES = (
     "taylor_rows",
     "taylor_march",
     "taylor",
+    "lanes",
+    "lanes_two_term",
+    "lanes_four_term",
+    "lanes_runge_kutta",
+    "many_programs",
 )
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)

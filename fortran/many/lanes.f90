@@ -8,7 +8,7 @@ module lanes
   implicit none(type, external)
   private
 
-  integer, parameter, public :: LANE_COUNT = 16
+  integer, parameter, public :: LANE_COUNT = 32
   integer, parameter, public :: POINTS = 5 !! at which a step reads the torque, at the most
 
   ! What a step says of a lane: bits.
@@ -22,18 +22,18 @@ module lanes
     integer :: used                       !! lanes with a body; the others repeat the first
     logical :: one_step_size              !! of all lanes
     integer(int64) :: alive(LANE_COUNT)   !! EVERY_BIT until the run ends, then none
-    real(dp), dimension(LANE_COUNT) :: U1, U2, U3  !! at the step's beginning, then its result, rad/s
-    real(dp), dimension(LANE_COUNT) :: V1, V2, V3  !! m/s
+    real(dp), dimension(LANE_COUNT, 3) :: U        !! at the step's beginning, then its result, rad/s
+    real(dp), dimension(LANE_COUNT, 3) :: V        !! the same, m/s
     real(dp), dimension(LANE_COUNT) :: A, B, C     !! of equations 13-15
     real(dp), dimension(LANE_COUNT) :: step, DT, TIME
     real(dp), dimension(LANE_COUNT) :: lipschitz
     real(dp), dimension(LANE_COUNT, 3) :: body, torque_constant, torque_first
     real(dp) :: M(LANE_COUNT, 3, POINTS)  !! torque over moment, 1/s2
-    real(dp) :: ACL1, ACL2, ACL3
+    real(dp) :: ACL1, ACL2, ACL3          !! force over mass, m/s2
     integer :: ier(LANE_COUNT)
   end type block_t
 
-  public :: begin_block, set_torque, spread_torque, first_torque
+  public :: begin_block, first_torque, look, set_torque, spread_torque
 
 contains
 
@@ -55,18 +55,14 @@ contains
       scene%body = e%body(:, of_body)
       call euler_coefficients(scene, b%A(i), b%B(i), b%C(i))
       b%body(i, :) = scene%body
-      b%U1(i) = e%omega(1, of_body)
-      b%U2(i) = e%omega(2, of_body)
-      b%U3(i) = e%omega(3, of_body)
+      b%U(i, :) = e%omega(:, of_body)
       b%torque_constant(i, :) = e%torque_constant(:, of_body)
       b%torque_first(i, :) = e%torque_first(:, of_body)
       b%step(i) = e%step_size(of_body)
       b%lipschitz(i) = e%lipschitz(of_body)
     end do
     b%one_step_size = all(b%step == b%step(1))
-    b%V1 = 0.0_dp
-    b%V2 = 0.0_dp
-    b%V3 = 0.0_dp
+    b%V = 0.0_dp
     b%DT = b%step
     b%TIME = 0.0_dp
     b%ier = 0
@@ -160,5 +156,28 @@ contains
       end do
     end do
   end subroutine add
+
+  pure subroutine look(b, verdict, found)
+    !! Whether any lane overflows: is_finite of deck.f90.
+    type(block_t), intent(in) :: b
+    integer(int64), intent(out) :: verdict(LANE_COUNT) !! of lanes that are alive
+    integer(int64), intent(out) :: found               !! of any of them
+    integer(int64) :: of_axis
+    integer :: axis
+    integer :: i
+
+    verdict = GOES_ON
+    do axis = 1, 3
+      do i = 1, LANE_COUNT
+        of_axis = merge(GOES_ON, OVERFLOWS, abs(b%U(i, axis)) <= huge(1.0_dp))
+        verdict(i) = ior(verdict(i), of_axis)
+      end do
+    end do
+    found = GOES_ON
+    do i = 1, LANE_COUNT
+      verdict(i) = iand(verdict(i), b%alive(i))
+      found = ior(found, verdict(i))
+    end do
+  end subroutine look
 
 end module lanes

@@ -128,9 +128,9 @@ contains
 
     ! first estimate: constant right-hand sides
     do i = 1, LANE_COUNT
-      u1 = b%U1(i)
-      u2 = b%U2(i)
-      u3 = b%U3(i)
+      u1 = b%U(i, 1)
+      u2 = b%U(i, 2)
+      u3 = b%U(i, 3)
       s%U(i, 1, 0) = u1
       s%U(i, 2, 0) = u2
       s%U(i, 3, 0) = u3
@@ -140,7 +140,7 @@ contains
     end do
     call solve_alike(s)                                                           ! 1320
     do k = 1, 4
-      call evaluate(s, k, b%U1, b%U2, b%U3, there1, there2, there3)               ! 1390-1440
+      call evaluate(s, k, b%U(:, 1), b%U(:, 2), b%U(:, 3), there1, there2, there3)               ! 1390-1440
       do i = 1, LANE_COUNT
         u1 = there1(i)
         u2 = there2(i)
@@ -154,7 +154,7 @@ contains
       end do
     end do
     call solve(s)                                                                 ! 2010
-    call evaluate(s, 5, s%U(:, 1, 0), s%U(:, 2, 0), s%U(:, 3, 0), b%U1, b%U2, b%U3) ! 2030-2080
+    call evaluate(s, 5, s%U(:, 1, 0), s%U(:, 2, 0), s%U(:, 3, 0), b%U(:, 1), b%U(:, 2), b%U(:, 3)) ! 2030-2080
   end subroutine turn
 
   pure subroutine move(b, s)
@@ -164,17 +164,17 @@ contains
     real(dp), dimension(LANE_COUNT) :: v1, v2, v3
     integer :: k
 
-    call push(b, s, 0, b%V1, b%V2, b%V3)                                          ! 810-830
+    call push(b, s, 0, b%V(:, 1), b%V(:, 2), b%V(:, 3))                                          ! 810-830
     call solve_alike(s)                                                           ! 1320
     do k = 1, 4
-      call evaluate(s, k, b%V1, b%V2, b%V3, v1, v2, v3)                           ! 1450-1500
+      call evaluate(s, k, b%V(:, 1), b%V(:, 2), b%V(:, 3), v1, v2, v3)                           ! 1450-1500
       call push(b, s, k, v1, v2, v3)                                              ! 1540-1560
     end do
     call solve(s)                                                                 ! 2010
-    v1 = b%V1
-    v2 = b%V2
-    v3 = b%V3
-    call evaluate(s, 5, v1, v2, v3, b%V1, b%V2, b%V3)                             ! 2090-2140
+    v1 = b%V(:, 1)
+    v2 = b%V(:, 2)
+    v3 = b%V(:, 3)
+    call evaluate(s, 5, v1, v2, v3, b%V(:, 1), b%V(:, 2), b%V(:, 3))                             ! 2090-2140
   end subroutine move
 
   pure subroutine push(b, s, k, v1, v2, v3)

@@ -1,23 +1,19 @@
 module lanes_runge_kutta
   !! A step of runge_kutta.f90 in every lane; the margin names its cards.
-  !! The stages are scalars: a lane goes through the whole step in registers.
+  !! What a listing changes is which array a stage reads: no question is asked lane by lane.
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use ensemble, only: ensemble_t
-  use lanes, only: block_t, first_torque, set_torque, spread_torque, EXCEEDS, GOES_ON, LANE_COUNT, &
-                   OVERFLOWS
+  use lanes, only: block_t, first_torque, set_torque, spread_torque, EXCEEDS, GOES_ON, LANE_COUNT
   implicit none(type, external)
   private
 
   type, public :: stages_t
-    real(dp), dimension(LANE_COUNT) :: U11, U21, U31 !! U(1): base and first stage at once
-    real(dp), dimension(LANE_COUNT) :: V11, V21, V31
-    real(dp), dimension(LANE_COUNT, 3) :: P          !! U at which K(1) was evaluated
-    real(dp), dimension(LANE_COUNT, 3, 3) :: U       !! after stages 1, 2, 3
+    real(dp), dimension(LANE_COUNT, 3) :: U, V         !! U(1): base and first stage at once
     real(dp), dimension(LANE_COUNT, 6) :: change_k, change_u
   end type stages_t
 
-  public :: begin_stages, step_runge_kutta, torque_runge_kutta
+  public :: begin_stages, step_runge_kutta, test, torque_runge_kutta
 
 contains
 
@@ -25,12 +21,8 @@ contains
     type(block_t), intent(in) :: b
     type(stages_t), intent(out) :: s
 
-    s%U11 = b%U1
-    s%U21 = b%U2
-    s%U31 = b%U3
-    s%V11 = b%V1
-    s%V21 = b%V2
-    s%V31 = b%V3
+    s%U = b%U
+    s%V = b%V
     s%change_k = 0.0_dp
     s%change_u = 0.0_dp
   end subroutine begin_stages
@@ -57,234 +49,185 @@ contains
     end if
   end subroutine torque_runge_kutta
 
-  subroutine step_runge_kutta(e, b, s, verdict, found)
+  subroutine step_runge_kutta(e, b, s)
     type(ensemble_t), intent(in) :: e
     type(block_t), intent(inout) :: b
     type(stages_t), intent(inout) :: s
-    integer(int64), intent(out) :: verdict(LANE_COUNT) !! of lanes that are alive
-    integer(int64), intent(out) :: found               !! of any of them
-    integer :: i
+    real(dp), dimension(LANE_COUNT, 3) :: base, P, first, second, third
+    real(dp), dimension(LANE_COUNT, 3) :: base_v, P_v, first_v, second_v, third_v
+    real(dp), dimension(LANE_COUNT, 3, 4) :: K
+    real(dp) :: half(LANE_COUNT)
 
-    call turn(e%listing%stage_base, e%listing%base_not_restored, e%listing%do_variable, &
-              e%listing%lipschitz_mismatched_pairs, b, s)
-    if (e%scene%with_velocity) then
-      call move(e%listing%stage_base, e%listing%base_not_restored, e%listing%do_variable, &
-                e%listing%lipschitz_mismatched_pairs, b, s)
+    half = 0.5_dp*b%DT
+    base = b%U
+    P = s%U
+    call turn(b, 1, P, K(:, :, 1))                                                ! 800-820
+    call advance(e%listing%stage_base, base, P, half, K(:, :, 1), first)          ! 860-880
+    call turn(b, 2, first, K(:, :, 2))                                            ! 800-820
+    call advance(e%listing%stage_base, base, first, half, K(:, :, 2), second)     ! 860-880
+    call turn(b, 2, second, K(:, :, 3))                                           ! 950-970
+    call advance(e%listing%stage_base, base, second, b%DT, K(:, :, 3), third)     ! 1040-1060
+    if (e%listing%do_variable) then
+      ! FORTRAN 77: this stage goes to the place of the fourth, and the third stays zero.
+      third = 0.0_dp
+      K(:, :, 3) = 0.0_dp
     end if
-    found = GOES_ON
-    do i = 1, LANE_COUNT
-      verdict(i) = merge(GOES_ON, OVERFLOWS, abs(b%U1(i)) <= huge(1.0_dp) .and. &
-                         abs(b%U2(i)) <= huge(1.0_dp) .and. abs(b%U3(i)) <= huge(1.0_dp))
-      verdict(i) = iand(verdict(i), b%alive(i))
-      found = ior(found, verdict(i))
-    end do
-    if (e%scene%may_stop) then
-      if (.not. e%listing%lipschitz_per_component) then
-        call test_norms(merge(6, 3, e%listing%lipschitz_tests_velocity), b, s, verdict, found)
-      else
-        call test_components(1, 3, b, s, verdict, found)
-        if (e%listing%lipschitz_tests_velocity) call test_components(4, 6, b, s, verdict, found)
-      end if
+    call turn(b, 4, third, K(:, :, 4))                                            ! 1120-1140
+    call weigh(base, b%DT, K, b%U)                                                ! 1180-1200
+    call carry(e, base, P, first, third, b%U, K, s%U, s%change_u(:, 1:3), s%change_k(:, 1:3))
+    if (.not. e%scene%with_velocity) return
+
+    ! the velocity, along the angular velocities of the stages
+    base_v = b%V
+    P_v = s%V
+    call move(b, P, P_v, K(:, :, 1))                                              ! 830-850
+    call advance(e%listing%stage_base, base_v, P_v, half, K(:, :, 1), first_v)    ! 890-910
+    call move(b, first, first_v, K(:, :, 2))                                      ! 830-850
+    call advance(e%listing%stage_base, base_v, first_v, half, K(:, :, 2), second_v) ! 890-910
+    call move(b, second, second_v, K(:, :, 3))                                    ! 980-1000
+    call advance(e%listing%stage_base, base_v, second_v, b%DT, K(:, :, 3), third_v) ! 1070-1090
+    if (e%listing%do_variable) then
+      third_v = 0.0_dp
+      K(:, :, 3) = 0.0_dp
     end if
+    call move(b, third, third_v, K(:, :, 4))                                      ! 1150-1170
+    call weigh(base_v, b%DT, K, b%V)                                              ! 1210-1230
+    call carry(e, base_v, P_v, first_v, third_v, b%V, K, s%V, s%change_u(:, 4:6), &
+               s%change_k(:, 4:6))
   end subroutine step_runge_kutta
 
-  pure subroutine turn(stage_base, base_not_restored, do_variable, mismatched, b, s)
-    !! The angular velocity, which does not see the velocity.
-    logical, intent(in) :: stage_base, base_not_restored, do_variable, mismatched
-    type(block_t), intent(inout) :: b
-    type(stages_t), intent(inout) :: s
-    real(dp) :: DT, half, p1, p2, p3, u1, u2, u3, base1, base2, base3
-    real(dp) :: KF1, KF2, KF3, KF4, KG1, KG2, KG3, KG4, KH1, KH2, KH3, KH4
+  pure subroutine turn(b, point, u, K)
+    !! KF, KG, KH.
+    type(block_t), intent(in) :: b
+    integer, intent(in) :: point
+    real(dp), intent(in) :: u(LANE_COUNT, 3)
+    real(dp), intent(out) :: K(LANE_COUNT, 3)
     integer :: i
 
     do i = 1, LANE_COUNT
-      DT = b%DT(i)
-      half = 0.5_dp*DT
-      p1 = s%U11(i)
-      p2 = s%U21(i)
-      p3 = s%U31(i)
-      s%P(i, 1) = p1
-      s%P(i, 2) = p2
-      s%P(i, 3) = p3
-      KF1 = b%M(i, 1, 1) + b%A(i)*p2*p3                                           ! 800
-      KG1 = b%M(i, 2, 1) + b%B(i)*p3*p1                                           ! 810
-      KH1 = b%M(i, 3, 1) + b%C(i)*p1*p2                                           ! 820
-      base1 = merge(p1, b%U1(i), stage_base)
-      base2 = merge(p2, b%U2(i), stage_base)
-      base3 = merge(p3, b%U3(i), stage_base)
-      u1 = base1 + half*KF1                                                       ! 860
-      u2 = base2 + half*KG1                                                       ! 870
-      u3 = base3 + half*KH1                                                       ! 880
-      s%U(i, 1, 1) = u1
-      s%U(i, 2, 1) = u2
-      s%U(i, 3, 1) = u3
-      KF2 = b%M(i, 1, 2) + b%A(i)*u2*u3                                           ! 800
-      KG2 = b%M(i, 2, 2) + b%B(i)*u3*u1                                           ! 810
-      KH2 = b%M(i, 3, 2) + b%C(i)*u1*u2                                           ! 820
-      base1 = merge(u1, b%U1(i), stage_base)
-      base2 = merge(u2, b%U2(i), stage_base)
-      base3 = merge(u3, b%U3(i), stage_base)
-      u1 = base1 + half*KF2                                                       ! 860
-      u2 = base2 + half*KG2                                                       ! 870
-      u3 = base3 + half*KH2                                                       ! 880
-      s%U(i, 1, 2) = u1
-      s%U(i, 2, 2) = u2
-      s%U(i, 3, 2) = u3
-      KF3 = b%M(i, 1, 2) + b%A(i)*u2*u3                                           ! 950
-      KG3 = b%M(i, 2, 2) + b%B(i)*u3*u1                                           ! 960
-      KH3 = b%M(i, 3, 2) + b%C(i)*u1*u2                                           ! 970
-      base1 = merge(u1, b%U1(i), stage_base)
-      base2 = merge(u2, b%U2(i), stage_base)
-      base3 = merge(u3, b%U3(i), stage_base)
-      u1 = base1 + DT*KF3                                                         ! 1040
-      u2 = base2 + DT*KG3                                                         ! 1050
-      u3 = base3 + DT*KH3                                                         ! 1060
-      ! FORTRAN 77: this stage goes to the place of the fourth, and the third stays zero.
-      u1 = merge(0.0_dp, u1, do_variable)
-      u2 = merge(0.0_dp, u2, do_variable)
-      u3 = merge(0.0_dp, u3, do_variable)
-      KF3 = merge(0.0_dp, KF3, do_variable)
-      KG3 = merge(0.0_dp, KG3, do_variable)
-      KH3 = merge(0.0_dp, KH3, do_variable)
-      s%U(i, 1, 3) = u1
-      s%U(i, 2, 3) = u2
-      s%U(i, 3, 3) = u3
-      KF4 = b%M(i, 1, 4) + b%A(i)*u2*u3                                           ! 1120
-      KG4 = b%M(i, 2, 4) + b%B(i)*u3*u1                                           ! 1130
-      KH4 = b%M(i, 3, 4) + b%C(i)*u1*u2                                           ! 1140
-      u1 = b%U1(i) + (DT/6.0_dp)*(KF1 + 2.0_dp*(KF2 + KF3) + KF4)                 ! 1180
-      u2 = b%U2(i) + (DT/6.0_dp)*(KG1 + 2.0_dp*(KG2 + KG3) + KG4)                 ! 1190
-      u3 = b%U3(i) + (DT/6.0_dp)*(KH1 + 2.0_dp*(KH2 + KH3) + KH4)                 ! 1200
-      s%change_u(i, 1) = abs(merge(u1 - b%U1(i), s%U(i, 1, 3) - p1, mismatched))  ! 1270
-      s%change_u(i, 2) = abs(merge(u2 - b%U2(i), s%U(i, 2, 3) - p2, mismatched))  ! 1280
-      s%change_u(i, 3) = abs(merge(u3 - b%U3(i), s%U(i, 3, 3) - p3, mismatched))  ! 1290
-      s%change_k(i, 1) = abs(KF4 - KF1)                                           ! 1330
-      s%change_k(i, 2) = abs(KG4 - KG1)                                           ! 1340
-      s%change_k(i, 3) = abs(KH4 - KH1)                                           ! 1350
-      b%U1(i) = u1                                                                ! 1480
-      b%U2(i) = u2                                                                ! 1490
-      b%U3(i) = u3                                                                ! 1500
-      s%U11(i) = merge(s%U(i, 1, 1), u1, base_not_restored)
-      s%U21(i) = merge(s%U(i, 2, 1), u2, base_not_restored)
-      s%U31(i) = merge(s%U(i, 3, 1), u3, base_not_restored)
+      K(i, 1) = b%M(i, 1, point) + b%A(i)*u(i, 2)*u(i, 3)
+      K(i, 2) = b%M(i, 2, point) + b%B(i)*u(i, 3)*u(i, 1)
+      K(i, 3) = b%M(i, 3, point) + b%C(i)*u(i, 1)*u(i, 2)
     end do
   end subroutine turn
 
-  pure subroutine move(stage_base, base_not_restored, do_variable, mismatched, b, s)
-    !! The velocity, along the angular velocities of the stages.
-    logical, intent(in) :: stage_base, base_not_restored, do_variable, mismatched
-    type(block_t), intent(inout) :: b
-    type(stages_t), intent(inout) :: s
-    real(dp) :: DT, half, p1, p2, p3, v1, v2, v3, first1, first2, first3, base1, base2, base3
-    real(dp) :: KX1, KX2, KX3, KX4, KY1, KY2, KY3, KY4, KZ1, KZ2, KZ3, KZ4
+  pure subroutine move(b, u, v, K)
+    !! KX, KY, KZ.
+    type(block_t), intent(in) :: b
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: u, v
+    real(dp), intent(out) :: K(LANE_COUNT, 3)
     integer :: i
 
     do i = 1, LANE_COUNT
-      DT = b%DT(i)
-      half = 0.5_dp*DT
-      p1 = s%V11(i)
-      p2 = s%V21(i)
-      p3 = s%V31(i)
-      KX1 = b%ACL1 + p2*s%P(i, 3) - p3*s%P(i, 2)                                  ! 830
-      KY1 = b%ACL2 + p3*s%P(i, 1) - p1*s%P(i, 3)                                  ! 840
-      KZ1 = b%ACL3 + p1*s%P(i, 2) - p2*s%P(i, 1)                                  ! 850
-      base1 = merge(p1, b%V1(i), stage_base)
-      base2 = merge(p2, b%V2(i), stage_base)
-      base3 = merge(p3, b%V3(i), stage_base)
-      first1 = base1 + half*KX1                                                   ! 890
-      first2 = base2 + half*KY1                                                   ! 900
-      first3 = base3 + half*KZ1                                                   ! 910
-      KX2 = b%ACL1 + first2*s%U(i, 3, 1) - first3*s%U(i, 2, 1)                    ! 830
-      KY2 = b%ACL2 + first3*s%U(i, 1, 1) - first1*s%U(i, 3, 1)                    ! 840
-      KZ2 = b%ACL3 + first1*s%U(i, 2, 1) - first2*s%U(i, 1, 1)                    ! 850
-      base1 = merge(first1, b%V1(i), stage_base)
-      base2 = merge(first2, b%V2(i), stage_base)
-      base3 = merge(first3, b%V3(i), stage_base)
-      v1 = base1 + half*KX2                                                       ! 890
-      v2 = base2 + half*KY2                                                       ! 900
-      v3 = base3 + half*KZ2                                                       ! 910
-      KX3 = b%ACL1 + v2*s%U(i, 3, 2) - v3*s%U(i, 2, 2)                            ! 980
-      KY3 = b%ACL2 + v3*s%U(i, 1, 2) - v1*s%U(i, 3, 2)                            ! 990
-      KZ3 = b%ACL3 + v1*s%U(i, 2, 2) - v2*s%U(i, 1, 2)                            ! 1000
-      base1 = merge(v1, b%V1(i), stage_base)
-      base2 = merge(v2, b%V2(i), stage_base)
-      base3 = merge(v3, b%V3(i), stage_base)
-      v1 = base1 + DT*KX3                                                         ! 1070
-      v2 = base2 + DT*KY3                                                         ! 1080
-      v3 = base3 + DT*KZ3                                                         ! 1090
-      v1 = merge(0.0_dp, v1, do_variable)
-      v2 = merge(0.0_dp, v2, do_variable)
-      v3 = merge(0.0_dp, v3, do_variable)
-      KX3 = merge(0.0_dp, KX3, do_variable)
-      KY3 = merge(0.0_dp, KY3, do_variable)
-      KZ3 = merge(0.0_dp, KZ3, do_variable)
-      KX4 = b%ACL1 + v2*s%U(i, 3, 3) - v3*s%U(i, 2, 3)                            ! 1150
-      KY4 = b%ACL2 + v3*s%U(i, 1, 3) - v1*s%U(i, 3, 3)                            ! 1160
-      KZ4 = b%ACL3 + v1*s%U(i, 2, 3) - v2*s%U(i, 1, 3)                            ! 1170
-      base1 = b%V1(i)
-      base2 = b%V2(i)
-      base3 = b%V3(i)
-      b%V1(i) = base1 + (DT/6.0_dp)*(KX1 + 2.0_dp*(KX2 + KX3) + KX4)              ! 1210
-      b%V2(i) = base2 + (DT/6.0_dp)*(KY1 + 2.0_dp*(KY2 + KY3) + KY4)              ! 1220
-      b%V3(i) = base3 + (DT/6.0_dp)*(KZ1 + 2.0_dp*(KZ2 + KZ3) + KZ4)              ! 1230
-      s%change_u(i, 4) = abs(merge(b%V1(i) - base1, v1 - p1, mismatched))         ! 1300
-      s%change_u(i, 5) = abs(merge(b%V2(i) - base2, v2 - p2, mismatched))         ! 1310
-      s%change_u(i, 6) = abs(merge(b%V3(i) - base3, v3 - p3, mismatched))         ! 1320
-      s%change_k(i, 4) = abs(KX4 - KX1)                                           ! 1360
-      s%change_k(i, 5) = abs(KY4 - KY1)                                           ! 1370
-      s%change_k(i, 6) = abs(KZ4 - KZ1)                                           ! 1380
-      s%V11(i) = merge(first1, b%V1(i), base_not_restored)
-      s%V21(i) = merge(first2, b%V2(i), base_not_restored)
-      s%V31(i) = merge(first3, b%V3(i), base_not_restored)
+      K(i, 1) = b%ACL1 + v(i, 2)*u(i, 3) - v(i, 3)*u(i, 2)
+      K(i, 2) = b%ACL2 + v(i, 3)*u(i, 1) - v(i, 1)*u(i, 3)
+      K(i, 3) = b%ACL3 + v(i, 1)*u(i, 2) - v(i, 2)*u(i, 1)
     end do
   end subroutine move
 
-  pure subroutine test_components(first, last, b, s, verdict, found)
-    !! Whether any variable from first to last exceeds; lipschitz_test says which.
-    integer, intent(in) :: first, last
-    type(block_t), intent(in) :: b
-    type(stages_t), intent(in) :: s
-    integer(int64), intent(inout) :: verdict(LANE_COUNT)
-    integer(int64), intent(inout) :: found
-    integer(int64) :: here
+  pure subroutine advance(stage_base, base, before, step, K, after)
+    !! A stage, from the base of the step or from the stage before.
+    logical, intent(in) :: stage_base
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: base, before, K
+    real(dp), intent(in) :: step(LANE_COUNT)
+    real(dp), intent(out) :: after(LANE_COUNT, 3)
+    integer :: axis
     integer :: i
-    integer :: variable
 
-    do variable = first, last
+    if (stage_base) then
+      do axis = 1, 3
+        do i = 1, LANE_COUNT
+          after(i, axis) = before(i, axis) + step(i)*K(i, axis)
+        end do
+      end do
+    else
+      do axis = 1, 3
+        do i = 1, LANE_COUNT
+          after(i, axis) = base(i, axis) + step(i)*K(i, axis)
+        end do
+      end do
+    end if
+  end subroutine advance
+
+  pure subroutine weigh(base, DT, K, after)
+    real(dp), intent(in) :: base(LANE_COUNT, 3), DT(LANE_COUNT), K(LANE_COUNT, 3, 4)
+    real(dp), intent(out) :: after(LANE_COUNT, 3)
+    real(dp) :: sixth(LANE_COUNT)
+    integer :: axis
+    integer :: i
+
+    sixth = DT/6.0_dp
+    do axis = 1, 3
       do i = 1, LANE_COUNT
-        here = merge(EXCEEDS, GOES_ON, &
-                     s%change_k(i, variable) > s%change_u(i, variable)*b%lipschitz(i)) ! 1410-1460
-        verdict(i) = ior(verdict(i), iand(here, b%alive(i)))
-        found = ior(found, verdict(i))
+        after(i, axis) = base(i, axis) + &
+                         sixth(i)*(K(i, axis, 1) + 2.0_dp*(K(i, axis, 2) + K(i, axis, 3)) + &
+                                   K(i, axis, 4))
       end do
     end do
-  end subroutine test_components
+  end subroutine weigh
 
-  pure subroutine test_norms(last, b, s, verdict, found)
-    !! Whether the norm exceeds.
-    integer, intent(in) :: last
+  pure subroutine carry(e, base, P, first, third, after, K, next, change_u, change_k)
+    !! What the next step begins with, and what the Lipschitz test compares.
+    type(ensemble_t), intent(in) :: e
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: base, P, first, third, after
+    real(dp), intent(in) :: K(LANE_COUNT, 3, 4)
+    real(dp), dimension(LANE_COUNT, 3), intent(out) :: next, change_u, change_k
+
+    if (e%listing%base_not_restored) then
+      next = first
+    else
+      next = after
+    end if
+    if (.not. e%scene%may_stop) return
+    if (e%listing%lipschitz_mismatched_pairs) then
+      change_u = abs(after - base)                                                ! 1270-1320
+    else
+      change_u = abs(third - P)                                                   ! 1270-1320
+    end if
+    change_k = abs(K(:, :, 4) - K(:, :, 1))                                       ! 1330-1380
+  end subroutine carry
+
+  pure subroutine test(e, b, s, verdict, found)
+    !! Whether any lane exceeds: lipschitz_test says in what.
+    type(ensemble_t), intent(in) :: e
     type(block_t), intent(in) :: b
     type(stages_t), intent(in) :: s
     integer(int64), intent(inout) :: verdict(LANE_COUNT)
     integer(int64), intent(inout) :: found
     real(dp) :: sum_k(LANE_COUNT), sum_u(LANE_COUNT)
+    integer(int64) :: exceeding(LANE_COUNT)
     integer(int64) :: here
     integer :: i
+    integer :: last
     integer :: variable
 
-    sum_k = 0.0_dp
-    sum_u = 0.0_dp
-    do variable = 1, last
-      do i = 1, LANE_COUNT
-        sum_k(i) = sum_k(i) + s%change_k(i, variable)*s%change_k(i, variable)
-        sum_u(i) = sum_u(i) + s%change_u(i, variable)*s%change_u(i, variable)
+    last = merge(6, 3, e%listing%lipschitz_tests_velocity)
+    exceeding = GOES_ON
+    if (e%listing%lipschitz_per_component) then
+      do variable = 1, last
+        do i = 1, LANE_COUNT
+          here = merge(EXCEEDS, GOES_ON, &
+                       s%change_k(i, variable) > s%change_u(i, variable)*b%lipschitz(i)) ! 1410-1460
+          exceeding(i) = ior(exceeding(i), here)
+        end do
       end do
-    end do
+    else
+      sum_k = 0.0_dp
+      sum_u = 0.0_dp
+      do variable = 1, last
+        do i = 1, LANE_COUNT
+          sum_k(i) = sum_k(i) + s%change_k(i, variable)*s%change_k(i, variable)
+          sum_u(i) = sum_u(i) + s%change_u(i, variable)*s%change_u(i, variable)
+        end do
+      end do
+      do i = 1, LANE_COUNT
+        exceeding(i) = merge(EXCEEDS, GOES_ON, sqrt(sum_k(i)) > sqrt(sum_u(i))*b%lipschitz(i))
+      end do
+    end if
     do i = 1, LANE_COUNT
-      here = merge(EXCEEDS, GOES_ON, sqrt(sum_k(i)) > sqrt(sum_u(i))*b%lipschitz(i))
-      verdict(i) = ior(verdict(i), iand(here, b%alive(i)))
+      verdict(i) = ior(verdict(i), iand(exceeding(i), b%alive(i)))
       found = ior(found, verdict(i))
     end do
-  end subroutine test_norms
+  end subroutine test
 
 end module lanes_runge_kutta

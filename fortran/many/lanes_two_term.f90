@@ -86,8 +86,13 @@ contains
     type(ensemble_t), intent(in) :: e
     type(block_t), intent(inout) :: b
     type(points_t), intent(inout) :: s
+    real(dp), parameter :: zero(LANE_COUNT) = 0.0_dp
 
-    call turn(e%listing%c1_for_c, b, s)
+    if (e%listing%c1_for_c) then
+      call turn(b, zero, s)
+    else
+      call turn(b, b%C, s)
+    end if
     if (e%scene%with_velocity) call move(e%listing%x3_reads_acl2, b, s)
   end subroutine step_two_term
 
@@ -103,24 +108,23 @@ contains
     y = merge(y, q, singular < 0.5_dp)
   end subroutine solve
 
-  pure subroutine turn(c1_for_c, b, s)
+  pure subroutine turn(b, C1, s)
     !! The angular velocity, which does not see the velocity.
-    logical, intent(in) :: c1_for_c
     type(block_t), intent(inout) :: b
+    real(dp), intent(in) :: C1(LANE_COUNT)  !! of the first estimate: b%C, or the zero of no card
     type(points_t), intent(inout) :: s
-    real(dp) :: u1, u2, u3, a1, a2, a3, b1, b2, b3, C, F, G, H, F3, G3, H3
+    real(dp) :: u1, u2, u3, a1, a2, a3, b1, b2, b3, F, G, H, F3, G3, H3
     real(dp) :: x1, x2, x3, y1, y2, y3
     integer :: i
 
     do i = 1, LANE_COUNT
-      u1 = b%U1(i)
-      u2 = b%U2(i)
-      u3 = b%U3(i)
+      u1 = b%U(i, 1)
+      u2 = b%U(i, 2)
+      u3 = b%U(i, 3)
       ! first estimate: constant right-hand sides
-      C = merge(0.0_dp, b%C(i), c1_for_c)
       F = b%M(i, 1, 1) + b%A(i)*u2*u3                                             ! 750
       G = b%M(i, 2, 1) + b%B(i)*u1*u3                                             ! 760
-      H = b%M(i, 3, 1) + C*u1*u2                                                  ! 770
+      H = b%M(i, 3, 1) + C1(i)*u1*u2                                                  ! 770
       call solve(F, F, s%low(i), s%high(i), s%diagonal(i), s%singular(i), x1, y1) ! 1050
       call solve(G, G, s%low(i), s%high(i), s%diagonal(i), s%singular(i), x2, y2)
       call solve(H, H, s%low(i), s%high(i), s%diagonal(i), s%singular(i), x3, y3)
@@ -149,9 +153,9 @@ contains
       s%before(i, 1) = u1
       s%before(i, 2) = u2
       s%before(i, 3) = u3
-      b%U1(i) = u1 + x1*s%T3(i) + y1*s%T32(i)                                     ! 1500
-      b%U2(i) = u2 + x2*s%T3(i) + y2*s%T32(i)                                     ! 1510
-      b%U3(i) = u3 + x3*s%T3(i) + y3*s%T32(i)                                     ! 1520
+      b%U(i, 1) = u1 + x1*s%T3(i) + y1*s%T32(i)                                     ! 1500
+      b%U(i, 2) = u2 + x2*s%T3(i) + y2*s%T32(i)                                     ! 1510
+      b%U(i, 3) = u3 + x3*s%T3(i) + y3*s%T32(i)                                     ! 1520
     end do
   end subroutine turn
 
@@ -166,9 +170,9 @@ contains
 
     of_x3 = merge(b%ACL2, b%ACL1, x3_reads_acl2)
     do i = 1, LANE_COUNT
-      v1 = b%V1(i)
-      v2 = b%V2(i)
-      v3 = b%V3(i)
+      v1 = b%V(i, 1)
+      v2 = b%V(i, 2)
+      v3 = b%V(i, 3)
       X = b%ACL1 + v2*s%before(i, 3) - v3*s%before(i, 2)                          ! 780
       Y = b%ACL2 + v3*s%before(i, 1) - v1*s%before(i, 3)                          ! 790
       Z = b%ACL3 + v1*s%before(i, 2) - v2*s%before(i, 1)                          ! 800
@@ -190,9 +194,9 @@ contains
       call solve(X, Xb, s%low(i), s%high(i), s%diagonal(i), s%singular(i), x1, y1) ! 1480
       call solve(Y, Yb, s%low(i), s%high(i), s%diagonal(i), s%singular(i), x2, y2)
       call solve(Z, Zb, s%low(i), s%high(i), s%diagonal(i), s%singular(i), x3, y3)
-      b%V1(i) = v1 + x1*s%T3(i) + y1*s%T32(i)                                     ! 1530
-      b%V2(i) = v2 + x2*s%T3(i) + y2*s%T32(i)                                     ! 1540
-      b%V3(i) = v3 + x3*s%T3(i) + y3*s%T32(i)                                     ! 1550
+      b%V(i, 1) = v1 + x1*s%T3(i) + y1*s%T32(i)                                     ! 1530
+      b%V(i, 2) = v2 + x2*s%T3(i) + y2*s%T32(i)                                     ! 1540
+      b%V(i, 3) = v3 + x3*s%T3(i) + y3*s%T32(i)                                     ! 1550
     end do
   end subroutine move
 

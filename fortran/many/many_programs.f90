@@ -6,9 +6,10 @@ module many_programs
   use kinds, only: dp
   use deck, only: steps_between_looks, stop_t
   use ensemble, only: ensemble_t
-  use lanes, only: begin_block, block_t, EXCEEDS, GOES_ON, LANE_COUNT, OVERFLOWS
+  use lanes, only: begin_block, block_t, EXCEEDS, GOES_ON, LANE_COUNT, look, OVERFLOWS
   use lanes_four_term, only: grid_t, set_grid, step_four_term, torque_four_term
-  use lanes_runge_kutta, only: begin_stages, stages_t, step_runge_kutta, torque_runge_kutta
+  use lanes_runge_kutta, only: begin_stages, stages_t, step_runge_kutta, test, &
+                               torque_runge_kutta
   use lanes_two_term, only: points_t, set_points, step_two_term, torque_two_term
   use runge_kutta_program, only: lipschitz_test
   use statuses, only: COMPLETE, OVERFLOW, STOPPED
@@ -62,16 +63,16 @@ contains
         if (step == 1 .or. e%listing%dt_accumulates) call set_points(b, points)
         if (e%scene%torque_varies) call torque_two_term(e, step, b, points)
         call step_two_term(e, b, points)
-        call look(b, verdict, found)
       case (2)
         if (step == 1 .or. e%listing%dt_accumulates) call set_grid(b, grid)
         if (e%scene%torque_varies) call torque_four_term(e, step, b, grid)
         call step_four_term(e, b, grid)
-        call look(b, verdict, found)
       case default
         if (e%scene%torque_varies) call torque_runge_kutta(e, step, b)
-        call step_runge_kutta(e, b, stages, verdict, found)
+        call step_runge_kutta(e, b, stages)
       end select
+      call look(b, verdict, found)
+      if (e%program == 3 .and. e%scene%may_stop) call test(e, b, stages, verdict, found)
       if (found /= GOES_ON) call end_overflows(e, step, verdict, b)
       if (row <= e%n_at) then
         if (e%at(row) == step) then
@@ -87,22 +88,6 @@ contains
     end do
     call end_rest(e, b)
   end subroutine run_block
-
-  pure subroutine look(b, verdict, found)
-    !! Whether any lane overflows.
-    type(block_t), intent(in) :: b
-    integer(int64), intent(out) :: verdict(LANE_COUNT) !! of lanes that are alive
-    integer(int64), intent(out) :: found               !! of any of them
-    integer :: i
-
-    found = GOES_ON
-    do i = 1, LANE_COUNT
-      verdict(i) = merge(GOES_ON, OVERFLOWS, abs(b%U1(i)) <= huge(1.0_dp) .and. &
-                         abs(b%U2(i)) <= huge(1.0_dp) .and. abs(b%U3(i)) <= huge(1.0_dp))
-      verdict(i) = iand(verdict(i), b%alive(i))
-      found = ior(found, verdict(i))
-    end do
-  end subroutine look
 
   subroutine end_overflows(e, step, verdict, b)
     !! A step that overflows leaves no row.
@@ -169,8 +154,8 @@ contains
     do i = 1, b%used
       if (b%alive(i) == 0) cycle
       body = b%first + i - 1
-      e%omega_rows(:, row, body) = [b%U1(i), b%U2(i), b%U3(i)]
-      if (size(e%velocity_rows) > 0) e%velocity_rows(:, row, body) = [b%V1(i), b%V2(i), b%V3(i)]
+      e%omega_rows(:, row, body) = b%U(i, :)
+      if (size(e%velocity_rows) > 0) e%velocity_rows(:, row, body) = b%V(i, :)
       if (size(e%ier_rows) > 0) e%ier_rows(row, body) = b%ier(i)
       e%times(row, min(body, size(e%times, 2))) = b%TIME(i)
     end do

@@ -20,7 +20,7 @@ from pyharness.original.equations import card_torque
 from pyharness.original.many_input import above_zero, from_zero, is_finite, one_count, rows, spread
 
 # Bodies side by side: LANE_COUNT of fortran/many/lanes.f90.
-_LANES = 16
+_LANES = 32
 # What one call of the kernel is given among threads: steps of all its bodies.
 _LEAST_WORK, _MOST_WORK = 100_000, 10_000_000
 _PIECES = 8  # for each thread, as bodies may end early

@@ -18,10 +18,7 @@ module lanes
   integer(int64), parameter, public :: EVERY_BIT = -1_int64
 
   type, public :: block_t
-    integer :: first                      !! body of the first lane
-    integer :: used                       !! lanes with a body; the others repeat the first
-    logical :: one_step_size              !! of all lanes
-    integer(int64) :: alive(LANE_COUNT)   !! EVERY_BIT until the run ends, then none
+    ! What is read lane by lane comes first: whole lines of the cache.
     real(dp), dimension(LANE_COUNT, 3) :: U        !! at the step's beginning, then its result, rad/s
     real(dp), dimension(LANE_COUNT, 3) :: V        !! the same, m/s
     real(dp), dimension(LANE_COUNT) :: A, B, C     !! of equations 13-15
@@ -29,8 +26,13 @@ module lanes
     real(dp), dimension(LANE_COUNT) :: lipschitz
     real(dp), dimension(LANE_COUNT, 3) :: body, torque_constant, torque_first
     real(dp) :: M(LANE_COUNT, 3, POINTS)  !! torque over moment, 1/s2
-    real(dp) :: ACL1, ACL2, ACL3          !! force over mass, m/s2
+    integer(int64) :: alive(LANE_COUNT)   !! EVERY_BIT until the run ends, then none
     integer :: ier(LANE_COUNT)
+    real(dp) :: ACL1, ACL2, ACL3          !! force over mass, m/s2
+    integer :: first                      !! body of the first lane
+    integer :: used                       !! lanes with a body; the others repeat the first
+    logical :: one_step_size              !! of all lanes
+    integer :: rest(7)                    !! to the end of a line
   end type block_t
 
   public :: begin_block, first_torque, look, set_torque, spread_torque

@@ -11,13 +11,13 @@ module lanes_four_term
   type, public :: grid_t
     real(dp), dimension(LANE_COUNT, 5) :: T, TL2, TL3, TL4 !! T1 to T5 and their powers
     real(dp) :: A(LANE_COUNT, 4, 4)       !! its factors
-    integer :: row(LANE_COUNT, 4)         !! of B, that stands at each row of the factors
-    logical :: one_order                  !! of rows, in all lanes
-    logical :: any_singular
-    logical :: singular(LANE_COUNT)
     real(dp) :: U(LANE_COUNT, 3, 0:4)     !! omega at the beginning and at T1 to T4
     real(dp) :: sides(LANE_COUNT, 4, 3)   !! right-hand sides at T1 to T4
     real(dp) :: terms(LANE_COUNT, 4, 3)   !! coefficients of the trial functions
+    integer :: row(LANE_COUNT, 4)         !! of B, that stands at each row of the factors
+    logical :: singular(LANE_COUNT)
+    logical :: one_order                  !! of rows, in all lanes
+    logical :: any_singular
   end type grid_t
 
   public :: set_grid, step_four_term, torque_four_term

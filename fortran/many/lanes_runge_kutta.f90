@@ -11,6 +11,11 @@ module lanes_runge_kutta
   type, public :: stages_t
     real(dp), dimension(LANE_COUNT, 3) :: U, V         !! U(1): base and first stage at once
     real(dp), dimension(LANE_COUNT, 6) :: change_k, change_u
+    ! Of one step: U when it began, at stage 1, and after the stages.
+    real(dp), dimension(LANE_COUNT, 3) :: base, P, first, second, third
+    real(dp), dimension(LANE_COUNT, 3) :: base_v, P_v, first_v, second_v, third_v
+    real(dp), dimension(LANE_COUNT, 3, 4) :: K
+    real(dp) :: half(LANE_COUNT)
   end type stages_t
 
   public :: begin_stages, step_runge_kutta, test, torque_runge_kutta
@@ -53,101 +58,107 @@ contains
     type(ensemble_t), intent(in) :: e
     type(block_t), intent(inout) :: b
     type(stages_t), intent(inout) :: s
-    real(dp), dimension(LANE_COUNT, 3) :: base, P, first, second, third
-    real(dp), dimension(LANE_COUNT, 3) :: base_v, P_v, first_v, second_v, third_v
-    real(dp), dimension(LANE_COUNT, 3, 4) :: K
-    real(dp) :: half(LANE_COUNT)
 
-    half = 0.5_dp*b%DT
-    base = b%U
-    P = s%U
-    call turn(b, 1, P, K(:, :, 1))                                                ! 800-820
-    call advance(e%listing%stage_base, base, P, half, K(:, :, 1), first)          ! 860-880
-    call turn(b, 2, first, K(:, :, 2))                                            ! 800-820
-    call advance(e%listing%stage_base, base, first, half, K(:, :, 2), second)     ! 860-880
-    call turn(b, 2, second, K(:, :, 3))                                           ! 950-970
-    call advance(e%listing%stage_base, base, second, b%DT, K(:, :, 3), third)     ! 1040-1060
-    if (e%listing%do_variable) then
-      ! FORTRAN 77: this stage goes to the place of the fourth, and the third stays zero.
-      third = 0.0_dp
-      K(:, :, 3) = 0.0_dp
-    end if
-    call turn(b, 4, third, K(:, :, 4))                                            ! 1120-1140
-    call weigh(base, b%DT, K, b%U)                                                ! 1180-1200
-    call carry(e, base, P, first, third, b%U, K, s%U, s%change_u(:, 1:3), s%change_k(:, 1:3))
+    associate (base => s%base, P => s%P, first => s%first, second => s%second, &
+               third => s%third, K => s%K, half => s%half)
+      half = 0.5_dp*b%DT
+      base = b%U
+      P = s%U
+      if (e%listing%stage_base) then
+        call turn(b, 1, P, P, half, K(:, :, 1), first)                            ! 800-880
+        call turn(b, 2, first, first, half, K(:, :, 2), second)                   ! 800-880
+        call turn(b, 2, second, second, b%DT, K(:, :, 3), third)                  ! 950-1060
+      else
+        call turn(b, 1, P, base, half, K(:, :, 1), first)                         ! 800-880
+        call turn(b, 2, first, base, half, K(:, :, 2), second)                    ! 800-880
+        call turn(b, 2, second, base, b%DT, K(:, :, 3), third)                    ! 950-1060
+      end if
+      if (e%listing%do_variable) call leave_out(K(:, :, 3), third)
+      call turn(b, 4, third, base, b%DT, K(:, :, 4), b%U)                         ! 1120-1140
+      call weigh(base, b%DT, K, b%U)                                              ! 1180-1200
+      call carry(e, base, P, first, third, b%U, K, s%U, s%change_u(:, 1:3), s%change_k(:, 1:3))
+    end associate
     if (.not. e%scene%with_velocity) return
 
-    ! the velocity, along the angular velocities of the stages
-    base_v = b%V
-    P_v = s%V
-    call move(b, P, P_v, K(:, :, 1))                                              ! 830-850
-    call advance(e%listing%stage_base, base_v, P_v, half, K(:, :, 1), first_v)    ! 890-910
-    call move(b, first, first_v, K(:, :, 2))                                      ! 830-850
-    call advance(e%listing%stage_base, base_v, first_v, half, K(:, :, 2), second_v) ! 890-910
-    call move(b, second, second_v, K(:, :, 3))                                    ! 980-1000
-    call advance(e%listing%stage_base, base_v, second_v, b%DT, K(:, :, 3), third_v) ! 1070-1090
-    if (e%listing%do_variable) then
-      third_v = 0.0_dp
-      K(:, :, 3) = 0.0_dp
-    end if
-    call move(b, third, third_v, K(:, :, 4))                                      ! 1150-1170
-    call weigh(base_v, b%DT, K, b%V)                                              ! 1210-1230
-    call carry(e, base_v, P_v, first_v, third_v, b%V, K, s%V, s%change_u(:, 4:6), &
-               s%change_k(:, 4:6))
+    ! along the angular velocities of the stages
+    associate (base => s%base_v, P => s%P_v, first => s%first_v, second => s%second_v, &
+               third => s%third_v, K => s%K, half => s%half)
+      base = b%V
+      P = s%V
+      if (e%listing%stage_base) then
+        call move(b, s%P, P, P, half, K(:, :, 1), first)                          ! 830-910
+        call move(b, s%first, first, first, half, K(:, :, 2), second)             ! 830-910
+        call move(b, s%second, second, second, b%DT, K(:, :, 3), third)           ! 980-1090
+      else
+        call move(b, s%P, P, base, half, K(:, :, 1), first)                       ! 830-910
+        call move(b, s%first, first, base, half, K(:, :, 2), second)              ! 830-910
+        call move(b, s%second, second, base, b%DT, K(:, :, 3), third)             ! 980-1090
+      end if
+      if (e%listing%do_variable) call leave_out(K(:, :, 3), third)
+      call move(b, s%third, third, base, b%DT, K(:, :, 4), b%V)                   ! 1150-1170
+      call weigh(base, b%DT, K, b%V)                                              ! 1210-1230
+      call carry(e, base, P, first, third, b%V, K, s%V, s%change_u(:, 4:6), s%change_k(:, 4:6))
+    end associate
   end subroutine step_runge_kutta
 
-  pure subroutine turn(b, point, u, K)
-    !! KF, KG, KH.
+  pure subroutine leave_out(K, third)
+    !! FORTRAN 77: this stage goes to the place of the fourth, and the third stays zero.
+    real(dp), dimension(LANE_COUNT, 3), intent(out) :: K, third
+
+    third = 0.0_dp
+    K = 0.0_dp
+  end subroutine leave_out
+
+  pure subroutine turn(b, point, u, base, step, K, after)
+    !! KF, KG, KH at u, and a step from the base.
     type(block_t), intent(in) :: b
     integer, intent(in) :: point
-    real(dp), intent(in) :: u(LANE_COUNT, 3)
-    real(dp), intent(out) :: K(LANE_COUNT, 3)
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: u, base
+    real(dp), intent(in) :: step(LANE_COUNT)
+    real(dp), dimension(LANE_COUNT, 3), intent(out) :: K, after
+    real(dp) :: u1, u2, u3, KF, KG, KH
     integer :: i
 
     do i = 1, LANE_COUNT
-      K(i, 1) = b%M(i, 1, point) + b%A(i)*u(i, 2)*u(i, 3)
-      K(i, 2) = b%M(i, 2, point) + b%B(i)*u(i, 3)*u(i, 1)
-      K(i, 3) = b%M(i, 3, point) + b%C(i)*u(i, 1)*u(i, 2)
+      u1 = u(i, 1)
+      u2 = u(i, 2)
+      u3 = u(i, 3)
+      KF = b%M(i, 1, point) + b%A(i)*u2*u3
+      KG = b%M(i, 2, point) + b%B(i)*u3*u1
+      KH = b%M(i, 3, point) + b%C(i)*u1*u2
+      K(i, 1) = KF
+      K(i, 2) = KG
+      K(i, 3) = KH
+      after(i, 1) = base(i, 1) + step(i)*KF
+      after(i, 2) = base(i, 2) + step(i)*KG
+      after(i, 3) = base(i, 3) + step(i)*KH
     end do
   end subroutine turn
 
-  pure subroutine move(b, u, v, K)
-    !! KX, KY, KZ.
+  pure subroutine move(b, u, v, base, step, K, after)
+    !! KX, KY, KZ at u and v, and a step from the base.
     type(block_t), intent(in) :: b
-    real(dp), dimension(LANE_COUNT, 3), intent(in) :: u, v
-    real(dp), intent(out) :: K(LANE_COUNT, 3)
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: u, v, base
+    real(dp), intent(in) :: step(LANE_COUNT)
+    real(dp), dimension(LANE_COUNT, 3), intent(out) :: K, after
+    real(dp) :: v1, v2, v3, KX, KY, KZ
     integer :: i
 
     do i = 1, LANE_COUNT
-      K(i, 1) = b%ACL1 + v(i, 2)*u(i, 3) - v(i, 3)*u(i, 2)
-      K(i, 2) = b%ACL2 + v(i, 3)*u(i, 1) - v(i, 1)*u(i, 3)
-      K(i, 3) = b%ACL3 + v(i, 1)*u(i, 2) - v(i, 2)*u(i, 1)
+      v1 = v(i, 1)
+      v2 = v(i, 2)
+      v3 = v(i, 3)
+      KX = b%ACL1 + v2*u(i, 3) - v3*u(i, 2)
+      KY = b%ACL2 + v3*u(i, 1) - v1*u(i, 3)
+      KZ = b%ACL3 + v1*u(i, 2) - v2*u(i, 1)
+      K(i, 1) = KX
+      K(i, 2) = KY
+      K(i, 3) = KZ
+      after(i, 1) = base(i, 1) + step(i)*KX
+      after(i, 2) = base(i, 2) + step(i)*KY
+      after(i, 3) = base(i, 3) + step(i)*KZ
     end do
   end subroutine move
-
-  pure subroutine advance(stage_base, base, before, step, K, after)
-    !! A stage, from the base of the step or from the stage before.
-    logical, intent(in) :: stage_base
-    real(dp), dimension(LANE_COUNT, 3), intent(in) :: base, before, K
-    real(dp), intent(in) :: step(LANE_COUNT)
-    real(dp), intent(out) :: after(LANE_COUNT, 3)
-    integer :: axis
-    integer :: i
-
-    if (stage_base) then
-      do axis = 1, 3
-        do i = 1, LANE_COUNT
-          after(i, axis) = before(i, axis) + step(i)*K(i, axis)
-        end do
-      end do
-    else
-      do axis = 1, 3
-        do i = 1, LANE_COUNT
-          after(i, axis) = base(i, axis) + step(i)*K(i, axis)
-        end do
-      end do
-    end if
-  end subroutine advance
 
   pure subroutine weigh(base, DT, K, after)
     real(dp), intent(in) :: base(LANE_COUNT, 3), DT(LANE_COUNT), K(LANE_COUNT, 3, 4)

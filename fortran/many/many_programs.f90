@@ -1,6 +1,6 @@
 module many_programs
   !! The three programs of the appendix on many bodies, a block of lanes at a time.
-  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -16,6 +16,15 @@ module many_programs
   implicit none(type, external)
   private
 
+  integer(c_intptr_t), parameter :: ALIGNED = 64 ! bytes: no vector across two lines of the cache
+
+  type :: room_t
+    type(block_t) :: b
+    type(stages_t) :: stages
+    type(points_t) :: points
+    type(grid_t) :: grid
+  end type room_t
+
   public :: run_lanes
 
 contains
@@ -24,25 +33,30 @@ contains
     !! Run them all, or until the user interrupts.
     type(c_ptr), intent(in), value :: ensemble_at !! an ensemble_t, through C
     type(ensemble_t), pointer :: e
+    type(room_t), pointer :: room
+    real(c_double), target :: place(storage_size(room)/64 + ALIGNED/8)
+    integer(c_intptr_t) :: address
     integer :: first
     integer :: left  ! steps until the user is looked at
 
     call c_f_pointer(ensemble_at, e)
+    address = transfer(c_loc(place), address)
+    call c_f_pointer(c_loc(place(1 + modulo(-address, ALIGNED)/8)), room)
     left = 0
     do first = 1, e%n, LANE_COUNT
-      call run_block(e, first, left)
+      call run_block(e, first, room%b, room%stages, room%points, room%grid, left)
       if (left < 0) return
     end do
   end subroutine run_lanes
 
-  subroutine run_block(e, first, left)
+  subroutine run_block(e, first, b, stages, points, grid, left)
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: first
+    type(block_t), intent(out) :: b
+    type(stages_t), intent(inout) :: stages
+    type(points_t), intent(inout) :: points
+    type(grid_t), intent(inout) :: grid
     integer, intent(inout) :: left
-    type(block_t) :: b
-    type(stages_t) :: stages
-    type(points_t) :: points
-    type(grid_t) :: grid
     integer(int64) :: verdict(LANE_COUNT)
     integer(int64) :: found
     integer :: step

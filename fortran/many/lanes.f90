@@ -164,20 +164,15 @@ contains
     type(block_t), intent(in) :: b
     integer(int64), intent(out) :: verdict(LANE_COUNT) !! of lanes that are alive
     integer(int64), intent(out) :: found               !! of any of them
-    integer(int64) :: of_axis
-    integer :: axis
+    integer(int64) :: here
     integer :: i
 
-    verdict = GOES_ON
-    do axis = 1, 3
-      do i = 1, LANE_COUNT
-        of_axis = merge(GOES_ON, OVERFLOWS, abs(b%U(i, axis)) <= huge(1.0_dp))
-        verdict(i) = ior(verdict(i), of_axis)
-      end do
-    end do
     found = GOES_ON
     do i = 1, LANE_COUNT
-      verdict(i) = iand(verdict(i), b%alive(i))
+      here = ior(ior(merge(GOES_ON, OVERFLOWS, abs(b%U(i, 1)) <= huge(1.0_dp)), &
+                     merge(GOES_ON, OVERFLOWS, abs(b%U(i, 2)) <= huge(1.0_dp))), &
+                 merge(GOES_ON, OVERFLOWS, abs(b%U(i, 3)) <= huge(1.0_dp)))
+      verdict(i) = iand(here, b%alive(i))
       found = ior(found, verdict(i))
     end do
   end subroutine look

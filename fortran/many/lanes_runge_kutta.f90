@@ -11,10 +11,9 @@ module lanes_runge_kutta
   type, public :: stages_t
     real(dp), dimension(LANE_COUNT, 3) :: U, V         !! U(1): base and first stage at once
     real(dp), dimension(LANE_COUNT, 6) :: change_k, change_u
-    ! Of one step: U when it began, at stage 1, and after the stages.
-    real(dp), dimension(LANE_COUNT, 3) :: base, P, first, second, third
-    real(dp), dimension(LANE_COUNT, 3) :: base_v, P_v, first_v, second_v, third_v
-    real(dp), dimension(LANE_COUNT, 3, 4) :: K
+    ! Of one step: after the stages.
+    real(dp), dimension(LANE_COUNT, 3) :: first, second, third, first_v, second_v, third_v
+    real(dp), dimension(LANE_COUNT, 3, 4) :: K, K_v
     real(dp) :: half(LANE_COUNT)
   end type stages_t
 
@@ -59,46 +58,36 @@ contains
     type(block_t), intent(inout) :: b
     type(stages_t), intent(inout) :: s
 
-    associate (base => s%base, P => s%P, first => s%first, second => s%second, &
-               third => s%third, K => s%K, half => s%half)
-      half = 0.5_dp*b%DT
-      base = b%U
-      P = s%U
+    s%half = 0.5_dp*b%DT
+    if (e%listing%stage_base) then
+      call turn(b, 1, s%U, s%U, s%half, s%K(:, :, 1), s%first)                    ! 800-880
+      call turn(b, 2, s%first, s%first, s%half, s%K(:, :, 2), s%second)           ! 800-880
+      call turn(b, 2, s%second, s%second, b%DT, s%K(:, :, 3), s%third)            ! 950-1060
+    else
+      call turn(b, 1, s%U, b%U, s%half, s%K(:, :, 1), s%first)                    ! 800-880
+      call turn(b, 2, s%first, b%U, s%half, s%K(:, :, 2), s%second)               ! 800-880
+      call turn(b, 2, s%second, b%U, b%DT, s%K(:, :, 3), s%third)                 ! 950-1060
+    end if
+    if (e%listing%do_variable) call leave_out(s%K(:, :, 3), s%third)
+    call turn_last(b, s%third, s%K(:, :, 4))                                      ! 1120-1140
+    if (e%scene%with_velocity) then
+      ! along the angular velocities of the stages
       if (e%listing%stage_base) then
-        call turn(b, 1, P, P, half, K(:, :, 1), first)                            ! 800-880
-        call turn(b, 2, first, first, half, K(:, :, 2), second)                   ! 800-880
-        call turn(b, 2, second, second, b%DT, K(:, :, 3), third)                  ! 950-1060
+        call move(b, s%U, s%V, s%V, s%half, s%K_v(:, :, 1), s%first_v)            ! 830-910
+        call move(b, s%first, s%first_v, s%first_v, s%half, s%K_v(:, :, 2), s%second_v) ! 830-910
+        call move(b, s%second, s%second_v, s%second_v, b%DT, s%K_v(:, :, 3), s%third_v) ! 980-1090
       else
-        call turn(b, 1, P, base, half, K(:, :, 1), first)                         ! 800-880
-        call turn(b, 2, first, base, half, K(:, :, 2), second)                    ! 800-880
-        call turn(b, 2, second, base, b%DT, K(:, :, 3), third)                    ! 950-1060
+        call move(b, s%U, s%V, b%V, s%half, s%K_v(:, :, 1), s%first_v)            ! 830-910
+        call move(b, s%first, s%first_v, b%V, s%half, s%K_v(:, :, 2), s%second_v) ! 830-910
+        call move(b, s%second, s%second_v, b%V, b%DT, s%K_v(:, :, 3), s%third_v)  ! 980-1090
       end if
-      if (e%listing%do_variable) call leave_out(K(:, :, 3), third)
-      call turn(b, 4, third, base, b%DT, K(:, :, 4), b%U)                         ! 1120-1140
-      call weigh(base, b%DT, K, b%U)                                              ! 1180-1200
-      call carry(e, base, P, first, third, b%U, K, s%U, s%change_u(:, 1:3), s%change_k(:, 1:3))
-    end associate
-    if (.not. e%scene%with_velocity) return
-
-    ! along the angular velocities of the stages
-    associate (base => s%base_v, P => s%P_v, first => s%first_v, second => s%second_v, &
-               third => s%third_v, K => s%K, half => s%half)
-      base = b%V
-      P = s%V
-      if (e%listing%stage_base) then
-        call move(b, s%P, P, P, half, K(:, :, 1), first)                          ! 830-910
-        call move(b, s%first, first, first, half, K(:, :, 2), second)             ! 830-910
-        call move(b, s%second, second, second, b%DT, K(:, :, 3), third)           ! 980-1090
-      else
-        call move(b, s%P, P, base, half, K(:, :, 1), first)                       ! 830-910
-        call move(b, s%first, first, base, half, K(:, :, 2), second)              ! 830-910
-        call move(b, s%second, second, base, b%DT, K(:, :, 3), third)             ! 980-1090
-      end if
-      if (e%listing%do_variable) call leave_out(K(:, :, 3), third)
-      call move(b, s%third, third, base, b%DT, K(:, :, 4), b%V)                   ! 1150-1170
-      call weigh(base, b%DT, K, b%V)                                              ! 1210-1230
-      call carry(e, base, P, first, third, b%V, K, s%V, s%change_u(:, 4:6), s%change_k(:, 4:6))
-    end associate
+      if (e%listing%do_variable) call leave_out(s%K_v(:, :, 3), s%third_v)
+      call move(b, s%third, s%third_v, b%V, b%DT, s%K_v(:, :, 4), s%second_v)     ! 1150-1170
+      call close_step(e, b%DT, s%K_v, s%first_v, s%third_v, b%V, s%V, s%change_u(:, 4:6), &
+                      s%change_k(:, 4:6))                                         ! 1210-1230
+    end if
+    call close_step(e, b%DT, s%K, s%first, s%third, b%U, s%U, s%change_u(:, 1:3), &
+                    s%change_k(:, 1:3))                                           ! 1180-1200
   end subroutine step_runge_kutta
 
   pure subroutine leave_out(K, third)
@@ -160,43 +149,62 @@ contains
     end do
   end subroutine move
 
-  pure subroutine weigh(base, DT, K, after)
-    real(dp), intent(in) :: base(LANE_COUNT, 3), DT(LANE_COUNT), K(LANE_COUNT, 3, 4)
-    real(dp), intent(out) :: after(LANE_COUNT, 3)
-    real(dp) :: sixth(LANE_COUNT)
+  pure subroutine turn_last(b, u, K)
+    !! KF, KG, KH at the fourth stage, from which no step goes on.
+    type(block_t), intent(in) :: b
+    real(dp), intent(in) :: u(LANE_COUNT, 3)
+    real(dp), intent(out) :: K(LANE_COUNT, 3)
+    integer :: i
+
+    do i = 1, LANE_COUNT
+      K(i, 1) = b%M(i, 1, 4) + b%A(i)*u(i, 2)*u(i, 3)
+      K(i, 2) = b%M(i, 2, 4) + b%B(i)*u(i, 3)*u(i, 1)
+      K(i, 3) = b%M(i, 3, 4) + b%C(i)*u(i, 1)*u(i, 2)
+    end do
+  end subroutine turn_last
+
+  pure subroutine close_step(e, DT, K, first, third, U, next, change_u, change_k)
+    !! The result; what the next step begins with; what the Lipschitz test compares.
+    type(ensemble_t), intent(in) :: e
+    real(dp), intent(in) :: DT(LANE_COUNT), K(LANE_COUNT, 3, 4)
+    real(dp), dimension(LANE_COUNT, 3), intent(in) :: first, third
+    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: U     !! UU, then U(4)
+    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: next  !! U(1) as it was, then of the next
+    real(dp), dimension(LANE_COUNT, 3), intent(out) :: change_u, change_k
+    real(dp) :: new
     integer :: axis
     integer :: i
 
-    sixth = DT/6.0_dp
     do axis = 1, 3
       do i = 1, LANE_COUNT
-        after(i, axis) = base(i, axis) + &
-                         sixth(i)*(K(i, axis, 1) + 2.0_dp*(K(i, axis, 2) + K(i, axis, 3)) + &
-                                   K(i, axis, 4))
+        new = U(i, axis) + (DT(i)/6.0_dp)*(K(i, axis, 1) + &
+                                           2.0_dp*(K(i, axis, 2) + K(i, axis, 3)) + K(i, axis, 4))
+        change_k(i, axis) = abs(K(i, axis, 4) - K(i, axis, 1))                    ! 1330-1380
+        change_u(i, axis) = abs(new - U(i, axis))                                 ! 1270-1320
+        U(i, axis) = new
       end do
     end do
-  end subroutine weigh
-
-  pure subroutine carry(e, base, P, first, third, after, K, next, change_u, change_k)
-    !! What the next step begins with, and what the Lipschitz test compares.
-    type(ensemble_t), intent(in) :: e
-    real(dp), dimension(LANE_COUNT, 3), intent(in) :: base, P, first, third, after
-    real(dp), intent(in) :: K(LANE_COUNT, 3, 4)
-    real(dp), dimension(LANE_COUNT, 3), intent(out) :: next, change_u, change_k
-
+    if (.not. e%listing%lipschitz_mismatched_pairs) then
+      do axis = 1, 3
+        do i = 1, LANE_COUNT
+          change_u(i, axis) = abs(third(i, axis) - next(i, axis))                 ! 1270-1320
+        end do
+      end do
+    end if
     if (e%listing%base_not_restored) then
-      next = first
+      do axis = 1, 3
+        do i = 1, LANE_COUNT
+          next(i, axis) = first(i, axis)
+        end do
+      end do
     else
-      next = after
+      do axis = 1, 3
+        do i = 1, LANE_COUNT
+          next(i, axis) = U(i, axis)
+        end do
+      end do
     end if
-    if (.not. e%scene%may_stop) return
-    if (e%listing%lipschitz_mismatched_pairs) then
-      change_u = abs(after - base)                                                ! 1270-1320
-    else
-      change_u = abs(third - P)                                                   ! 1270-1320
-    end if
-    change_k = abs(K(:, :, 4) - K(:, :, 1))                                       ! 1330-1380
-  end subroutine carry
+  end subroutine close_step
 
   pure subroutine test(e, b, s, verdict, found)
     !! Whether any lane exceeds: lipschitz_test says in what.

@@ -52,7 +52,7 @@ end subroutine run_program
 subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forces, &
                         torque_constant, torque_rate, torque_first, torque_varies, n_sines, sines, &
                         n_cosines, cosines, step_size, n_steps, lipschitz, may_stop, &
-                        with_velocity, n_at, at, omega_rows, n_velocities, velocity_rows, n_times, &
+                        with_velocity, given_up, n_at, at, omega_rows, n_velocities, velocity_rows, n_times, &
                         times, n_iers, ier_rows, n_rows, status, stop_variable, stop_quotient)
   ! One of the three programs on n bodies. What is not reached of the results stays as it was.
   !f2py threadsafe
@@ -78,6 +78,7 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
   integer(4), intent(in) :: n_steps
   real(8), intent(in), target :: lipschitz(n)
   integer(4), intent(in) :: may_stop, with_velocity
+  integer(4), intent(inout), target :: given_up(1) ! not 0: by another thread, while this one runs
   integer(4), intent(in) :: n_at
   integer(4), intent(in), target :: at(n_at)               ! steps whose rows are wanted, rising
   real(8), intent(inout), target :: omega_rows(3, n_at, n)
@@ -97,8 +98,8 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
                  torque_varies /= 0, sines, cosines, 1.0d0, n_steps, 1.0d0, may_stop /= 0, &
                  with_velocity /= 0)
   call run_lanes(ensemble_t(program, listing_from_bits(flags), scene, n, n_at, body, omega, &
-                            torque_constant, torque_first, step_size, lipschitz, at, omega_rows, &
-                            velocity_rows, times, ier_rows, n_rows, status, stop_variable, &
+                            torque_constant, torque_first, step_size, lipschitz, at, given_up(1), &
+                            omega_rows, velocity_rows, times, ier_rows, n_rows, status, stop_variable, &
                             stop_quotient))
 end subroutine run_programs
 

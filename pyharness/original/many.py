@@ -21,8 +21,7 @@ from pyharness.original.many_input import above_zero, from_zero, is_finite, one_
 
 # Bodies side by side: LANE_COUNT of fortran/many/lanes.f90.
 _LANES = 32
-# What one call of the kernel is given among threads: steps of all its bodies.
-_LEAST_WORK, _MOST_WORK = 100_000, 10_000_000
+_LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
 _PIECES = 8  # for each thread, as bodies may end early
 _NOT_REACHED = -1
 
@@ -204,6 +203,7 @@ def _run(
     ier = np.full((n * prints_ier, at.size), _NOT_REACHED, dtype=np.int32)
     n_rows, status, stop_variable = (np.zeros(n, dtype=np.int32) for _ in range(3))
     quotient = np.full(n, np.nan)
+    given_up = np.zeros(1, dtype=np.int32)
     law = scene.torque
     waves = columns(law.sines), columns(law.cosines)
 
@@ -212,14 +212,14 @@ def _run(
             PROGRAMS.index(listing.program) + 1, listing.flags, by_moments, body[part].T,
             omega[part].T, scene.masses, scene.forces, constant[part].T, law.rate, first[part].T,
             law.varies, *waves, step_size[part], scene.steps, lipschitz[part], may_stop,
-            computes_velocity, at, omega_rows[part].T,
+            computes_velocity, given_up, at, omega_rows[part].T,
             velocity_rows[part if velocity else slice(0)].T,
             times[slice(None) if one_step_size else part].T,
             ier[part if prints_ier else slice(0)].T, n_rows[part], status[part],
             stop_variable[part], quotient[part],
         )  # fmt: skip
 
-    _share(some, list(_pieces(n, scene.steps, threads)), threads)
+    _share(some, list(_pieces(n, scene.steps, threads)), threads, given_up)
     return ProgramEnsemble(
         at=wanted,
         omega=omega_rows[:, back],
@@ -238,13 +238,15 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
     size = n
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
-        size = max(min(fair, _MOST_WORK // steps), _LEAST_WORK // steps, 1)
+        size = max(fair, _LEAST_WORK // steps, 1)
         size = -(-size // _LANES) * _LANES
     for begin in range(0, n, max(1, size)):
         yield slice(begin, min(n, begin + size))
 
 
-def _share(some: Callable[[slice], None], pieces: list[slice], threads: int) -> None:
+def _share(
+    some: Callable[[slice], None], pieces: list[slice], threads: int, given_up: NDArray[np.int32]
+) -> None:
     if threads == 1 or len(pieces) < 2:
         # Here and not in a thread of its own: Python gives signals to this one.
         for piece in pieces:
@@ -256,6 +258,8 @@ def _share(some: Callable[[slice], None], pieces: list[slice], threads: int) -> 
             for job in jobs:
                 job.result()
         except BaseException:
+            # Signals don't reach the others: they look at this.
+            given_up[0] = 1
             pool.shutdown(cancel_futures=True)
             raise
 

@@ -195,7 +195,9 @@ def _run(
     step_size, lipschitz = (spread(inputs[name], n, 1) for name in ("step_size", "lipschitz"))
     computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
     prints_ier = listing.program != "runge-kutta"
-    at, back = np.unique(wanted, return_inverse=True)
+    # The kernel takes one row at least.
+    at = np.unique(wanted) if wanted.size else np.full(1, scene.steps, dtype=np.int32)
+    back = np.searchsorted(at, wanted)
     # Body by body, as the kernel's columns are.
     omega_rows = np.full((n, at.size, 3), np.nan)
     velocity_rows = np.full((n * velocity, at.size, 3), np.nan)

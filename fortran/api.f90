@@ -52,8 +52,9 @@ end subroutine run_program
 subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forces, &
                         torque_constant, torque_rate, torque_first, torque_varies, n_sines, sines, &
                         n_cosines, cosines, step_size, n_steps, lipschitz, may_stop, &
-                        with_velocity, given_up, n_at, at, omega_rows, n_velocities, velocity_rows, n_times, &
-                        times, n_iers, ier_rows, n_rows, status, stop_variable, stop_quotient)
+                        with_velocity, given_up, n_at, at, omega_rows, n_velocities, &
+                        velocity_rows, n_times, times, n_iers, ier_rows, n_rows, status, &
+                        stop_variable, stop_quotient)
   ! One of the three programs on n bodies. What is not reached of the results stays as it was.
   !f2py threadsafe
   use deck, only: deck_t
@@ -99,8 +100,8 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
                  with_velocity /= 0)
   call run_lanes(ensemble_t(program, listing_from_bits(flags), scene, n, n_at, body, omega, &
                             torque_constant, torque_first, step_size, lipschitz, at, given_up(1), &
-                            omega_rows, velocity_rows, times, ier_rows, n_rows, status, stop_variable, &
-                            stop_quotient))
+                            omega_rows, velocity_rows, times, ier_rows, n_rows, status, &
+                            stop_variable, stop_quotient))
 end subroutine run_programs
 
 subroutine solve_linear(n, m, a, b, factors, x, ier)

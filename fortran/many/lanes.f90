@@ -19,7 +19,7 @@ module lanes
 
   type, public :: block_t
     ! What is read lane by lane comes first: whole lines of the cache.
-    real(dp), dimension(LANE_COUNT, 3) :: U        !! at the step's beginning, then its result, rad/s
+    real(dp), dimension(LANE_COUNT, 3) :: U        !! when a step begins, then its result, rad/s
     real(dp), dimension(LANE_COUNT, 3) :: V        !! the same, m/s
     real(dp), dimension(LANE_COUNT) :: A, B, C     !! of equations 13-15
     real(dp), dimension(LANE_COUNT) :: step, DT, TIME

@@ -122,7 +122,7 @@ contains
     type(block_t), intent(inout) :: b
     type(grid_t), intent(inout) :: s
     real(dp) :: u1, u2, u3
-    real(dp), dimension(LANE_COUNT) :: there1, there2, there3
+    real(dp) :: there(LANE_COUNT, 3)
     integer :: i
     integer :: k
 
@@ -140,11 +140,11 @@ contains
     end do
     call solve_alike(s)                                                           ! 1320
     do k = 1, 4
-      call evaluate(s, k, b%U(:, 1), b%U(:, 2), b%U(:, 3), there1, there2, there3)               ! 1390-1440
+      call evaluate(s, k, b%U, there)                                             ! 1390-1440
       do i = 1, LANE_COUNT
-        u1 = there1(i)
-        u2 = there2(i)
-        u3 = there3(i)
+        u1 = there(i, 1)
+        u2 = there(i, 2)
+        u3 = there(i, 3)
         s%U(i, 1, k) = u1
         s%U(i, 2, k) = u2
         s%U(i, 3, k) = u3
@@ -154,61 +154,59 @@ contains
       end do
     end do
     call solve(s)                                                                 ! 2010
-    call evaluate(s, 5, s%U(:, 1, 0), s%U(:, 2, 0), s%U(:, 3, 0), b%U(:, 1), b%U(:, 2), b%U(:, 3)) ! 2030-2080
+    call evaluate(s, 5, s%U(:, :, 0), b%U)                                        ! 2030-2080
   end subroutine turn
 
   pure subroutine move(b, s)
     !! The velocity, along the angular velocities at the beginning and at the points.
     type(block_t), intent(inout) :: b
     type(grid_t), intent(inout) :: s
-    real(dp), dimension(LANE_COUNT) :: v1, v2, v3
+    real(dp) :: v(LANE_COUNT, 3)
     integer :: k
 
-    call push(b, s, 0, b%V(:, 1), b%V(:, 2), b%V(:, 3))                                          ! 810-830
+    call push(b, s, 0, b%V)                                                       ! 810-830
     call solve_alike(s)                                                           ! 1320
     do k = 1, 4
-      call evaluate(s, k, b%V(:, 1), b%V(:, 2), b%V(:, 3), v1, v2, v3)                           ! 1450-1500
-      call push(b, s, k, v1, v2, v3)                                              ! 1540-1560
+      call evaluate(s, k, b%V, v)                                                 ! 1450-1500
+      call push(b, s, k, v)                                                       ! 1540-1560
     end do
     call solve(s)                                                                 ! 2010
-    v1 = b%V(:, 1)
-    v2 = b%V(:, 2)
-    v3 = b%V(:, 3)
-    call evaluate(s, 5, v1, v2, v3, b%V(:, 1), b%V(:, 2), b%V(:, 3))                             ! 2090-2140
+    v = b%V
+    call evaluate(s, 5, v, b%V)                                                   ! 2090-2140
   end subroutine move
 
-  pure subroutine push(b, s, k, v1, v2, v3)
+  pure subroutine push(b, s, k, v)
     !! Right-hand sides at point k, or at the beginning.
     type(block_t), intent(in) :: b
     type(grid_t), intent(inout) :: s
     integer, intent(in) :: k
-    real(dp), dimension(LANE_COUNT), intent(in) :: v1, v2, v3
+    real(dp), intent(in) :: v(LANE_COUNT, 3)
     integer :: i
     integer :: at
 
     at = max(1, k)
     do i = 1, LANE_COUNT
-      s%sides(i, at, 1) = b%ACL1 + v2(i)*s%U(i, 3, k) - v3(i)*s%U(i, 2, k)
-      s%sides(i, at, 2) = b%ACL2 + v3(i)*s%U(i, 1, k) - v1(i)*s%U(i, 3, k)
-      s%sides(i, at, 3) = b%ACL3 + v1(i)*s%U(i, 2, k) - v2(i)*s%U(i, 1, k)
+      s%sides(i, at, 1) = b%ACL1 + v(i, 2)*s%U(i, 3, k) - v(i, 3)*s%U(i, 2, k)
+      s%sides(i, at, 2) = b%ACL2 + v(i, 3)*s%U(i, 1, k) - v(i, 1)*s%U(i, 3, k)
+      s%sides(i, at, 3) = b%ACL3 + v(i, 1)*s%U(i, 2, k) - v(i, 2)*s%U(i, 1, k)
     end do
   end subroutine push
 
-  pure subroutine evaluate(s, k, base1, base2, base3, x1, x2, x3)
+  pure subroutine evaluate(s, k, base, x)
     !! The trial functions at time k, from the values at the beginning.
     type(grid_t), intent(in) :: s
     integer, intent(in) :: k
-    real(dp), dimension(LANE_COUNT), intent(in) :: base1, base2, base3
-    real(dp), dimension(LANE_COUNT), intent(out) :: x1, x2, x3
+    real(dp), intent(in) :: base(LANE_COUNT, 3)
+    real(dp), intent(out) :: x(LANE_COUNT, 3)
+    integer :: axis
     integer :: i
 
-    do i = 1, LANE_COUNT
-      x1(i) = base1(i) + s%terms(i, 1, 1)*s%T(i, k) + s%terms(i, 2, 1)*s%TL2(i, k) + &
-              s%terms(i, 3, 1)*s%TL3(i, k) + s%terms(i, 4, 1)*s%TL4(i, k)
-      x2(i) = base2(i) + s%terms(i, 1, 2)*s%T(i, k) + s%terms(i, 2, 2)*s%TL2(i, k) + &
-              s%terms(i, 3, 2)*s%TL3(i, k) + s%terms(i, 4, 2)*s%TL4(i, k)
-      x3(i) = base3(i) + s%terms(i, 1, 3)*s%T(i, k) + s%terms(i, 2, 3)*s%TL2(i, k) + &
-              s%terms(i, 3, 3)*s%TL3(i, k) + s%terms(i, 4, 3)*s%TL4(i, k)
+    do axis = 1, 3
+      do i = 1, LANE_COUNT
+        x(i, axis) = base(i, axis) + s%terms(i, 1, axis)*s%T(i, k) + &
+                     s%terms(i, 2, axis)*s%TL2(i, k) + s%terms(i, 3, axis)*s%TL3(i, k) + &
+                     s%terms(i, 4, axis)*s%TL4(i, k)
+      end do
     end do
   end subroutine evaluate
 

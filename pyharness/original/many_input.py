@@ -21,7 +21,7 @@ from_zero: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows(where: str, values: object, width: int, rule: Rule) -> Array:
-    """Return an array of shape (width,) or (n, width), for width 1 () or (n,), of what a rule allows.
+    """Return an array of shape (width,) or (n, width), or of () or (n,), of what a rule allows.
 
     InputError, which begins with `where` and the number of a row, for anything else.
     """

@@ -20,7 +20,7 @@ AT_REST = 1e9  # 1/s: the stop test is made, and ends nothing
 
 def best(task: Callable[[], object], repeats: int = 9) -> float:
     """Return the least time of a task (s)."""
-    found = np.inf
+    found = float("inf")
     for _ in range(repeats):
         begin = time.perf_counter()
         task()
@@ -35,7 +35,7 @@ def single(listing: Listing, steps: int) -> float:
     calls = max(1, 100_000 // steps)
     run = extension().run_program
     taken = run(*given)[2]  # it may overflow before
-    return best(lambda: [run(*given) for _ in range(calls)]) / calls / taken * 1e9
+    return best(lambda: [run(*given) for _ in range(calls)]) / calls / int(taken) * 1e9
 
 
 def side_by_side(listing: Listing, steps: int, threads: int = 1, work: int = BODY_STEPS) -> float:
@@ -47,7 +47,7 @@ def side_by_side(listing: Listing, steps: int, threads: int = 1, work: int = BOD
     def task() -> ProgramEnsemble:
         return run_many(scene, listing, omega0=omega, lipschitz=AT_REST, threads=threads)
 
-    return best(task) / task().n_rows.sum() * 1e9
+    return best(task) / int(task().n_rows.sum()) * 1e9
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -29,6 +29,7 @@ contains
     type(block_t), intent(inout) :: b
     type(grid_t), intent(inout) :: s
     real(dp), parameter :: shares(4) = [0.2_dp, 0.4_dp, 0.6_dp, 0.8_dp]
+    real(dp) :: factors(4, 4)
     integer :: i
     integer :: k
 
@@ -39,21 +40,28 @@ contains
     s%TL2 = s%T*s%T
     s%TL3 = s%TL2*s%T
     s%TL4 = s%TL2*s%TL2
-    do i = 1, LANE_COUNT
-      if (i > 1 .and. b%one_step_size) then
-        s%A(i, :, :) = s%A(1, :, :)
-        s%row(i, :) = s%row(1, :)
-        b%ier(i) = b%ier(1)
-      else
-        call set_factors(s%T(i, 1:4), s%A(i, :, :), s%row(i, :), b%ier(i))
-      end if
-    end do
+    if (b%one_step_size) then
+      call set_factors(s%T(1, 1:4), factors, s%row(1, :), b%ier(1))
+      b%ier = b%ier(1)
+      do k = 1, 4
+        do i = 1, 4
+          s%A(:, i, k) = factors(i, k)
+        end do
+        s%row(:, k) = s%row(1, k)
+      end do
+      s%one_order = .true.
+    else
+      do i = 1, LANE_COUNT
+        call set_factors(s%T(i, 1:4), factors, s%row(i, :), b%ier(i))
+        s%A(i, :, :) = factors
+      end do
+      s%one_order = .true.
+      do k = 1, 4
+        s%one_order = s%one_order .and. all(s%row(:, k) == s%row(1, k))
+      end do
+    end if
     s%singular = b%ier /= 0
     s%any_singular = any(s%singular)
-    s%one_order = .true.
-    do k = 1, 4
-      s%one_order = s%one_order .and. all(s%row(:, k) == s%row(1, k))
-    end do
   end subroutine set_grid
 
   subroutine set_factors(T, factors, row, ier)

@@ -57,7 +57,7 @@ def _linear() -> object:
 
 
 def _many(program: str, threads: int) -> object:
-    starts = np.full((2000, 3), BUSY.omega)
+    starts = np.full((64, 3), BUSY.omega)
     return run_many(
         BUSY, corrected(program), omega0=starts, may_stop=False, threads=threads, effort=1e9
     )

@@ -212,3 +212,24 @@ def test_velocity_that_the_stop_test_reads_is_computed_unasked() -> None:
     found = run_many(case_scene(5), listing, **options)
     assert found.stop_variable[0] == 8
     assert_alike(found, case_scene(5), listing, options)
+
+
+@pytest.mark.parametrize("keep", [[], ["lipschitz-per-component"], ["lipschitz-tests-velocity"]])
+def test_constants_beside_the_quotient_itself(level: int, keep: list[str]) -> None:
+    """The last bit of a constant decides; numbers whose squares vanish or overflow among them."""
+    listing = subset("runge-kutta", "corrected", keep=keep)
+    source = np.random.default_rng(1)
+    scene = replace(case_scene(5), steps=2)
+    sizes = 10.0 ** source.choice([-165.0, -150.0, 0.0, 1.0, 75.0], (80, 1))
+    omega = source.normal(size=(80, 3)) * sizes
+    found = run_many(scene, listing, omega0=omega, lipschitz=0.0, at=[])
+    stopped = found.stop_variable > 0
+    assert stopped.sum() > 40
+    quotient, omega = found.stop_quotient[stopped], omega[stopped]
+    for constant in (
+        quotient,
+        *(np.nextafter(quotient, end) for end in (0.0, np.inf)),
+        *(quotient * (1.0 + few * 2.0**-52) for few in (-3, -2, 2, 3)),
+    ):
+        options: Options = {"omega0": omega, "lipschitz": constant, "at": [1, 2]}
+        assert_alike(run_many(scene, listing, **options), scene, listing, options)

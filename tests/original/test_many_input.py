@@ -20,11 +20,12 @@ from tests.original.single_runs import Options, assert_same, same_bits
 
 def test_numbers_of_any_type() -> None:
     scene, listing = case_scene(3), corrected("two-term")
-    wanted = run_many(scene, listing, omega0=[[0.5, 1.0, 2.0]], moments=(4.0, 3.0, 2.0))
+    starts = [[0.5, 1.0, 2.0], [0.5, -1.0, 2.0]]
+    wanted = run_many(scene, listing, omega0=starts, moments=(4.0, 3.0, 2.0))
     kinds: list[tuple[Any, Any]] = [
-        ([[Fraction(1, 2), 1, 2]], np.array([4, 3, 2])),
-        (np.array([[0.5, 1.0, 2.0]], dtype=np.float32), (4, 3, Fraction(2))),
-        (np.asfortranarray([[0.5, 1.0, 2.0]]), np.array([4, 9, 3, 9, 2, 9.0])[::2]),
+        ([[Fraction(1, 2), 1, 2], [0.5, Fraction(-1), 2]], np.array([4, 3, 2])),
+        (np.array(starts, dtype=np.float32), (4, 3, Fraction(2))),
+        (np.asfortranarray(starts), np.array([4, 9, 3, 9, 2, 9.0])[::2]),
     ]
     for omega, moments in kinds:
         found = run_many(scene, listing, omega0=omega, moments=moments, threads=np.int64(1))

@@ -2,13 +2,13 @@ module lanes
   !! Bodies side by side, each in a lane of its own: what the three programs have in common.
   !! Every lane has the operations of deck.f90 in their order, and so the same bits.
   use, intrinsic :: iso_fortran_env, only: int64
+  use blocks, only: LANE_COUNT
   use kinds, only: dp
   use deck, only: accelerations, deck_t, euler_coefficients
   use ensemble, only: ensemble_t
   implicit none(type, external)
   private
 
-  integer, parameter, public :: LANE_COUNT = 32
   integer, parameter, public :: POINTS = 5 !! at which a step reads the torque, at the most
 
   ! What a step says of a lane: bits.

@@ -1,9 +1,10 @@
 module lanes_four_term
   !! A step of four_term.f90 in every lane; the margin names its cards.
   !! The matrix knows DT alone: it is factored where DT is another, and not for every body.
+  use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
-  use lanes, only: block_t, first_torque, set_torque, spread_torque, LANE_COUNT
+  use lanes, only: block_t, first_torque, set_torque, spread_torque
   use linear_solver, only: factor
   implicit none(type, external)
   private

@@ -2,9 +2,10 @@ module lanes_runge_kutta
   !! A step of runge_kutta.f90 in every lane; the margin names its cards.
   !! What a listing changes is which array a stage reads: no question is asked lane by lane.
   use, intrinsic :: iso_fortran_env, only: int64
+  use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
-  use lanes, only: block_t, first_torque, set_torque, spread_torque, EXCEEDS, GOES_ON, LANE_COUNT
+  use lanes, only: block_t, first_torque, set_torque, spread_torque, EXCEEDS, GOES_ON
   implicit none(type, external)
   private
 

@@ -3,10 +3,11 @@ module many_programs
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
+  use blocks, only: LANE_COUNT
   use kinds, only: dp
   use deck, only: steps_between_looks, stop_t
   use ensemble, only: ensemble_t
-  use lanes, only: begin_block, block_t, EXCEEDS, GOES_ON, LANE_COUNT, look, OVERFLOWS
+  use lanes, only: begin_block, block_t, EXCEEDS, GOES_ON, look, OVERFLOWS
   use lanes_four_term, only: grid_t, set_grid, step_four_term, torque_four_term
   use lanes_runge_kutta, only: begin_stages, stages_t, step_runge_kutta, test, &
                                torque_runge_kutta

@@ -8,6 +8,7 @@ from typing import SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyharness.model.codes import Blocks
 from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
 from pyharness.model.extension import columns, extension
@@ -19,8 +20,6 @@ from pyharness.original.compiled import stop_reads_velocity
 from pyharness.original.equations import card_torque
 from pyharness.original.many_input import above_zero, from_zero, is_finite, one_count, rows, spread
 
-# Bodies side by side: LANE_COUNT of fortran/many/lanes.f90.
-_LANES = 32
 _LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
 _PIECES = 8  # for each thread, as bodies may end early
 _NOT_REACHED = -1
@@ -241,7 +240,7 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
         size = max(fair, _LEAST_WORK // steps, 1)
-        size = -(-size // _LANES) * _LANES
+        size = -(-size // Blocks.LANE_COUNT) * Blocks.LANE_COUNT
     for begin in range(0, n, max(1, size)):
         yield slice(begin, min(n, begin + size))
 

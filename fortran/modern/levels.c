@@ -18,16 +18,18 @@ typedef void free_solver(const void *bodies, double *omega, int8_t *status);
 typedef void series_solver(const void *bodies, double *omega, int8_t *status, int *interrupted);
 typedef void fixed_solver(const void *bodies, int method, double *omega, int8_t *status,
                           int *interrupted);
+typedef void runner(void *ensemble);
 
 #define DECLARED(level)                                                                        \
   solver taylor_solve_##level;                                                                 \
   quick_solver quick_solve_##level;                                                            \
-  free_solver solve_many_free_##level;                                                               \
-  series_solver solve_many_taylor_##level;                                                           \
-  fixed_solver solve_many_fixed_##level;
+  free_solver solve_many_free_##level;                                                         \
+  series_solver solve_many_taylor_##level;                                                     \
+  fixed_solver solve_many_fixed_##level;                                                       \
+  runner run_lanes_##level;
 #define TAKEN(level)                                                                           \
-  {taylor_solve_##level, quick_solve_##level, solve_many_free_##level, solve_many_taylor_##level,          \
-   solve_many_fixed_##level}
+  {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
+   solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -41,6 +43,7 @@ static struct {
   free_solver *free;
   series_solver *series;
   fixed_solver *fixed;
+  runner *lanes;
 } chosen, known[] = {
   TAKEN(plain),
 #ifdef WITH_LEVELS
@@ -99,3 +102,5 @@ void many_fixed(const void *bodies, int method, double *omega, int8_t *status, i
 {
   chosen.fixed(bodies, method, omega, status, interrupted);
 }
+
+void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

@@ -1,12 +1,13 @@
 module levels
-  !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a problem_t
-  !! on as it is, and knows no more of it than its address.
+  !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a problem_t,
+  !! a bodies_t or an ensemble_t on as it is, and knows no more of it than its address.
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
   use bodies, only: i1
   implicit none(type, external)
   private
 
-  public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, taylor_solve
+  public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, run_lanes, &
+            taylor_solve
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
@@ -76,6 +77,12 @@ module levels
       integer(i1), intent(inout) :: status(*)
       integer(c_int), intent(out) :: interrupted
     end subroutine many_fixed
+
+    subroutine run_lanes(ensemble) bind(c, name="run_lanes")
+      !! As in many_programs.f90.
+      implicit none(type, external)
+      type(*), intent(in) :: ensemble
+    end subroutine run_lanes
   end interface
 
 end module levels

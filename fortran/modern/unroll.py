@@ -30,6 +30,11 @@ MODULES = (
     "many_free",
     "many_fixed",
     "many_taylor",
+    "lanes",
+    "lanes_two_term",
+    "lanes_four_term",
+    "lanes_runge_kutta",
+    "many_programs",
 )
 LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)

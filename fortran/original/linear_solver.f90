@@ -10,7 +10,7 @@ module linear_solver
   integer, parameter :: LARGE = 500 ! order from which a column takes long enough for a look
   integer, parameter, public :: SINGULAR = 129 !! IER: the matrix is algorithmically singular
 
-  public :: leqt1f
+  public :: factor, leqt1f
 
 contains
 

@@ -11,7 +11,7 @@ module runge_kutta_program
   implicit none(type, external)
   private
 
-  public :: runge_kutta
+  public :: lipschitz_test, runge_kutta
 
 contains
 

@@ -44,3 +44,9 @@ class Places:
     COEFFICIENTS_LOW = 15  # three: what rounding took off, for the closed form
     MOMENTS = 18  # three: of the closed form with attitude, and where the torque is in space
     WAVES = 21  # four for each sine, then for each cosine
+
+
+class Blocks:
+    """How many bodies go side by side through the programs of the appendix."""
+
+    LANE_COUNT = 32  # so that while one register waits there are others to go on with

@@ -19,6 +19,8 @@ _UNFORESEEN = 10.0  # where there is no forecast
 # Steps of a program without waves, some 30 s of the slowest; and what a wave costs of such a step.
 _MOST_STEPS = {"fortran": 1e8, "python": 5e5}
 _A_WAVE = {"fortran": 1.0, "python": 0.05}
+# The same of the compiled programs on many bodies, a step of each counted.
+_MOST_STEPS_OF_ALL = 1e9
 
 
 class Integrator(Protocol):
@@ -69,10 +71,26 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
     needed = scene.steps * cost / _MOST_STEPS[implementation]
     if needed <= checked_effort(effort) * _ROUNDING:
         return
+    raise InputError(
+        f"{program} ({implementation}): {_load(scene)} would take too long; "
+        + advice("take fewer steps", effort, needed / _SLACK)
+    )
+
+
+def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
+    """Refuse so many bodies that their steps take longer than anyone waits who was not asked."""
+    cost = 1.0 + _A_WAVE["fortran"] * waves(scene)
+    needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL
+    factor = checked_effort(effort)
+    if needed > factor * _ROUNDING:
+        raise InputError(
+            f"{program}: {_load(scene)} of {bodies} bodies would take too long; "
+            + advice("take fewer", factor, needed / _SLACK)
+        )
+
+
+def _load(scene: Scene) -> str:
     load = f"{scene.steps} steps"
     if waves(scene):
         load += f" with {waves(scene)} waves of torque"
-    raise InputError(
-        f"{program} ({implementation}): {load} would take too long; "
-        + advice("take fewer steps", effort, needed / _SLACK)
-    )
+    return load

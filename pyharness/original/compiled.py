@@ -65,9 +65,10 @@ def program_arguments(
         scene.steps,
         lipschitz,
         may_stop,
-        velocity or _stop_reads_velocity(listing, may_stop),
+        velocity or stop_reads_velocity(listing, may_stop),
     )
 
 
-def _stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
+def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
+    """Whether a run without velocity would end elsewhere."""
     return may_stop and listing.has("lipschitz-tests-velocity")

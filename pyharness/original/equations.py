@@ -37,10 +37,16 @@ def initial_torque(scene: Scene) -> Vector | None:
 
     By the conjecture `initial-torque` it acts over the first step.
     """
-    given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
-    if scene.case not in given or scene.moments is None:
+    given = card_torque(scene)
+    if given is None or scene.moments is None:
         return None
-    return [n / moment for n, moment in zip(given[scene.case], scene.moments, strict=True)]
+    return [n / moment for n, moment in zip(given, scene.moments, strict=True)]
+
+
+def card_torque(scene: Scene) -> Vector | None:
+    """Return the torque that Table 1 gives initially (N m); None where it gives none."""
+    given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
+    return given.get(scene.case)
 
 
 def all_finite(values: Vector) -> bool:

@@ -21,6 +21,7 @@ from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.original.compiled import run
+from pyharness.original.many import run_many
 
 # An idle machine needs some hundredths of a second; each call would take many seconds.
 PATIENCE = 1.5
@@ -55,6 +56,13 @@ def _linear() -> object:
     return room.extension().solve_linear(matrix, matrix[:, :1])
 
 
+def _many(program: str, threads: int) -> object:
+    starts = np.full((64, 3), BUSY.omega)
+    return run_many(
+        BUSY, corrected(program), omega0=starts, may_stop=False, threads=threads, effort=1e9
+    )
+
+
 LONG: dict[str, Callable[[], object]] = {
     "taylor": _method(PUSHED, "taylor", 1e5),
     "taylor-waves": _method(CROWDED, "taylor", 1e5),
@@ -70,6 +78,8 @@ LONG: dict[str, Callable[[], object]] = {
     "gauss-8": _method(CROWDED, "gauss-8", 1e5),
     "sphere": lambda: solve(SPHERE, TIMES, "closed-form", 1e-12, effort=1e6),
     **{name: partial(run, BUSY, corrected(name), may_stop=False) for name in PROGRAMS},
+    **{f"many-{name}": partial(_many, name, 1) for name in PROGRAMS},
+    "many-threads": partial(_many, "four-term", 2),
     "linear-solver": _linear,
     "dop853": _method(PUSHED, "dop853", 1e4, 1e-3),
     "lsoda": _method(PUSHED, "lsoda", 1e4, 1e-3),
@@ -109,7 +119,7 @@ def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rooms = [f"methods.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss")]
-    for each in (*rooms, "original.compiled", "model.extension"):
+    for each in (*rooms, "original.compiled", "original.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:
         keyboard.press()

@@ -1,4 +1,4 @@
-module ensemble
+module many_bodies
   !! Many bodies in one call: side by side where that will do, and each by itself what is left.
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int64
@@ -228,4 +228,4 @@ contains
     if (.not. abs(remainder_of) <= huge(x)) remainder_of = 0.0_dp
   end function remainder_of
 
-end module ensemble
+end module many_bodies

@@ -1,0 +1,180 @@
+module lanes
+  !! Bodies side by side, each in a lane of its own: what the three programs have in common.
+  !! Every lane has the operations of deck.f90 in their order, and so the same bits.
+  use, intrinsic :: iso_fortran_env, only: int64
+  use blocks, only: LANE_COUNT
+  use kinds, only: dp
+  use deck, only: accelerations, deck_t, euler_coefficients
+  use ensemble, only: ensemble_t
+  implicit none(type, external)
+  private
+
+  integer, parameter, public :: POINTS = 5 !! at which a step reads the torque, at the most
+
+  ! What a step says of a lane: bits.
+  integer(int64), parameter, public :: GOES_ON = 0_int64
+  integer(int64), parameter, public :: OVERFLOWS = 1_int64
+  integer(int64), parameter, public :: EXCEEDS = 2_int64  !! the Lipschitz constant
+  integer(int64), parameter, public :: EVERY_BIT = -1_int64
+
+  type, public :: block_t
+    ! What is read lane by lane comes first: whole lines of the cache.
+    real(dp), dimension(LANE_COUNT, 3) :: U        !! when a step begins, then its result, rad/s
+    real(dp), dimension(LANE_COUNT, 3) :: V        !! the same, m/s
+    real(dp), dimension(LANE_COUNT) :: A, B, C     !! of equations 13-15
+    real(dp), dimension(LANE_COUNT) :: step, DT, TIME
+    real(dp), dimension(LANE_COUNT) :: lipschitz
+    real(dp), dimension(LANE_COUNT, 3) :: body, torque_constant, torque_first
+    real(dp) :: M(LANE_COUNT, 3, POINTS)  !! torque over moment, 1/s2
+    integer(int64) :: alive(LANE_COUNT)   !! EVERY_BIT until the run ends, then none
+    integer :: ier(LANE_COUNT)
+    real(dp) :: ACL1, ACL2, ACL3          !! force over mass, m/s2
+    integer :: first                      !! body of the first lane
+    integer :: used                       !! lanes with a body; the others repeat the first
+    logical :: one_step_size              !! of all lanes
+    integer :: rest(7)                    !! to the end of a line
+  end type block_t
+
+  public :: begin_block, first_torque, look, set_torque, spread_torque
+
+contains
+
+  subroutine begin_block(e, first, b)
+    !! The cards before the loop over steps.
+    type(ensemble_t), intent(in) :: e
+    integer, intent(in) :: first
+    type(block_t), intent(out) :: b
+    type(deck_t) :: scene
+    integer :: i
+    integer :: of_body
+
+    b%first = first
+    b%used = min(LANE_COUNT, e%n - first + 1)
+    scene = e%scene
+    do i = 1, LANE_COUNT
+      of_body = first + merge(i - 1, 0, i <= b%used)
+      b%alive(i) = merge(EVERY_BIT, 0_int64, i <= b%used)
+      scene%body = e%body(:, of_body)
+      call euler_coefficients(scene, b%A(i), b%B(i), b%C(i))
+      b%body(i, :) = scene%body
+      b%U(i, :) = e%omega(:, of_body)
+      b%torque_constant(i, :) = e%torque_constant(:, of_body)
+      b%torque_first(i, :) = e%torque_first(:, of_body)
+      b%step(i) = e%step_size(of_body)
+      b%lipschitz(i) = e%lipschitz(of_body)
+    end do
+    b%one_step_size = all(b%step == b%step(1))
+    b%V = 0.0_dp
+    b%DT = b%step
+    b%TIME = 0.0_dp
+    b%ier = 0
+    call accelerations(scene, b%ACL1, b%ACL2, b%ACL3)
+    if (.not. scene%torque_varies) then
+      call set_torque(scene, b, b%TIME, 1)
+      call spread_torque(b)
+    end if
+  end subroutine begin_block
+
+  subroutine first_torque(b)
+    !! What the cards have, over the first step.
+    type(block_t), intent(inout) :: b
+
+    b%M(:, :, 1) = b%torque_first
+    call spread_torque(b)
+  end subroutine first_torque
+
+  subroutine spread_torque(b)
+    !! That of the first point at all points.
+    type(block_t), intent(inout) :: b
+    integer :: point
+
+    do point = 2, POINTS
+      b%M(:, :, point) = b%M(:, :, 1)
+    end do
+  end subroutine spread_torque
+
+  subroutine set_torque(scene, b, time, point)
+    !! N(time) over the moments at one point: normalized_torque of deck.f90.
+    type(deck_t), intent(in) :: scene
+    type(block_t), intent(inout) :: b
+    real(dp), intent(in) :: time(LANE_COUNT)
+    integer, intent(in) :: point
+    real(dp) :: wave(LANE_COUNT)
+    integer :: axis
+    integer :: i
+    integer :: term
+
+    associate (N => b%M(:, :, point))
+      N = b%torque_constant
+      if (scene%torque_varies) then
+        do axis = 1, 3
+          do i = 1, LANE_COUNT
+            N(i, axis) = N(i, axis) + scene%torque_rate(axis)*time(i)
+          end do
+        end do
+        do term = 1, size(scene%sines, 2)
+          wave(1) = sin(scene%sines(4, term)*time(1))
+          if (b%one_step_size) then
+            wave(2:) = wave(1)
+          else
+            do i = 2, LANE_COUNT
+              wave(i) = sin(scene%sines(4, term)*time(i))
+            end do
+          end if
+          call add(scene%sines(1:3, term), wave, N)
+        end do
+        do term = 1, size(scene%cosines, 2)
+          wave(1) = cos(scene%cosines(4, term)*time(1))
+          if (b%one_step_size) then
+            wave(2:) = wave(1)
+          else
+            do i = 2, LANE_COUNT
+              wave(i) = cos(scene%cosines(4, term)*time(i))
+            end do
+          end if
+          call add(scene%cosines(1:3, term), wave, N)
+        end do
+      end if
+      if (scene%by_moments) then
+        do axis = 1, 3
+          do i = 1, LANE_COUNT
+            N(i, axis) = N(i, axis)/b%body(i, axis)
+          end do
+        end do
+      end if
+    end associate
+  end subroutine set_torque
+
+  pure subroutine add(amplitude, wave, N)
+    real(dp), intent(in) :: amplitude(3)
+    real(dp), intent(in) :: wave(LANE_COUNT)
+    real(dp), intent(inout) :: N(LANE_COUNT, 3)
+    integer :: axis
+    integer :: i
+
+    do axis = 1, 3
+      do i = 1, LANE_COUNT
+        N(i, axis) = N(i, axis) + amplitude(axis)*wave(i)
+      end do
+    end do
+  end subroutine add
+
+  pure subroutine look(b, verdict, found)
+    !! Whether any lane overflows: is_finite of deck.f90.
+    type(block_t), intent(in) :: b
+    integer(int64), intent(out) :: verdict(LANE_COUNT) !! of lanes that are alive
+    integer(int64), intent(out) :: found               !! of any of them
+    integer(int64) :: here
+    integer :: i
+
+    found = GOES_ON
+    do i = 1, LANE_COUNT
+      here = ior(ior(merge(GOES_ON, OVERFLOWS, abs(b%U(i, 1)) <= huge(1.0_dp)), &
+                     merge(GOES_ON, OVERFLOWS, abs(b%U(i, 2)) <= huge(1.0_dp))), &
+                 merge(GOES_ON, OVERFLOWS, abs(b%U(i, 3)) <= huge(1.0_dp)))
+      verdict(i) = iand(here, b%alive(i))
+      found = ior(found, verdict(i))
+    end do
+  end subroutine look
+
+end module lanes

@@ -1,0 +1,276 @@
+module lanes_four_term
+  !! A step of four_term.f90 in every lane; the margin names its cards.
+  !! The matrix knows DT alone: it is factored where DT is another, and not for every body.
+  use blocks, only: LANE_COUNT
+  use kinds, only: dp
+  use ensemble, only: ensemble_t
+  use lanes, only: block_t, first_torque, set_torque, spread_torque
+  use linear_solver, only: factor
+  implicit none(type, external)
+  private
+
+  type, public :: grid_t
+    real(dp), dimension(LANE_COUNT, 5) :: T, TL2, TL3, TL4 !! T1 to T5 and their powers
+    real(dp) :: A(LANE_COUNT, 4, 4)       !! its factors
+    real(dp) :: U(LANE_COUNT, 3, 0:4)     !! omega at the beginning and at T1 to T4
+    real(dp) :: sides(LANE_COUNT, 4, 3)   !! right-hand sides at T1 to T4
+    real(dp) :: terms(LANE_COUNT, 4, 3)   !! coefficients of the trial functions
+    integer :: row(LANE_COUNT, 4)         !! of B, that stands at each row of the factors
+    logical :: singular(LANE_COUNT)
+    logical :: one_order                  !! of rows, in all lanes
+    logical :: any_singular
+  end type grid_t
+
+  public :: set_grid, step_four_term, torque_four_term
+
+contains
+
+  subroutine set_grid(b, s)
+    !! What follows from DT.
+    type(block_t), intent(inout) :: b
+    type(grid_t), intent(inout) :: s
+    real(dp), parameter :: shares(4) = [0.2_dp, 0.4_dp, 0.6_dp, 0.8_dp]
+    real(dp) :: factors(4, 4)
+    integer :: i
+    integer :: k
+
+    do k = 1, 4
+      s%T(:, k) = b%DT*shares(k)                                                  ! 720-750
+    end do
+    s%T(:, 5) = b%step                                                            ! 760
+    s%TL2 = s%T*s%T
+    s%TL3 = s%TL2*s%T
+    s%TL4 = s%TL2*s%TL2
+    if (b%one_step_size) then
+      call set_factors(s%T(1, 1:4), factors, s%row(1, :), b%ier(1))
+      b%ier = b%ier(1)
+      do k = 1, 4
+        do i = 1, 4
+          s%A(:, i, k) = factors(i, k)
+        end do
+        s%row(:, k) = s%row(1, k)
+      end do
+      s%one_order = .true.
+    else
+      do i = 1, LANE_COUNT
+        call set_factors(s%T(i, 1:4), factors, s%row(i, :), b%ier(i))
+        s%A(i, :, :) = factors
+      end do
+      s%one_order = .true.
+      do k = 1, 4
+        s%one_order = s%one_order .and. all(s%row(:, k) == s%row(1, k))
+      end do
+    end if
+    s%singular = b%ier /= 0
+    s%any_singular = any(s%singular)
+  end subroutine set_grid
+
+  subroutine set_factors(T, factors, row, ier)
+    real(dp), intent(in) :: T(4)
+    real(dp), intent(out) :: factors(4, 4)
+    integer, intent(out) :: row(4)
+    integer, intent(out) :: ier
+    real(dp) :: A(4, 4)
+    integer :: pivot(4)
+    integer :: held
+    integer :: k
+
+    do k = 1, 4
+      A(k, 1) = 1.0_dp                                                            ! 850-970
+      A(k, 2) = 2.0_dp*T(k)                                                       ! 860-980
+      A(k, 3) = 3.0_dp*(T(k)*T(k))                                                ! 870-990
+      A(k, 4) = 4.0_dp*(T(k)*T(k)*T(k))                                           ! 880-1000
+    end do
+    call factor(A, 4, pivot, ier)
+    row = [1, 2, 3, 4]
+    factors = 1.0_dp
+    if (ier /= 0) return
+    factors = A
+    do k = 1, 4
+      held = row(pivot(k))
+      row(pivot(k)) = row(k)
+      row(k) = held
+    end do
+  end subroutine set_factors
+
+  subroutine torque_four_term(e, I, b, s)
+    !! Where the torque varies: as assumed where no card exists.
+    type(ensemble_t), intent(in) :: e
+    integer, intent(in) :: I
+    type(block_t), intent(inout) :: b
+    type(grid_t), intent(in) :: s
+    real(dp) :: time(LANE_COUNT)
+    integer :: k
+
+    if (e%listing%initial_torque .and. I == 1) then
+      call first_torque(b)
+    else if (e%listing%torque_held) then
+      call set_torque(e%scene, b, b%TIME, 1)
+      call spread_torque(b)
+    else
+      time = real(I - 1, dp)*b%step
+      call set_torque(e%scene, b, time, 1)
+      do k = 1, 4
+        time = real(I - 1, dp)*b%step + s%T(:, k)
+        call set_torque(e%scene, b, time, k + 1)
+      end do
+    end if
+  end subroutine torque_four_term
+
+  pure subroutine step_four_term(e, b, s)
+    type(ensemble_t), intent(in) :: e
+    type(block_t), intent(inout) :: b
+    type(grid_t), intent(inout) :: s
+
+    call turn(b, s)
+    if (e%scene%with_velocity) call move(b, s)
+  end subroutine step_four_term
+
+  pure subroutine turn(b, s)
+    !! The angular velocity, which does not see the velocity.
+    type(block_t), intent(inout) :: b
+    type(grid_t), intent(inout) :: s
+    real(dp) :: u1, u2, u3
+    real(dp) :: there(LANE_COUNT, 3)
+    integer :: i
+    integer :: k
+
+    ! first estimate: constant right-hand sides
+    do i = 1, LANE_COUNT
+      u1 = b%U(i, 1)
+      u2 = b%U(i, 2)
+      u3 = b%U(i, 3)
+      s%U(i, 1, 0) = u1
+      s%U(i, 2, 0) = u2
+      s%U(i, 3, 0) = u3
+      s%sides(i, 1, 1) = b%M(i, 1, 1) + b%A(i)*u2*u3                              ! 780
+      s%sides(i, 1, 2) = b%M(i, 2, 1) + b%B(i)*u1*u3                              ! 790
+      s%sides(i, 1, 3) = b%M(i, 3, 1) + b%C(i)*u1*u2                              ! 800
+    end do
+    call solve_alike(s)                                                           ! 1320
+    do k = 1, 4
+      call evaluate(s, k, b%U, there)                                             ! 1390-1440
+      do i = 1, LANE_COUNT
+        u1 = there(i, 1)
+        u2 = there(i, 2)
+        u3 = there(i, 3)
+        s%U(i, 1, k) = u1
+        s%U(i, 2, k) = u2
+        s%U(i, 3, k) = u3
+        s%sides(i, k, 1) = b%M(i, 1, k + 1) + b%A(i)*u2*u3                        ! 1510
+        s%sides(i, k, 2) = b%M(i, 2, k + 1) + b%B(i)*u1*u3                        ! 1520
+        s%sides(i, k, 3) = b%M(i, 3, k + 1) + b%C(i)*u1*u2                        ! 1530
+      end do
+    end do
+    call solve(s)                                                                 ! 2010
+    call evaluate(s, 5, s%U(:, :, 0), b%U)                                        ! 2030-2080
+  end subroutine turn
+
+  pure subroutine move(b, s)
+    !! The velocity, along the angular velocities at the beginning and at the points.
+    type(block_t), intent(inout) :: b
+    type(grid_t), intent(inout) :: s
+    real(dp) :: v(LANE_COUNT, 3)
+    integer :: k
+
+    call push(b, s, 0, b%V)                                                       ! 810-830
+    call solve_alike(s)                                                           ! 1320
+    do k = 1, 4
+      call evaluate(s, k, b%V, v)                                                 ! 1450-1500
+      call push(b, s, k, v)                                                       ! 1540-1560
+    end do
+    call solve(s)                                                                 ! 2010
+    v = b%V
+    call evaluate(s, 5, v, b%V)                                                   ! 2090-2140
+  end subroutine move
+
+  pure subroutine push(b, s, k, v)
+    !! Right-hand sides at point k, or at the beginning.
+    type(block_t), intent(in) :: b
+    type(grid_t), intent(inout) :: s
+    integer, intent(in) :: k
+    real(dp), intent(in) :: v(LANE_COUNT, 3)
+    integer :: i
+    integer :: at
+
+    at = max(1, k)
+    do i = 1, LANE_COUNT
+      s%sides(i, at, 1) = b%ACL1 + v(i, 2)*s%U(i, 3, k) - v(i, 3)*s%U(i, 2, k)
+      s%sides(i, at, 2) = b%ACL2 + v(i, 3)*s%U(i, 1, k) - v(i, 1)*s%U(i, 3, k)
+      s%sides(i, at, 3) = b%ACL3 + v(i, 1)*s%U(i, 2, k) - v(i, 2)*s%U(i, 1, k)
+    end do
+  end subroutine push
+
+  pure subroutine evaluate(s, k, base, x)
+    !! The trial functions at time k, from the values at the beginning.
+    type(grid_t), intent(in) :: s
+    integer, intent(in) :: k
+    real(dp), intent(in) :: base(LANE_COUNT, 3)
+    real(dp), intent(out) :: x(LANE_COUNT, 3)
+    integer :: axis
+    integer :: i
+
+    do axis = 1, 3
+      do i = 1, LANE_COUNT
+        x(i, axis) = base(i, axis) + s%terms(i, 1, axis)*s%T(i, k) + &
+                     s%terms(i, 2, axis)*s%TL2(i, k) + s%terms(i, 3, axis)*s%TL3(i, k) + &
+                     s%terms(i, 4, axis)*s%TL4(i, k)
+      end do
+    end do
+  end subroutine evaluate
+
+  pure subroutine solve_alike(s)
+    !! The same right-hand side, the first, in all four equations.
+    type(grid_t), intent(inout) :: s
+    integer :: variable
+
+    do variable = 1, 3
+      s%sides(:, 2, variable) = s%sides(:, 1, variable)
+      s%sides(:, 3, variable) = s%sides(:, 1, variable)
+      s%sides(:, 4, variable) = s%sides(:, 1, variable)
+    end do
+    call solve(s)
+  end subroutine solve_alike
+
+  pure subroutine solve(s)
+    !! LEQT1F's substitution. A(1, 1) is 1, as all of its column is: no division by it.
+    type(grid_t), intent(inout) :: s
+    integer :: row(4)
+    integer :: i
+    integer :: variable
+    real(dp) :: x1, x2, x3, x4, ordered(4)
+
+    row = s%row(1, :)
+    if (.not. s%one_order) then
+      row = [1, 2, 3, 4]
+      do variable = 1, 3
+        do i = 1, LANE_COUNT
+          ordered = s%sides(i, s%row(i, :), variable)
+          s%sides(i, :, variable) = ordered
+        end do
+      end do
+    end if
+    do variable = 1, 3
+      do i = 1, LANE_COUNT
+        x1 = s%sides(i, row(1), variable)
+        x2 = s%sides(i, row(2), variable) - s%A(i, 2, 1)*x1
+        x3 = s%sides(i, row(3), variable) - s%A(i, 3, 1)*x1 - s%A(i, 3, 2)*x2
+        x4 = s%sides(i, row(4), variable) - s%A(i, 4, 1)*x1 - s%A(i, 4, 2)*x2 - s%A(i, 4, 3)*x3
+        x4 = x4/s%A(i, 4, 4)
+        x3 = (x3 - s%A(i, 3, 4)*x4)/s%A(i, 3, 3)
+        x2 = (x2 - s%A(i, 2, 3)*x3 - s%A(i, 2, 4)*x4)/s%A(i, 2, 2)
+        x1 = x1 - s%A(i, 1, 2)*x2 - s%A(i, 1, 3)*x3 - s%A(i, 1, 4)*x4
+        s%terms(i, 1, variable) = x1
+        s%terms(i, 2, variable) = x2
+        s%terms(i, 3, variable) = x3
+        s%terms(i, 4, variable) = x4
+      end do
+    end do
+    if (s%any_singular) then
+      do i = 1, LANE_COUNT
+        if (s%singular(i)) s%terms(i, :, :) = s%sides(i, :, :)
+      end do
+    end if
+  end subroutine solve
+
+end module lanes_four_term

@@ -1,0 +1,287 @@
+"""The programs of the appendix on many bodies in one call, with the bits of the single runs."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import SupportsIndex
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyharness.model.codes import Blocks
+from pyharness.model.effort import check_bodies
+from pyharness.model.errors import InputError
+from pyharness.model.extension import columns, extension
+from pyharness.model.listing import PROGRAMS, Listing, checked_listing
+from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
+from pyharness.model.trajectory import Array
+from pyharness.model.values import Number, several, truth, whole
+from pyharness.original.compiled import stop_reads_velocity
+from pyharness.original.equations import card_torque
+from pyharness.original.many_input import above_zero, from_zero, is_finite, one_count, rows, spread
+
+_LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
+_PIECES = 8  # for each thread, as bodies may end early
+_NOT_REACHED = -1
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramEnsemble:
+    """What a program made of n bodies; NaN, and -1 of `ier`, where a row was not reached.
+
+    Attributes
+    ----------
+    at : ndarray of int, shape (m,)
+        The steps whose rows these are, from 1.
+    omega : ndarray, shape (n, m, 3)
+        Angular velocity about the body axes, rad/s.
+    velocity : ndarray, shape (n, m, 3), or None
+        Velocity along the body axes, m/s.
+    recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
+        The TIME that TAPE5 got, s; in one row for all NaN where no body has the row.
+    n_rows : ndarray of int32, shape (n,)
+        Steps that hold a result.
+    status : ndarray of int8, shape (n,)
+        COMPLETE, STOPPED or OVERFLOW of pyharness/model/codes.py.
+    stop_variable : ndarray of int8, shape (n,)
+        What ended a run: 1-3 U1-U3, 4-6 V1-V3, 7 the norm of U, 8 that of U and V; 0 for nothing.
+    stop_quotient : ndarray, shape (n,)
+        Change of K over change of U (1/s) there; infinite where U did not change, NaN where nothing
+        ended the run.
+    ier : ndarray of int32, shape (n, m), or None
+        IER as the collocation programs print it.
+    """
+
+    at: NDArray[np.int32]
+    omega: Array
+    velocity: Array | None
+    recorded_time: Array
+    n_rows: NDArray[np.int32]
+    status: NDArray[np.int8]
+    stop_variable: NDArray[np.int8]
+    stop_quotient: Array
+    ier: NDArray[np.int32] | None
+
+
+def run_many(
+    scene: Scene,
+    listing: Listing,
+    *,
+    omega0: ArrayLike | None = None,
+    moments: ArrayLike | None = None,
+    coefficients: ArrayLike | None = None,
+    torque_constant: ArrayLike | None = None,
+    step_size: ArrayLike | None = None,
+    lipschitz: ArrayLike = 500.0,
+    may_stop: bool = True,
+    velocity: bool = False,
+    at: Sequence[SupportsIndex] | None = None,
+    threads: SupportsIndex = 1,
+    effort: Number = 1.0,
+) -> ProgramEnsemble:
+    """Run the compiled program of a listing on n bodies: for each the bits of its `run_program`.
+
+    Parameters
+    ----------
+    scene : Scene
+        What all have in common.
+    listing : Listing
+        The program, its active defects and readings.
+    omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
+        In place of the scene's; one of `moments` and `coefficients` at the most.
+    step_size, lipschitz : array_like, shape (n,) or one number, optional
+        The scene's step size, and 500/s.
+    may_stop : bool
+        Whether the stop test, which only the Runge-Kutta program has, may end runs.
+    velocity : bool
+        Whether the velocity is wanted.
+    at : sequence of int, optional
+        The steps whose rows are wanted, from 1, in any order; the last step by default.
+    threads : int
+        Threads that share the bodies; no bit depends on this.
+    effort : float
+        Factor on the steps of all bodies, times waves, that are run without being asked for.
+
+    Returns
+    -------
+    ProgramEnsemble
+        A row for each body; one for all where nothing was given as an array.
+
+    Raises
+    ------
+    InputError
+        For what `run_program` refuses of any body, naming its row, and for arrays that don't fit
+        together or in memory.
+    NotBuiltError
+        Where the extension is not built.
+    """
+    given = moments is not None or coefficients is not None
+    checked_scene(scene, any_axes=given)
+    checked_listing(listing)
+    if moments is not None and coefficients is not None:
+        raise InputError("moments and coefficients are both given; allowed: one of them")
+    may_stop, velocity = truth("may_stop", may_stop), truth("velocity", velocity)
+    threads = whole("threads", threads)
+    if threads < 1:
+        raise InputError(f"threads is {threads}; allowed: a whole number from 1")
+    by_moments = moments is not None or (coefficients is None and scene.moments is not None)
+    if moments is None and coefficients is None:
+        moments, coefficients = scene.moments, scene.coefficients
+    law = scene.torque
+    inputs = {
+        "body": rows("moments", moments, 3, above_zero)
+        if by_moments
+        else rows("coefficients", coefficients, 3, is_finite),
+        "omega": rows("omega0", scene.omega if omega0 is None else omega0, 3, is_finite),
+        "constant": rows(
+            "torque_constant", law.constant if torque_constant is None else torque_constant, 3,
+            is_finite,
+        ),
+        "step_size": rows(
+            "step_size", scene.step_size if step_size is None else step_size, 1, above_zero
+        ),
+        "lipschitz": rows("lipschitz", lipschitz, 1, from_zero),
+    }  # fmt: skip
+    if law.frame == "space" and inputs["constant"].any():
+        raise InputError(SPACE_TORQUE)
+    n = one_count(inputs)
+    _check_ends(inputs["step_size"], scene.steps)
+    check_bodies(scene, listing.program, n, effort)
+    wanted = _steps(at, scene.steps)
+    if n * len(wanted) > most_steps():
+        raise InputError(
+            f"at: {len(wanted)} rows of {n} bodies; allowed: {most_steps()} in all, what fits in "
+            "this machine's memory"
+        )
+    first = np.zeros(3)
+    if listing.has("initial-torque"):
+        cards = card_torque(scene) if by_moments else None
+        if cards is None:
+            listing = replace(listing, conjectures=listing.conjectures - {"initial-torque"})
+        else:
+            with np.errstate(over="ignore"):
+                first = np.array(cards) / inputs["body"]
+    return _run(
+        scene,
+        listing,
+        by_moments,
+        {**inputs, "first": first},
+        n,
+        wanted,
+        may_stop,
+        velocity,
+        threads,
+    )
+
+
+def _run(
+    scene: Scene,
+    listing: Listing,
+    by_moments: bool,
+    inputs: dict[str, Array],
+    n: int,
+    wanted: NDArray[np.int32],
+    may_stop: bool,
+    velocity: bool,
+    threads: int,
+) -> ProgramEnsemble:
+    """Run what was checked."""
+    program = extension().run_programs
+    one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
+    body, omega, constant, first = (
+        spread(inputs[name], n, 3) for name in ("body", "omega", "constant", "first")
+    )
+    step_size, lipschitz = (spread(inputs[name], n, 1) for name in ("step_size", "lipschitz"))
+    computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
+    prints_ier = listing.program != "runge-kutta"
+    # The kernel takes one row at least.
+    at = np.unique(wanted) if wanted.size else np.full(1, scene.steps, dtype=np.int32)
+    back = np.searchsorted(at, wanted)
+    # Body by body, as the kernel's columns are.
+    omega_rows = np.full((n, at.size, 3), np.nan)
+    velocity_rows = np.full((n * velocity, at.size, 3), np.nan)
+    times = np.full((1 if one_step_size else n, at.size), np.nan)
+    ier = np.full((n * prints_ier, at.size), _NOT_REACHED, dtype=np.int32)
+    n_rows, status, stop_variable = (np.zeros(n, dtype=np.int32) for _ in range(3))
+    quotient = np.full(n, np.nan)
+    given_up = np.zeros(1, dtype=np.int32)
+    law = scene.torque
+    waves = columns(law.sines), columns(law.cosines)
+
+    def some(part: slice) -> None:
+        program(
+            PROGRAMS.index(listing.program) + 1, listing.flags, by_moments, body[part].T,
+            omega[part].T, scene.masses, scene.forces, constant[part].T, law.rate, first[part].T,
+            law.varies, *waves, step_size[part], scene.steps, lipschitz[part], may_stop,
+            computes_velocity, given_up, at, omega_rows[part].T,
+            velocity_rows[part if velocity else slice(0)].T,
+            times[slice(None) if one_step_size else part].T,
+            ier[part if prints_ier else slice(0)].T, n_rows[part], status[part],
+            stop_variable[part], quotient[part],
+        )  # fmt: skip
+
+    _share(some, list(_pieces(n, scene.steps, threads)), threads, given_up)
+    return ProgramEnsemble(
+        at=wanted,
+        omega=omega_rows[:, back],
+        velocity=velocity_rows[:, back] if velocity else None,
+        recorded_time=times[0, back] if one_step_size else times[:, back],
+        n_rows=n_rows,
+        status=status.astype(np.int8),
+        stop_variable=stop_variable.astype(np.int8),
+        stop_quotient=quotient,
+        ier=ier[:, back] if prints_ier else None,
+    )
+
+
+def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
+    """Yield the bodies of each call: all at once, or whole blocks for threads to take."""
+    size = n
+    if threads > 1:
+        fair = -(-n // (_PIECES * threads))
+        size = max(fair, _LEAST_WORK // steps, 1)
+        size = -(-size // Blocks.LANE_COUNT) * Blocks.LANE_COUNT
+    for begin in range(0, n, max(1, size)):
+        yield slice(begin, min(n, begin + size))
+
+
+def _share(
+    some: Callable[[slice], None], pieces: list[slice], threads: int, given_up: NDArray[np.int32]
+) -> None:
+    if threads == 1 or len(pieces) < 2:
+        # Here and not in a thread of its own: Python gives signals to this one.
+        for piece in pieces:
+            some(piece)
+        return
+    with ThreadPoolExecutor(min(threads, len(pieces))) as pool:
+        jobs = [pool.submit(some, piece) for piece in pieces]
+        try:
+            for job in jobs:
+                job.result()
+        except BaseException:
+            # Signals don't reach the others: they look at this.
+            given_up[0] = 1
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _check_ends(step_size: Array, steps: int) -> None:
+    """Refuse step sizes whose last time is no number."""
+    with np.errstate(over="ignore"):
+        ends = np.isfinite(step_size * steps)
+    if not ends.all():
+        raise InputError(
+            f"step_size[{int(np.argmin(ends))}] times steps is not finite; take fewer or smaller "
+            "steps"
+        )
+
+
+def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
+    """Return the numbers of the steps that are wanted."""
+    if at is None:
+        return np.array([steps], dtype=np.int32)
+    found = [whole("at", each) for each in several("at", at, "allowed: a list of steps")]
+    for each in found:
+        if not 1 <= each <= steps:
+            raise InputError(f"at: {each}; allowed: steps from 1 to {steps}")
+    return np.array(found, dtype=np.int32)

@@ -9,11 +9,11 @@ module bodies
 
   integer, parameter, public :: i1 = c_int8_t
   integer, parameter, public :: LANES = 64   !! bodies side by side
-  integer, parameter, public :: A_GROUP = 8  !! of them in the widest register: blocks are filled up to it
-  integer(i1), parameter, public :: LEFT = -1_i1 !! status of a body that is left to the single kernel
+  integer, parameter, public :: A_GROUP = 8  !! in the widest register: blocks are filled up to it
+  integer(i1), parameter, public :: LEFT = -1_i1 !! status: left to the single kernel
 
   type, public :: bodies_t
-    logical :: by_moments       !! body holds I1, I2, I3, and torques are in N m; else A, B, C and 1/s2
+    logical :: by_moments       !! I1, I2, I3 and N m; else A, B, C and 1/s2
     real(dp) :: tolerance       !! relative
     real(dp) :: step            !! s, of the methods with a fixed step
     integer :: n                !! starts

@@ -6,7 +6,7 @@ module many_circular
   implicit none(type, external)
   private
 
-  real(dp), parameter :: ROUNDS = 1.5_dp*2.0_dp**52     ! added and taken off, it leaves a whole number
+  real(dp), parameter :: ROUNDS = 1.5_dp*2.0_dp**52     ! added and taken off: a whole number
   real(dp), parameter :: QUARTERS = 0.63661977236758134308_dp ! 2 over pi
   ! Half of pi in two words, the first of 33 bits: times less than 2**20 it is exact.
   real(dp), parameter :: HALF_PI = 1.5707963267341256142_dp

@@ -64,7 +64,8 @@ module many_taylor
 
 contains
 
-  subroutine many_taylor_solve(bodies_at, omega, status, interrupted) bind(c, name="solve_many_taylor_level")
+  subroutine many_taylor_solve(bodies_at, omega, status, interrupted) &
+    bind(c, name="solve_many_taylor_level")
     !! Angular velocity of each body at its time; status is COMPLETE or LEFT.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     real(c_double), intent(inout) :: omega(3, *)          !! rad/s

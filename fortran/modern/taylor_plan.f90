@@ -72,7 +72,7 @@ contains
     end if
   end subroutine steady_rates
 
-  elemental subroutine share_and_step(coupling, scale, gain, rate, turned, tolerance, time, share, h)
+ elemental subroutine share_and_step(coupling, scale, gain, rate, turned, tolerance, time, share, h)
     !! An error turns into one of phase and grows with it, and the phase of all later ones with that;
     !! the weights are from random scenes.
     !! Waves ask for more steps, and those may all err alike.

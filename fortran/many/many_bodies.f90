@@ -71,11 +71,11 @@ contains
     if (size(attitude0) > 0 .or. bodies%n == 1) then
       status = LEFT
     else if (code == CLOSED_FORM .or. (code == CLOSED_FORM_OR_TAYLOR .and. .not. with_torque)) then
-      call many_free(c_loc(bodies), omega, status)
+      call many_free(c_loc(bodies), bodies%n, omega, status)
     else if (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR) then
-      call many_taylor(c_loc(bodies), omega, status, raised)
+      call many_taylor(c_loc(bodies), bodies%n, omega, status, raised)
     else if (code >= IMPROVED_EULER .and. code <= RK4) then
-      call many_fixed(c_loc(bodies), code, omega, status, raised)
+      call many_fixed(c_loc(bodies), code, bodies%n, omega, status, raised)
     else
       status = LEFT
     end if

@@ -47,6 +47,8 @@ def for_each_piece(work: Callable[[slice], None], n: int, threads: int) -> None:
 
     Pieces as large as each other: a body alone in one would be solved another way.
     """
+    if not n:
+        return
     count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
     ends = [n * piece // count for piece in range(count + 1)]
     pieces = [slice(*each) for each in itertools.pairwise(ends)]

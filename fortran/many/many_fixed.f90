@@ -20,6 +20,8 @@ module many_fixed
   real(dp), parameter :: FAR = 1e60_dp      ! from 1: products of such scales are numbers
   real(dp), parameter :: THIRD = 1.0_dp/3.0_dp
 
+  public :: many_fixed_solve
+
   type :: scaled_t
     real(dp), dimension(LANES) :: x, y, z          !! omega, scaled; x' = y z, y' = -x z, z' = x y
     real(dp), dimension(LANES) :: mx, my, mz       !! torque of half a step

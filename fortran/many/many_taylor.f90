@@ -22,6 +22,7 @@ module many_taylor
   ! A step may leave out so much more than that of a single march, whose order it does not choose:
   ! what it leaves out is known and taken off.
   real(dp), parameter :: MORE = 10.0_dp
+  real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
   ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
   real(dp), parameter :: TRUSTED = 0.4_dp
   real(dp), parameter :: DOUBTED = 6.0_dp    ! growth at which it is half of that
@@ -37,6 +38,8 @@ module many_taylor
   real(dp), parameter :: RIDGE = 1.001_dp
   real(dp), parameter :: LEAST = 1e-290_dp
   real(dp), parameter :: MOST_BITS = 2.0_dp**57
+
+  public :: many_taylor_solve
 
   type :: slots_t
     real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding, rad/s
@@ -241,7 +244,7 @@ contains
     do i = 1, LANES
       call share_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
                           r%rest(i), r%share(i), r%h(i))
-      r%share(i) = MORE*r%share(i)
+      r%share(i) = merge(MORE_WITH_WAVES, MORE, n_waves > 0)*r%share(i)
       push = sqrt(abs(r%a(i, 1)))
       ramp = sqrt(abs(r%a(i, 2)))
       rate(i) = sqrt(abs(r%a(i, 3)))

@@ -3,15 +3,17 @@
 import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from pyharness import Ensemble, InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
-from pyharness.model.codes import Statuses
+from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
+from tests.as_written import compiler_here, many_as_written
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
 KINDS = ("free", "constant", "ramp", "waves")
@@ -337,3 +339,33 @@ def test_scenes_that_do_not_go_side_by_side() -> None:
         assert str(raised.value).startswith(said)
     with pytest.raises(InputError, match="omega0 is given beside many scenes"):
         solve_many([TOP], 1.0, omega0=[1.0, 2.0, 3.0])
+
+
+@pytest.mark.external
+@pytest.mark.skipif(not compiler_here(), reason="no compiler")
+def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path, level: int) -> None:
+    """The plain text is what unroll.py writes out: the same steps, other roundings."""
+    loops = many_as_written(tmp_path)
+    for kind, method, tolerance in (
+        ("constant", 0, 1e-12), ("waves", 0, 1e-9), ("waves", 0, 1e-6), ("ramp", 0, 1e-3),
+        ("constant", Methods.RK4, 1.0),
+    ):  # fmt: skip
+        drawn = bodies(kind, 50, 3)
+        if method:
+            drawn["t_end"] = np.array([0.02])
+        zero = np.zeros((50, 3))
+        omega, status = loops(
+            method, tolerance, 0.001, drawn["moments"], drawn["torque_constant"],
+            drawn.get("torque_rate", zero), drawn.get("sines", np.empty((50, 0, 4))),
+            drawn["omega0"], drawn["t_end"],
+        )  # fmt: skip
+        drawn.pop("cosines", None)
+        name = "rk4" if method else "taylor"
+        if method:
+            drawn["t_end"] = 0.02
+        found = solve_many(TOP, method=name, tolerance=tolerance, step=0.001, **drawn)
+        solved = status == Statuses.COMPLETE
+        assert np.count_nonzero(solved) > 20
+        scale = np.abs(found.omega).max(axis=1, keepdims=True)
+        off = np.abs(omega - found.omega) / scale
+        assert off[solved].max() <= (2e-12 if method == 0 else 1e-11)

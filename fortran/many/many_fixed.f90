@@ -77,7 +77,9 @@ contains
         piece = min(left_over, BETWEEN_LOOKS)
         call advance(method, m, piece, s)
         left_over = left_over - piece
-        if (piece == BETWEEN_LOOKS) interrupted = merge(1, 0, interrupt_raised() /= 0)
+        if (piece == BETWEEN_LOOKS) then
+          interrupted = merge(1, 0, interrupt_raised() /= 0 .or. bodies%given_up /= 0)
+        end if
         if (interrupted /= 0) return
       end do
       call lengthen(m, last/h, s)

@@ -25,8 +25,8 @@ module many_taylor
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
   ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
   real(dp), parameter :: TRUSTED = 0.4_dp
-  real(dp), parameter :: DOUBTED = 6.0_dp    ! growth at which it is half of that
-  real(dp), parameter :: MOST_GROWTH = 60.0_dp
+  real(dp), parameter :: DOUBTED = 4.0_dp    ! growth at which it is half of that
+  real(dp), parameter :: MOST_GROWTH = 30.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: SURE = 0.03_dp      ! rounding times growth, in tolerances
   real(dp), parameter :: A_STEP = 3.0_dp     ! norm up to which an exponential is taken at once

@@ -214,9 +214,12 @@ contains
       call steady_rates(coupling(i), r%scale(i), push, ramp, r%rest(i), gain(i), rate(i))
       ! Of numbers that are none, or not far from the end of the range, a product may be.
       r%fits(i) = 1.0_dp
-      if (.not. (r%scale(i) <= FAR .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
+      if (.not. (abs(r%w(i, 1)) + abs(r%w(i, 2)) + abs(r%w(i, 3)) <= FAR &
+                 .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
       if (.not. (abs(r%rest(i)) <= FAR .and. abs(r%rest(i)) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
-      if (.not. (coupling(i) <= FAR .and. push <= FAR .and. ramp <= FAR)) r%fits(i) = -1.0_dp
+      if (.not. sum(abs(r%a(i, :))) + sum(abs(r%constant(i, :))) + sum(abs(r%rate(i, :))) <= FAR) then
+        r%fits(i) = -1.0_dp
+      end if
       if (.not. abs(r%a(i, 1)) <= FAR) r%fits(i) = -1.0_dp
     end do
     turned = 0.0_dp
@@ -304,7 +307,8 @@ contains
     omega = s%w(i, :) + (s%low(i, :) - s%error(i, :))
     scale = max(s%scale(i), abs(omega(1)), abs(omega(2)), abs(omega(3)))
     status = LEFT
-    if (.not. abs(s%rest(i)) > 0.0_dp .and. scale <= FAR &
+    ! A sum, as a NaN may be lost in a maximum.
+    if (.not. abs(s%rest(i)) > 0.0_dp .and. sum(abs(omega)) + s%scale(i) <= FAR &
         .and. s%worst(i)*(1.0_dp + s%growth(i)/DOUBTED) <= TRUSTED*tolerance*scale &
         .and. s%growth(i) <= min(MOST_GROWTH, SURE*tolerance/ROUNDING)) then
       status = COMPLETE

@@ -96,7 +96,7 @@ def _stop_variable(solved: Solved, _: Mapping[str, Any]) -> Found:
 
 def _overflow_time(solved: Solved, _: Mapping[str, Any]) -> Found:
     # Of the first step that gave no finite row.
-    time = (solved.n_rows + 1) * solved.load.scene.step_size
+    time = (solved.n_rows + 1) * solved.load.step_sizes
     return np.where(solved.status == Statuses.OVERFLOW, time, np.nan)
 
 

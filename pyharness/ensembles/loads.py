@@ -89,8 +89,8 @@ def _load(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Load:
     if "t_end" in own:
         t_end = own["t_end"]
     else:
-        step_size = own.get("step_size", np.full(n, scene.step_size))
-        t_end = step_size * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
+        sizes = own.get("step_size", np.full(n, scene.step_size))
+        t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
     body, values = _body(scene, own, n)
     law = scene.torque
     return Load(

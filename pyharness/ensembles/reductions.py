@@ -13,6 +13,7 @@ from pyharness.ensembles.solved import Solved
 from pyharness.ensembles.sweep import Asked
 from pyharness.model.codes import Statuses
 from pyharness.model.trajectory import STOP_VARIABLES, Array
+from pyharness.theory.flips import flip_times
 
 Found = NDArray[Any]
 # The axes of a body, by their moments.
@@ -150,6 +151,10 @@ def _flips(solved: Solved, given: Mapping[str, Any]) -> Found:
     return count
 
 
+def _flip_time(solved: Solved, _: Mapping[str, Any]) -> Found:
+    return flip_times(solved.load.bodies, solved.omega0)
+
+
 def _growth(solved: Solved, given: Mapping[str, Any]) -> Found:
     start = solved.omega0
     size = np.linalg.norm(start, axis=1, keepdims=True)
@@ -236,6 +241,12 @@ REDUCTIONS = {
         "i4",
         needs=("moments",),
         parameters=_SAMPLES,
+    ),
+    "flip-time": Reduction(
+        "time between changes of sign of the component about the middle axis",
+        "s",
+        _flip_time,
+        needs=("moments", "no torque"),
     ),
     "growth": Reduction(
         "logarithm of the growth of a small difference, over the time",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLORS = ("#101010", "#1040a0", "#c02020", "#107040", "#806000", "#7030a0")
-_MOST_PLACES = 250
+_MOST_PLACES = 200
 _BODIES = {"Case 3": (41.0, 39.0, 20.0), "Cases 4, 5": (40.0, 30.0, 20.0)}
 _OF_REGIONS = (
     ("two-term and four-term, original and corrected", "collocation", "#101010", "solid"),

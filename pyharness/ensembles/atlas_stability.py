@@ -17,7 +17,7 @@ _MAPS = ((1e-8, 0), (1e-4, 0), (1.0, 0), (1.0, -1))  # tilt (rad), place of the 
 _LEVELS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 _LIMITS = (3.0, 1000.0)  # s
 _SHARES = (0.01, 0.5, 0.99)
-_UPRIGHT = 100.0  # s
+_LONG = 100.0  # s
 _FEW = 21
 
 
@@ -38,7 +38,7 @@ def stability_picture(store: Store) -> Picture:
         values = np.asarray(times[azimuth % len(azimuths), at])
         drawn = square_map(plot, store, values, norm=LogNorm(*_LIMITS), cmap="viridis")
         _contours(plot, store, values)
-        toward = f"{math.degrees(azimuths[azimuth]):.0f} degrees from the least moment's"
+        toward = f"azimuth {math.degrees(azimuths[azimuth]):.0f} degrees"
         title = f"tilt {tilts[at]:.0e} rad" + ("" if tilt < 1.0 else f", {toward}")
         plot.set_title(title, fontsize=9)
         rows += _few(store, f"flip-time at {title}", values)
@@ -52,9 +52,9 @@ def stability_picture(store: Store) -> Picture:
             rows += [[what, tilt, "", time] for tilt, time in zip(tilts, curve, strict=True)]
     plot = plots[1, 2]
     shown = square_map(plot, store, last, norm=LogNorm(tilts[0], tilts[-1]), cmap="magma")
-    plot.set_title(f"largest tilt that is up for {_UPRIGHT:g} s; white: none", fontsize=9)
+    plot.set_title(f"largest tilt with {_LONG:g} s between flips; white: none", fontsize=9)
     figure.colorbar(shown, ax=plot, label="tilt (rad)", shrink=0.8)
-    rows += _few(store, f"largest tilt up for {_UPRIGHT:g} s", last)
+    rows += _few(store, f"largest tilt with {_LONG:g} s between flips", last)
     told = [store.sweep.name, f"{store.sweep.n_scenes:.4g} bodies, 1 rad/s"]
     return Picture(figure, numbers("what x y value", rows), told)
 
@@ -68,9 +68,9 @@ def _contours(plot: "Axes", store: Store, values: Array) -> None:
 
 
 def _scanned(store: Store) -> tuple[Array, Array]:
-    """Return shares of the square (azimuth, share, tilt), and the largest tilts that stay up.
+    """Return shares of the square (azimuth, share, tilt), and the largest tilts that flip rarely.
 
-    Up for `_UPRIGHT`, by the first azimuth; NaN where no tilt does.
+    With `_LONG` between flips, by the first azimuth; NaN where no tilt has that.
     """
     tilts, azimuths = values_of(store, "tilt"), values_of(store, "azimuth")
     times = store.array("flip-time")
@@ -83,7 +83,7 @@ def _scanned(store: Store) -> tuple[Array, Array]:
             kth = [int(share * (flat.size - 1)) for share in _SHARES]
             shares[i, :, j] = np.partition(flat, kth)[kth]
             if i == 0:
-                last[values > _UPRIGHT] = tilt
+                last[values > _LONG] = tilt
     return shares, last
 
 
@@ -96,7 +96,7 @@ def _curves(plot: "Axes", tilts: Array, azimuths: Array, shares: Array) -> None:
     plot.set_yscale("log")
     plot.set_xlabel("tilt from the middle axis (rad)", fontsize=8)
     plot.set_ylabel("time between flips (s)", fontsize=8)
-    plot.set_title("all bodies; dashed: tilt to the largest moment's axis", fontsize=9)
+    plot.set_title("all bodies; dashed: the second azimuth", fontsize=9)
     plot.grid(visible=True, linewidth=0.3)
     plot.legend(fontsize=7)
 

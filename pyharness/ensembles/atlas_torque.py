@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 _TILT = 1e-4  # rad, of the maps
 _AXES = {1: "least", 2: "middle", 3: "largest"}
 _MOST_MAPS = 6
-_MOST_FLIPS = 20
+_MOST_FLIPS = 8
 _FEW = 16
 
 
 def torque_picture(store: Store) -> Picture:
     """Draw flips over the square for each torque, and shares of it against the tilt."""
+    from matplotlib.colors import BoundaryNorm
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15.0, 7.4), dpi=85, layout="constrained")
@@ -29,15 +30,16 @@ def torque_picture(store: Store) -> Picture:
     at = nearest(tilts, _TILT)
     flips, largest = store.array("flips"), store.array("largest-tilt")
     told = _told(store)[:_MOST_MAPS]
+    norm = BoundaryNorm([n - 0.5 for n in range(_MOST_FLIPS + 2)], 256, extend="max")
     drawn: Any = None
     rows: list[list[Any]] = []
     for i, (plot, name) in enumerate(zip(plots[:, :3].ravel(), told, strict=False)):
         values = np.asarray(flips[i, at], dtype=float)
-        drawn = square_map(plot, store, values, vmin=0, vmax=_MOST_FLIPS, cmap="viridis")
+        drawn = square_map(plot, store, values, norm=norm, cmap="viridis")
         plot.set_title(name, fontsize=9)
         rows += _few(store, f"flips: {name}, tilt {tilts[at]:.0e}", values)
     figure.colorbar(drawn, ax=list(plots[:, :3].ravel()), label=f"flips, tilt {tilts[at]:.0e} rad",
-                    shrink=0.6, extend="max", location="left")  # fmt: skip
+                    shrink=0.6, ticks=range(_MOST_FLIPS + 1), location="left")  # fmt: skip
     shares = np.array([np.mean(np.asarray(flips[i]) > 0, axis=(1, 2)) for i in range(len(told))])
     mean = np.array([np.mean(np.asarray(largest[i]), axis=(1, 2)) for i in range(len(told))])
     _lines(plots[0, 3], tilts, shares, told, "part of the bodies that flip")
@@ -46,7 +48,7 @@ def torque_picture(store: Store) -> Picture:
         rows += [[f"flip: {name}", x, "", y] for x, y in zip(tilts, share, strict=True)]
         rows += [[f"largest tilt: {name}", x, "", y] for x, y in zip(tilts, angle, strict=True)]
     plots[0, 3].legend(fontsize=7)
-    title = [store.sweep.name, f"{store.sweep.n_scenes:.4g} bodies, {store.sweep.solver.t_end} s"]
+    title = [store.sweep.name, f"{store.sweep.n_scenes:.4g} bodies, {store.sweep.solver.t_end:g} s"]
     return Picture(figure, numbers("what x y value", rows), title)
 
 

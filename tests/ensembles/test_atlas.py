@@ -12,9 +12,9 @@ from pyharness.ensembles.atlas import PAGES, atlas_picture
 from pyharness.ensembles.atlas_collocation import tenfold
 from pyharness.ensembles.atlas_maps import place_of
 from pyharness.ensembles.atlas_stops import case_scenes, foretold
-from pyharness.ensembles.run import run_sweep
+from pyharness.ensembles.run import _together, run_sweep
 from pyharness.ensembles.store import opened
-from pyharness.ensembles.sweep import Sweep, solve_chunk
+from pyharness.ensembles.sweep import Sweep, solve_chunk, spread
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
@@ -123,11 +123,20 @@ def test_torque_along_the_middle_axis_holds_nobody(tmp_path: Path) -> None:
         assert (flips == (times < 50.0))[np.abs(times - 50.0) > 1e-3].all()
 
 
+def test_sample_of_the_estimate_shares_what_loads_share() -> None:
+    sweep = read_sweep(ATLAS / "stops.toml")
+    places = _together(sweep, spread(sweep, 256))
+    steps = sorted({*places[2].tolist()})
+    assert (len(steps), steps[0], steps[-1]) == (5, 0, 600)
+    assert len({*places[3].tolist()}) > 100
+
+
 def _bodies(b_a: Array, c_b: Array) -> Array:
     parts = np.ones_like(b_a), b_a, b_a * c_b
-    return np.stack([parts[1] + parts[2], parts[0] + parts[2], parts[0] + parts[1]], axis=1) / (
-        1.0 + b_a[:, None]
-    )
+    found: Array = np.stack(
+        [parts[1] + parts[2], parts[0] + parts[2], parts[0] + parts[1]], axis=1
+    ) / (1.0 + b_a[:, None])
+    return found
 
 
 def _starts(tilt: Array) -> Array:

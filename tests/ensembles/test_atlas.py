@@ -155,7 +155,8 @@ def _first_flip(bodies: Array, tilt: Array, torque: float) -> Array:
 
     def square(angle: Array) -> Array:
         shift = np.sqrt(s3 / s1) * np.sin(tilt) * np.sinh(rate * angle)
-        return np.cos(tilt) ** 2 + 2.0 * torque / i2 * angle - s2 / s3 * shift**2
+        found: Array = np.cos(tilt) ** 2 + 2.0 * torque / i2 * angle - s2 / s3 * shift**2
+        return found
 
     low, high = np.zeros_like(tilt), 700.0 / rate * np.ones_like(tilt)
     with np.errstate(over="ignore"):

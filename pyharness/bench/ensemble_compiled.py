@@ -27,7 +27,7 @@ def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int)
 def numba_rk4(
     in_blocks: bool, load: EnsembleLoad, setting: float, threads: int
 ) -> Callable[[], Array]:
-    """Steps of blocks of bodies, a loop over its lanes within the step; or body by body."""
+    """Take steps of a block of bodies, a loop over its lanes within each; or body by body."""
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies
     starts, torques = load.omega0, load.acceleration
@@ -91,9 +91,7 @@ def _numba_kernels() -> tuple[Any, Any]:
                     m[k, i] = torques[first + i, k]
             for _ in range(steps):
                 for i in range(LANES):
-                    x, y, z = step(
-                        w[0, i], w[1, i], w[2, i], m[0, i], m[1, i], m[2, i], a, b, c, h
-                    )
+                    x, y, z = step(w[0, i], w[1, i], w[2, i], m[0, i], m[1, i], m[2, i], a, b, c, h)
                     w[0, i] = x
                     w[1, i] = y
                     w[2, i] = z
@@ -117,7 +115,7 @@ def _numba_kernels() -> tuple[Any, Any]:
 
 
 def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """A step on arrays of all bodies, an array an unknown, in a loop that JAX compiles."""
+    """Take steps of arrays of all bodies, one an unknown, in a loop that JAX compiles."""
     compiled, jnp = _jax_steps()
     steps = round(setting)
     given = [tuple(jnp.array(each) for each in rows.T) for rows in (load.omega0, load.acceleration)]
@@ -126,10 +124,7 @@ def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Ar
 
 @cache
 def _jax_steps() -> tuple[Any, Any]:
-    import jax
-    import jax.numpy as jnp
-
-    jax.config.update("jax_enable_x64", True)
+    jax, jnp = _jax()
     a, b, c = _rates().tolist()
 
     def slope(w: Any, torque: Any) -> Any:
@@ -154,7 +149,7 @@ def _jax_steps() -> tuple[Any, Any]:
 
 
 def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Dopri8, each body with its own steps."""
+    """Let Dopri8 choose the steps, each body its own."""
     compiled, jnp = _diffrax_solve()
     given = jnp.array(load.omega0), jnp.array(load.acceleration), setting
     return lambda: np.asarray(compiled(*given))
@@ -163,10 +158,8 @@ def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[
 @cache
 def _diffrax_solve() -> tuple[Any, Any]:
     import diffrax
-    import jax
-    import jax.numpy as jnp
 
-    jax.config.update("jax_enable_x64", True)
+    jax, jnp = _jax()
     rates = jnp.array(_rates())
 
     def slope(_: Any, w: Any, torque: Any) -> Any:
@@ -181,3 +174,13 @@ def _diffrax_solve() -> tuple[Any, Any]:
         return found.ys[0]
 
     return jax.jit(jax.vmap(solve, in_axes=(0, 0, None))), jnp
+
+
+def _jax() -> tuple[Any, Any]:
+    """Return JAX, computing in binary64, and its arrays."""
+    import jax
+    import jax.numpy as jnp
+
+    configuration: Any = jax.config
+    configuration.update("jax_enable_x64", True)
+    return jax, jnp

@@ -40,7 +40,8 @@ class EnsembleLoad:
         """Torque over moment, (n, 3), rad/s2."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
-        return self.torque / np.array(MOMENTS)
+        found: Array = self.torque / np.array(MOMENTS)
+        return found
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
         """Return some of the bodies."""

@@ -25,7 +25,9 @@ from pyharness.model.trajectory import Array
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # of RK4, where steps a second are asked for
 ROUNDS = 7
-_CALL = 0.1  # s; who takes less gets more bodies
+# s; who takes less gets more bodies, and so does who is much faster with more, up to the second.
+_CALL, _LONG_CALL = 0.1, 1.0
+_SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; of calls in a round
 _MOST_STEPS = 1 << 14
 Say = Callable[[str], None]
@@ -67,20 +69,20 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class _Sample:
-    """A load with the ends of some of its bodies."""
+    """A load with the ends of its first bodies, which are as random as any."""
 
     load: EnsembleLoad
     ends: dict[int, Array]
 
     @property
     def few(self) -> EnsembleLoad:
-        """Bodies from the beginning, for which no one takes long."""
+        """The bodies whose ends are known."""
         return self.load.part(slice(0, SAMPLE))
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of what starts with these bodies, over a body's omega."""
+        """Return the largest error, each over the body's largest omega at start and end."""
         worst = 0.0
-        for i in np.linspace(0, len(omega) - 1, min(SAMPLE, len(omega))).astype(int).tolist():
+        for i in range(min(SAMPLE, len(omega))):
             if i not in self.ends:
                 self.ends[i] = self.load.part([i]).ends()[0]
             end = self.ends[i]
@@ -135,7 +137,8 @@ def _rates(
     for number in range(1, ROUNDS + 1):
         say(f"{place}: round {number} of {ROUNDS}")
         for k, (*_, run) in enumerate(ready):
-            seconds[k] = min(seconds[k], shortest(run, _BATCH))
+            if number <= 3 or seconds[k] < _SLOW:
+                seconds[k] = min(seconds[k], shortest(run, _BATCH))
     for best, (each, setting, threads, n, error, _) in zip(seconds, ready, strict=True):
         shown = None if each.setting == "none" else setting
         yield Rate(sample.load.name, target, each.name, threads, shown, n, best, error)
@@ -175,14 +178,15 @@ def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
     """Return so many bodies that a call is long enough to be timed, all where they are few."""
-    n = min(load.n, 64)
+    n, before = min(load.n, 64), 0.0
     while True:
         part = load.part(slice(0, n))
         run = prepare(part, setting, threads)
         run()  # what is compiled
-        if n == load.n or shortest(run, 0.0) > _CALL:
+        taken = shortest(run, 0.0)
+        if n == load.n or taken > (_LONG_CALL if n / taken > 1.5 * before else _CALL):
             return part, run
-        n = min(load.n, 8 * n)
+        n, before = min(load.n, 8 * n), n / taken
 
 
 def shortest(run: Callable[[], object], length: float) -> float:

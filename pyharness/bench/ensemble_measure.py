@@ -24,9 +24,9 @@ from pyharness.model.trajectory import Array
 
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # of RK4, where steps a second are asked for
-ROUNDS = 7
+ROUNDS = 9
 # s; who takes less gets more bodies, and so does who is much faster with more, up to the second.
-_CALL, _LONG_CALL = 0.1, 1.0
+_CALL, _LONG_CALL = 0.03, 0.5
 _SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; of calls in a round
 _MOST_STEPS = 1 << 14

@@ -131,7 +131,8 @@ def _notes(found: Ensembles) -> list[str]:
         "solve at 1e-15. setting: the coarsest that keeps the error in the title; of a tolerance "
         "decades, of steps factors of 2**(1/4).",
         "ours over it: the best rate of ours on as many cores over the own one. Compiling is not "
-        "in the times. JAX and diffrax take the cores they like.",
+        "in the times. JAX and diffrax take the cores they like. heyoka-ensemble copies its "
+        "integrator for each batch; heyoka-batch sets state and torque of one, in a loop of Python's.",
     ]
     reasons: dict[str, list[str]] = {}
     for place, name, why in found.rates.refused:

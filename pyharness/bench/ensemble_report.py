@@ -132,7 +132,7 @@ def _notes(found: Ensembles) -> list[str]:
         "decades, of steps factors of 2**(1/4).",
         "ours over it: the best rate of ours on as many cores over the own one. Compiling is not "
         "in the times. JAX and diffrax take the cores they like. heyoka-ensemble copies its "
-        "integrator for each batch; heyoka-batch sets state and torque of one, in a loop of Python's.",
+        "integrator for each batch; heyoka-batch has one, in a loop of Python's.",
     ]
     reasons: dict[str, list[str]] = {}
     for place, name, why in found.rates.refused:
@@ -179,7 +179,7 @@ def size_picture(sizes: Sequence[Size]) -> Picture:
     for name in names:
         axes.loglog(
             [each.bodies for each in sizes], [1e9 * each.seconds[name] for each in sizes],
-            _STYLES[name], label=name, linewidth=1.2, markersize=5.0,
+            _STYLES[name], label={"prepared": "closed-form, prepared"}.get(name, name), linewidth=1.2, markersize=5.0,
         )  # fmt: skip
     axes.set_xlabel("bodies of a call")
     axes.set_ylabel("ns a body, one core")

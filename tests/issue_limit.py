@@ -172,9 +172,8 @@ def independent(loop: Sequence[str], wide: str) -> list[str]:
     count = 32 if wide == "zmm" else 16
     register = re.compile(rf"%{wide}(\d+)")
     free = [each for each in range(count) if each != IDLE]
-    # Of three parts two go round for what is read as it is written.
-    round_ones = free[: 2 * len(free) // 3]
-    plain_ones = free[len(round_ones) :]
+    # What is only written takes another register inside the processor each time.
+    plain_ones, round_ones = free[:2], free[2:]
     used: Counter[str] = Counter()
     result = []
     for line in loop:

@@ -176,10 +176,11 @@ def size_picture(sizes: Sequence[Size]) -> Picture:
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")
     axes = figure.subplots()
     names = list(sizes[0].seconds)
+    labels = {"prepared": "closed-form, prepared"}
     for name in names:
         axes.loglog(
             [each.bodies for each in sizes], [1e9 * each.seconds[name] for each in sizes],
-            _STYLES[name], label={"prepared": "closed-form, prepared"}.get(name, name), linewidth=1.2, markersize=5.0,
+            _STYLES[name], label=labels.get(name, name), linewidth=1.2, markersize=5.0,
         )  # fmt: skip
     axes.set_xlabel("bodies of a call")
     axes.set_ylabel("ns a body, one core")

@@ -2,13 +2,14 @@
 
 Each contender gets the coarsest setting whose error keeps the one asked for, on a sample, and then
 as many bodies as it can do in a part of a second. All are called in turn, in rounds, and the
-shortest call counts: what else the machine does can but lengthen it.
+shortest call counts: what else the machine does can but lengthen it. On one core what counts is the
+time that the core was ours.
 """
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from time import perf_counter
+from time import perf_counter, thread_time
 
 import numpy as np
 
@@ -136,9 +137,9 @@ def _rates(
     seconds = [np.inf] * len(ready)
     for number in range(1, ROUNDS + 1):
         say(f"{place}: round {number} of {ROUNDS}")
-        for k, (*_, run) in enumerate(ready):
+        for k, (_, _, threads, _, _, run) in enumerate(ready):
             if number <= 3 or seconds[k] < _SLOW:
-                seconds[k] = min(seconds[k], shortest(run, _BATCH))
+                seconds[k] = min(seconds[k], shortest(run, _BATCH, threads))
     for best, (each, setting, threads, n, error, _) in zip(seconds, ready, strict=True):
         shown = None if each.setting == "none" else setting
         yield Rate(sample.load.name, target, each.name, threads, shown, n, best, error)
@@ -183,18 +184,22 @@ def _enough(
         part = load.part(slice(0, n))
         run = prepare(part, setting, threads)
         run()  # what is compiled
-        taken = shortest(run, 0.0)
+        taken = shortest(run, 0.0, threads)
         if n == load.n or taken > (_LONG_CALL if n / taken > 1.5 * before else _CALL):
             return part, run
         n, before = min(load.n, 8 * n), n / taken
 
 
-def shortest(run: Callable[[], object], length: float) -> float:
-    """Return the time of the shortest call (s), among as many as fit in so many seconds, or one."""
+def shortest(run: Callable[[], object], length: float, threads: int = 1) -> float:
+    """Return the time of the shortest call (s), among as many as fit in so many seconds, or one.
+
+    Of a call on one core the time of this thread, else that of the clock on the wall.
+    """
+    clock = thread_time if threads == 1 else perf_counter
     best, spent = np.inf, 0.0
     while spent <= length:
-        begin = perf_counter()
+        begin = clock()
         run()
-        one = perf_counter() - begin
+        one = clock() - begin
         best, spent = min(best, one), spent + one
     return best

@@ -9,7 +9,7 @@ time that the core was ours.
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from time import perf_counter, thread_time
+from time import perf_counter, process_time
 
 import numpy as np
 
@@ -193,9 +193,9 @@ def _enough(
 def shortest(run: Callable[[], object], length: float, threads: int = 1) -> float:
     """Return the time of the shortest call (s), among as many as fit in so many seconds, or one.
 
-    Of a call on one core the time of this thread, else that of the clock on the wall.
+    Of a call on one core the time of the processor, else that of the clock on the wall.
     """
-    clock = thread_time if threads == 1 else perf_counter
+    clock = process_time if threads == 1 else perf_counter
     best, spent = np.inf, 0.0
     while spent <= length:
         begin = clock()

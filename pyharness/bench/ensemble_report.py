@@ -21,8 +21,8 @@ from pyharness.model.report import (
 
 _DRIFT = (
     "One process and one run: the shortest calls of interleaved rounds, on one core in the "
-    "processor's time, on more in that on the wall. Times drift with the machine and with what else it "
-    "does: compare the ratios, not the rates."
+    "processor's time, on more in that on the wall. Times drift with the machine and with what "
+    "else it does: compare the ratios, not the rates."
 )
 _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 

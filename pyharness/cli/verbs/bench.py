@@ -17,7 +17,7 @@ from pyharness.model.scene_file import case_numbers
 
 # Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.
 _LONGEST = 1e3
-_BODIES, _MOST_BODIES = 100_000, 1_000_000
+_BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 OPTIONS = {
     "--case N": "one case of Table 1 (default: 2 to 7)",
     "--horizon T": "go to this time, s (default: 3; Cases 3 and 4 also 100)",
@@ -184,7 +184,8 @@ def _ensemble(options: argparse.Namespace) -> int:
     missing = [each for each in others if not is_installed(each)]
     rates.refused.extend(("", each.name, "not installed") for each in missing)
     # A hundred times as many as above, and what memory ten times as many take.
-    found = ensembles.Ensembles(rates, sizes(seed, 100 * n, shared.progress), memory(10 * n))
+    growth = sizes(seed, min(100 * n, _MOST_GROWN), shared.progress)
+    found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
     shared.progress("")
     packages = sorted({each.package for each in those} - {"", "numpy"})
     command = f"pyharness bench --ensemble --bodies {n} --seed {shlex.quote(seed)}"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from pyharness.bench import report as reports
 from pyharness.bench.contenders import Contender, own
+from pyharness.bench.ensemble_contenders import EnsembleContender
 from pyharness.bench.measure import Refusal, measure, workloads
 from pyharness.bench.peers import installed, peers
 from pyharness.bench.random_loads import random_load
@@ -16,11 +17,14 @@ from pyharness.model.scene_file import case_numbers
 
 # Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.
 _LONGEST = 1e3
+_BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 OPTIONS = {
     "--case N": "one case of Table 1 (default: 2 to 7)",
     "--horizon T": "go to this time, s (default: 3; Cases 3 and 4 also 100)",
     "--random N": "N random scenes, the kinds in turn, in place of the cases",
-    "--seed S": "of the random scenes (default: the week)",
+    "--ensemble": "many bodies in one call: rates, growth with their number, memory",
+    "--bodies N": "of an ensemble (default: 100000)",
+    "--seed S": "of the random scenes, or bodies (default: the week)",
     "--attitude": "omega and attitude together, of the cases 1 to 7 or of the random scenes",
     "--methods A,B": "these of ours only, or none",
     "--peers X,Y": "these peers or packages only, or none",
@@ -32,6 +36,10 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Measure and show."""
+    if options.ensemble:
+        return _ensemble(options)
+    if options.bodies is not None:
+        raise InputError("--bodies has no meaning without --ensemble")
     if options.plan or options.growth:
         meaningless = ["case", "horizon", "random", "seed", "attitude", "methods", "peers"]
         meaningless += ["plot", "growth"] if options.plan else []
@@ -84,7 +92,7 @@ def _count(options: argparse.Namespace) -> int:
     """Return how many random scenes are asked for, 0 for none; without a seed it is the week's."""
     if options.random is None:
         if options.seed is not None:
-            raise InputError("--seed has no meaning without --random")
+            raise InputError("--seed has no meaning without --random or --ensemble")
         return 0
     shared.refuse(options, "--random", ["case", "horizon", "plot"])
     count = shared.whole(options.random, "--random")
@@ -149,3 +157,56 @@ def _growth(options: argparse.Namespace) -> int:
     found = {case: growth(case_scene(case)) for case in (3, 4)}
     shared.show(reports.growth_report(found), options)
     return 0
+
+
+def _ensemble(options: argparse.Namespace) -> int:
+    from pyharness.bench import ensemble_report as ensembles
+    from pyharness.bench.ensemble_contenders import draw, own_ensembles
+    from pyharness.bench.ensemble_growth import memory, sizes
+    from pyharness.bench.ensemble_measure import measure_ensembles
+    from pyharness.bench.ensemble_peers import ensemble_peers, is_installed
+
+    shared.refuse(
+        options, "--ensemble", ["case", "horizon", "random", "attitude", "plan", "growth"]
+    )
+    n = _BODIES if options.bodies is None else shared.whole(options.bodies, "--bodies")
+    if not 1 <= n <= _MOST_BODIES:
+        raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")
+    seed = shared.chosen_seed(options) or weekly_seed()
+    those = ensemble_peers()
+    methods = named(own_ensembles(), options.methods, "method", "--methods")
+    others = named(those, options.peers, "peer", "--peers")
+    contenders = methods + [each for each in others if is_installed(each)]
+    if not contenders:
+        raise InputError("bench: no method and no peer is left; name one")
+    shared.check_outputs(options)
+    rates = measure_ensembles(draw(seed, n), contenders, seed, shared.progress)
+    missing = [each for each in others if not is_installed(each)]
+    rates.refused.extend(("", each.name, "not installed") for each in missing)
+    # A hundred times as many as above, and what memory ten times as many take.
+    growth = sizes(seed, min(100 * n, _MOST_GROWN), shared.progress)
+    found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
+    shared.progress("")
+    packages = sorted({each.package for each in those} - {"", "numpy"})
+    command = f"pyharness bench --ensemble --bodies {n} --seed {shlex.quote(seed)}"
+    for name in ("methods", "peers"):
+        value = getattr(options, name)
+        command += f" --{name} {shlex.quote(value)}" if value is not None else ""
+    report = ensembles.ensemble_report(found, packages, command + " --format markdown")
+    shared.show(report, options)
+    return 0
+
+
+def named(
+    contenders: Sequence[EnsembleContender], text: str | None, what: str, where: str
+) -> list[EnsembleContender]:
+    """Return those of an ensemble that are named, by their own name or their package."""
+    names = shared.names(text)
+    if names == ["none"]:
+        return []
+    allowed = [each.name for each in contenders]
+    packages = sorted({each.package for each in contenders} - {""})
+    for name in names:
+        if name not in allowed and name not in packages:
+            raise unknown(what, name, [*allowed, *packages, "none"], where)
+    return [each for each in contenders if not names or {each.name, each.package} & {*names}]

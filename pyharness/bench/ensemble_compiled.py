@@ -1,0 +1,186 @@
+"""The peers of `bench --ensemble` that are compiled at the first call: numba, JAX, diffrax."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from pyharness.bench.ensemble_contenders import HORIZON, EnsembleLoad
+from pyharness.model.trajectory import Array
+
+LANES = 64  # of a block
+
+
+def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
+    """Call `solve` for blocks of bodies: in turn, or dealt out to threads."""
+    pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
+    if threads == 1:
+        for piece in pieces:
+            solve(piece)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(solve, pieces))
+
+
+def numba_rk4(
+    in_blocks: bool, load: EnsembleLoad, setting: float, threads: int
+) -> Callable[[], Array]:
+    """Take steps of a block of bodies, a loop over its lanes within each; or body by body."""
+    blocks, bodies = _numba_kernels()
+    kernel = blocks if in_blocks else bodies
+    starts, torques = load.omega0, load.acceleration
+    found = np.empty_like(starts)
+    steps = round(setting)
+    piece = LANES * max(1, -(-load.n // (LANES * threads)))
+
+    def solve(rows: slice) -> None:
+        kernel(starts[rows], torques[rows], _rates(), HORIZON / steps, steps, found[rows])
+
+    def run() -> Array:
+        in_threads(solve, load.n, threads, piece)
+        return found
+
+    return run
+
+
+@cache
+def _rates() -> Array:
+    from pyharness.bench.ensemble_peers import coefficients
+
+    return np.array(coefficients())
+
+
+@cache
+def _numba_kernels() -> tuple[Any, Any]:
+    import numba
+
+    def step(
+        x: float, y: float, z: float, p: float, q: float, r: float,
+        a: float, b: float, c: float, h: float,
+    ) -> tuple[float, float, float]:  # fmt: skip
+        half = 0.5 * h
+        x1, y1, z1 = a * y * z + p, b * x * z + q, c * x * y + r
+        u, v, w = x + half * x1, y + half * y1, z + half * z1
+        x2, y2, z2 = a * v * w + p, b * u * w + q, c * u * v + r
+        u, v, w = x + half * x2, y + half * y2, z + half * z2
+        x3, y3, z3 = a * v * w + p, b * u * w + q, c * u * v + r
+        u, v, w = x + h * x3, y + h * y3, z + h * z3
+        x4, y4, z4 = a * v * w + p, b * u * w + q, c * u * v + r
+        sixth = h / 6.0
+        return (
+            x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
+            y + sixth * (y1 + 2.0 * (y2 + y3) + y4),
+            z + sixth * (z1 + 2.0 * (z2 + z3) + z4),
+        )
+
+    # A product and a sum may become one operation, as in ours; nothing else may change.
+    step = numba.njit(inline="always", fastmath={"contract"})(step)
+
+    def blocks(
+        starts: Array, torques: Array, rates: Array, h: float, steps: int, ends: Array
+    ) -> None:
+        n, (a, b, c) = len(starts), (rates[0], rates[1], rates[2])
+        w, m = np.zeros((3, LANES)), np.zeros((3, LANES))
+        for first in range(0, n, LANES):
+            there = min(LANES, n - first)
+            for i in range(there):
+                for k in range(3):
+                    w[k, i] = starts[first + i, k]
+                    m[k, i] = torques[first + i, k]
+            for _ in range(steps):
+                for i in range(LANES):
+                    x, y, z = step(w[0, i], w[1, i], w[2, i], m[0, i], m[1, i], m[2, i], a, b, c, h)
+                    w[0, i] = x
+                    w[1, i] = y
+                    w[2, i] = z
+            for i in range(there):
+                for k in range(3):
+                    ends[first + i, k] = w[k, i]
+
+    def bodies(
+        starts: Array, torques: Array, rates: Array, h: float, steps: int, ends: Array
+    ) -> None:
+        a, b, c = rates[0], rates[1], rates[2]
+        for i in range(len(starts)):
+            x, y, z = starts[i, 0], starts[i, 1], starts[i, 2]
+            p, q, r = torques[i, 0], torques[i, 1], torques[i, 2]
+            for _ in range(steps):
+                x, y, z = step(x, y, z, p, q, r, a, b, c, h)
+            ends[i, 0], ends[i, 1], ends[i, 2] = x, y, z
+
+    compile_it = numba.njit(nogil=True, fastmath={"contract"})
+    return compile_it(blocks), compile_it(bodies)
+
+
+def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+    """Take steps of arrays of all bodies, one an unknown, in a loop that JAX compiles."""
+    compiled, jnp = _jax_steps()
+    steps = round(setting)
+    given = [tuple(jnp.array(each) for each in rows.T) for rows in (load.omega0, load.acceleration)]
+    return lambda: np.stack(compiled(*given, HORIZON / steps, steps), axis=1)
+
+
+@cache
+def _jax_steps() -> tuple[Any, Any]:
+    jax, jnp = _jax()
+    a, b, c = _rates().tolist()
+
+    def slope(w: Any, torque: Any) -> Any:
+        (x, y, z), (p, q, r) = w, torque
+        return a * y * z + p, b * x * z + q, c * x * y + r
+
+    def moved(w: Any, k: Any, length: Any) -> Any:
+        return tuple(x + length * rate for x, rate in zip(w, k, strict=True))
+
+    def solve(w: Any, torque: Any, h: Any, steps: Any) -> Any:
+        def step(_: int, w: Any) -> Any:
+            k1 = slope(w, torque)
+            k2 = slope(moved(w, k1, 0.5 * h), torque)
+            k3 = slope(moved(w, k2, 0.5 * h), torque)
+            k4 = slope(moved(w, k3, h), torque)
+            parts = zip(w, k1, k2, k3, k4, strict=True)
+            return tuple(x + h / 6.0 * (p + 2.0 * (q + r) + s) for x, p, q, r, s in parts)
+
+        return jax.lax.fori_loop(0, steps, step, w)
+
+    return jax.jit(solve), jnp
+
+
+def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+    """Let Dopri8 choose the steps, each body its own."""
+    compiled, jnp = _diffrax_solve()
+    given = jnp.array(load.omega0), jnp.array(load.acceleration), setting
+    return lambda: np.asarray(compiled(*given))
+
+
+@cache
+def _diffrax_solve() -> tuple[Any, Any]:
+    import diffrax
+
+    jax, jnp = _jax()
+    rates = jnp.array(_rates())
+
+    def slope(_: Any, w: Any, torque: Any) -> Any:
+        return rates * jnp.stack([w[1] * w[2], w[0] * w[2], w[0] * w[1]]) + torque
+
+    def solve(start: Any, torque: Any, tolerance: Any) -> Any:
+        found = diffrax.diffeqsolve(
+            diffrax.ODETerm(slope), diffrax.Dopri8(), t0=0.0, t1=HORIZON, dt0=None, y0=start,
+            args=torque, max_steps=100_000, saveat=diffrax.SaveAt(t1=True),
+            stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance),
+        )  # fmt: skip
+        return found.ys[0]
+
+    return jax.jit(jax.vmap(solve, in_axes=(0, 0, None))), jnp
+
+
+def _jax() -> tuple[Any, Any]:
+    """Return JAX, computing in binary64, and its arrays."""
+    import jax
+    import jax.numpy as jnp
+
+    configuration: Any = jax.config
+    configuration.update("jax_enable_x64", True)
+    return jax, jnp

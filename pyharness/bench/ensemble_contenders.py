@@ -1,0 +1,115 @@
+"""Who takes part in `bench --ensemble`, what all are given, and our own part in it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pyharness.methods.many import solve_many
+from pyharness.methods.solve import solve
+from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.trajectory import Array
+
+MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2
+HORIZON = 3.0  # s
+SAMPLE = 200  # bodies whose error is found
+_FASTEST = 2.0  # rad/s, about each axis
+_HARDEST = 1.0  # rad/s2, about each axis
+
+
+@dataclass(frozen=True, eq=False)
+class EnsembleLoad:
+    """Bodies of one kind, each with its start and its torque."""
+
+    name: str
+    omega0: Array  # (n, 3), rad/s
+    torque: Array | None  # (n, 3), N m about the body's axes
+
+    @property
+    def n(self) -> int:
+        """How many bodies."""
+        return len(self.omega0)
+
+    @property
+    def scene(self) -> Scene:
+        """The body without start and torque of its own."""
+        return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
+
+    @property
+    def acceleration(self) -> Array:
+        """Torque over moment, (n, 3), rad/s2."""
+        if self.torque is None:
+            return np.zeros_like(self.omega0)
+        found: Array = self.torque / np.array(MOMENTS)
+        return found
+
+    def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
+        """Return some of the bodies."""
+        torque = None if self.torque is None else np.ascontiguousarray(self.torque[rows])
+        return replace(self, omega0=np.ascontiguousarray(self.omega0[rows]), torque=torque)
+
+    def ends(self) -> Array:
+        """Return omega of each body at the horizon, one by one and as good as can be."""
+        found = np.empty_like(self.omega0)
+        for i, start in enumerate(self.omega0.tolist()):
+            law = TorqueLaw() if self.torque is None else TorqueLaw(self.torque[i].tolist())
+            scene = Scene(self.name, start, MOMENTS, torque=law)
+            found[i] = solve(scene, [HORIZON], tolerance=1e-15).omega[0]
+        return found
+
+
+# From bodies, setting and threads to a call that returns omega at the horizon, (n, 3).
+EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
+
+
+@dataclass(frozen=True)
+class EnsembleContender:
+    """A way to the ends of many bodies, with a setting that trades time for accuracy."""
+
+    name: str
+    setting: str  # what is varied: tolerance, steps, none
+    prepare: EnsembleMaker  # compiling may be left to the first call
+    package: str = ""  # that it needs; empty for our own
+    # On how many threads it runs; 0 for all that its package takes.
+    threads: tuple[int, ...] = (1, 2)
+    torque_free: bool = False  # whether it takes no torque
+
+
+def draw(seed: str, n: int) -> list[EnsembleLoad]:
+    """Return n bodies without torque, and the same with a torque of each."""
+    source = np.random.default_rng([ord(letter) for letter in f"ensemble/{seed}"])
+    omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
+    torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)
+    return [
+        EnsembleLoad("no torque", omega0, None),
+        EnsembleLoad("constant torque, each its own", omega0, torque),
+    ]
+
+
+def own_ensembles() -> list[EnsembleContender]:
+    """Return ours."""
+    return [
+        EnsembleContender("closed-form", "none", _own("closed-form"), torque_free=True),
+        EnsembleContender("taylor", "tolerance", _own("taylor")),
+        EnsembleContender("rk4", "steps", _own("rk4")),
+    ]
+
+
+def _own(method: str) -> EnsembleMaker:
+    def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+        # Results go where those of the call before went.
+        tolerance = setting if method == "taylor" else 1e-12
+        step = HORIZON / setting if method == "rk4" else None
+        kept = None
+
+        def run() -> Array:
+            nonlocal kept
+            kept = solve_many(
+                load.scene, HORIZON, omega0=load.omega0, torque_constant=load.torque,
+                method=method, tolerance=tolerance, step=step, threads=threads, out=kept,
+            )  # fmt: skip
+            return kept.omega
+
+        return run
+
+    return prepare

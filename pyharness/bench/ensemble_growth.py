@@ -1,0 +1,125 @@
+"""How the cost of a body falls as there are more of them, and what memory a call takes."""
+
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.bench.ensemble_contenders import (
+    HORIZON,
+    EnsembleContender,
+    EnsembleLoad,
+    draw,
+    own_ensembles,
+)
+from pyharness.bench.ensemble_measure import STEPS, shortest
+from pyharness.methods.many import Ensemble, solve_many
+from pyharness.methods.prepared import prepare
+from pyharness.model.trajectory import Array
+
+SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
+_BATCH, _ROUNDS = 0.02, 5
+_MANY = 1_000_000
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a call for so many bodies takes on one core, by method."""
+
+    bodies: int
+    seconds: dict[str, float]  # of a body
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a process needed beyond what it had, bytes."""
+
+    method: str
+    bodies: int
+    arrays: int  # starts, torques, results
+    peak: int | None  # with them; None where the system does not tell
+
+    @property
+    def ratio(self) -> float | None:
+        """Peak over arrays."""
+        return None if self.peak is None else self.peak / self.arrays
+
+
+def sizes(seed: str, most: int, say: Callable[[str], None] = lambda _: None) -> list[Size]:
+    """Measure calls for 1, 10, ... bodies, `most` at most: without torque the closed form."""
+    free, pushed = draw(seed, most)
+    found, n = [], 1
+    while n <= most:
+        say(f"{n} bodies")
+        runs = {"prepared": _prepared(free.part(slice(0, n)))}
+        for method in own_ensembles():
+            load = (free if method.torque_free else pushed).part(slice(0, n))
+            runs[method.name] = method.prepare(load, SETTINGS[method.name], 1)
+        rounds = _ROUNDS if n <= _MANY else 2
+        seconds = {name: _best(run, rounds) / n for name, run in runs.items()}
+        found.append(Size(n, seconds))
+        n *= 10
+    return found
+
+
+def _prepared(load: EnsembleLoad) -> Callable[[], object]:
+    """Return a call of a solver made beforehand, which has the closed form alone."""
+    solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
+    return lambda: solver.many(load.omega0, HORIZON, out=out)
+
+
+def _best(run: Callable[[], object], rounds: int) -> float:
+    run()
+    return min(shortest(run, _BATCH) for _ in range(rounds))
+
+
+def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
+    """Measure what a call takes, each in a process of its own: peaks do not fall again."""
+    found = []
+    for method in own_ensembles() if methods is None else methods:
+        command = f"from pyharness.bench.ensemble_growth import needed; needed({method.name!r}, "
+        told = subprocess.run(
+            [sys.executable, "-c", f"{command}{bodies})"],
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        arrays, peak = map(int, told.stdout.split())
+        found.append(Memory(method.name, bodies, arrays, peak if peak > 0 else None))
+    return found
+
+
+def needed(method: str, bodies: int) -> None:
+    """Print the bytes of arrays in and out, and the growth of this process up to its peak."""
+    _, load = draw("memory", 512)
+
+    def run(omega0: Array, torque: Array | None) -> Ensemble:
+        return solve_many(
+            load.scene, HORIZON, omega0=omega0, torque_constant=torque, method=method,
+            tolerance=1e-12, step=HORIZON / STEPS,
+        )  # fmt: skip
+
+    free = method == "closed-form"
+    run(load.omega0, None if free else load.torque)
+    before = _resident("VmRSS")
+    source = np.random.default_rng(1)
+    given = [np.empty((bodies, 3)) for _ in range(1 if free else 2)]
+    for array in given:
+        source.random(out=array)
+    found = run(given[0], None if free else given[1])
+    arrays = sum(each.nbytes for each in given) + found.omega.nbytes + found.status.nbytes
+    print(arrays, _resident("VmHWM") - before)
+
+
+def _resident(name: str) -> int:
+    """Return what Linux tells of this process (bytes); 0 on other systems."""
+    try:
+        with open("/proc/self/status", encoding="ascii") as file:
+            for line in file:
+                if line.startswith(name + ":"):
+                    return 1024 * int(line.split()[1])
+    except OSError:
+        pass
+    return 0

@@ -1,0 +1,184 @@
+"""Other people's ways to the ends of many bodies: NumPy, SciPy and heyoka; all of them, listed."""
+
+from collections.abc import Callable
+from functools import cache, partial
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from pyharness.bench import ensemble_compiled as compiled
+from pyharness.bench.contenders import refuse_rounding
+from pyharness.bench.ensemble_contenders import (
+    HORIZON,
+    MOMENTS,
+    EnsembleContender,
+    EnsembleLoad,
+)
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.truth.reference import exact_coefficients
+
+_BLOCK = 4096  # bodies whose arrays stay near the processor
+
+
+def ensemble_peers() -> list[EnsembleContender]:
+    """Return all peers, installed or not."""
+    blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
+    return [
+        EnsembleContender("heyoka-batch", "tolerance", _heyoka_batch, "heyoka", (1,)),
+        EnsembleContender("heyoka-ensemble", "tolerance", _heyoka_ensemble, "heyoka"),
+        EnsembleContender("numba-blocks-rk4", "steps", blocks, "numba"),
+        EnsembleContender("numba-bodies-rk4", "steps", alone, "numba"),
+        EnsembleContender("jax-rk4", "steps", compiled.jax_rk4, "jax", (0,)),
+        EnsembleContender("diffrax-dopri8", "tolerance", compiled.diffrax_vmap, "diffrax", (0,)),
+        EnsembleContender("numpy-rk4", "steps", _numpy_rk4, "numpy"),
+        EnsembleContender("scipy-dop853-loop", "tolerance", _scipy_loop, "scipy", (1,)),
+    ]
+
+
+def is_installed(contender: EnsembleContender) -> bool:
+    """Whether the package of a contender is there."""
+    return not contender.package or find_spec(contender.package) is not None
+
+
+def coefficients() -> list[float]:
+    """Return A, B, C of the body."""
+    return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
+
+
+def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+    """One integrator, whose state and torque are set for each batch."""
+    import heyoka
+
+    size = heyoka.recommended_simd_size()
+    integrator = _integrator(load.torque is not None, setting, size)
+    starts, torques = _batches(load.omega0, size), _batches(load.acceleration, size)
+    ends = np.empty_like(starts)
+    state, parameters = integrator.state, integrator.pars
+
+    def run() -> Array:
+        for k in range(len(starts)):
+            integrator.set_time(0.0)
+            state[:] = starts[k]
+            if len(parameters):
+                parameters[:] = torques[k]
+            integrator.propagate_until(HORIZON)
+            ends[k] = state
+        return ends.transpose(0, 2, 1).reshape(-1, 3)[: load.n]
+
+    return run
+
+
+def _heyoka_ensemble(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+    import heyoka
+
+    size = heyoka.recommended_simd_size()
+    integrator = _integrator(load.torque is not None, setting, size)
+    starts, torques = _batches(load.omega0, size), _batches(load.acceleration, size)
+
+    def begin(copy: Any, k: int) -> Any:
+        copy.set_time(0.0)
+        copy.state[:] = starts[k]
+        if len(copy.pars):
+            copy.pars[:] = torques[k]
+        return copy
+
+    def run() -> Array:
+        found = heyoka.ensemble_propagate_until_batch(
+            integrator, HORIZON, len(starts), begin, max_workers=threads
+        )
+        ends = np.array([each[0].state for each in found])
+        return ends.transpose(0, 2, 1).reshape(-1, 3)[: load.n]
+
+    return run
+
+
+@cache
+def _integrator(with_torque: bool, tolerance: float, size: int) -> Any:
+    import heyoka
+
+    x, y, z = heyoka.make_vars("x", "y", "z")
+    a, b, c = coefficients()
+    rates = [a * y * z, b * x * z, c * x * y]
+    if with_torque:
+        rates = [rate + heyoka.par[axis] for axis, rate in enumerate(rates)]
+    start = np.ones((3, size))
+    return heyoka.taylor_adaptive_batch(
+        list(zip((x, y, z), rates, strict=True)), start, tol=tolerance, compact_mode=False
+    )
+
+
+def _batches(rows: Array, size: int) -> Array:
+    """Return arrays of (3, size), the last filled up with its last body."""
+    lacking = -len(rows) % size
+    filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
+    return np.ascontiguousarray(filled.reshape(-1, size, 3).transpose(0, 2, 1))
+
+
+def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+    """Arrays of a block of bodies for each unknown."""
+    a, b, c = coefficients()
+    starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
+    found = np.empty_like(load.omega0)
+    steps = round(setting)
+    h = HORIZON / steps
+
+    def slope(w: Array, torque: Array) -> Array:
+        x, y, z = w
+        rates = np.empty_like(w)
+        np.multiply(y, a * z, out=rates[0])
+        np.multiply(z, b * x, out=rates[1])
+        np.multiply(x, c * y, out=rates[2])
+        if load.torque is not None:
+            rates += torque
+        return rates
+
+    def solve(piece: slice) -> None:
+        w, torque = starts[:, piece], torques[:, piece]
+        for _ in range(steps):
+            k1 = slope(w, torque)
+            k2 = slope(w + (0.5 * h) * k1, torque)
+            k3 = slope(w + (0.5 * h) * k2, torque)
+            k4 = slope(w + h * k3, torque)
+            k2 += k3
+            k2 *= 2.0
+            k1 += k2
+            k1 += k4
+            k1 *= h / 6.0
+            w = w + k1
+        found[piece] = w.T
+
+    def run() -> Array:
+        compiled.in_threads(solve, load.n, threads, _BLOCK)
+        return found
+
+    return run
+
+
+def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
+    """One body after the other, plain floats in the right-hand side."""
+    from scipy.integrate import solve_ivp
+
+    refuse_rounding("solve_ivp", setting)
+    a, b, c = coefficients()
+    bodies = list(zip(load.omega0.tolist(), load.acceleration.tolist(), strict=True))
+
+    def run() -> Array:
+        ends = []
+        for start, (p, q, r) in bodies:
+
+            def slope(
+                _: float, w: Any, p: float = p, q: float = q, r: float = r
+            ) -> tuple[float, float, float]:
+                x, y, z = w.tolist()
+                return a * y * z + p, b * x * z + q, c * x * y + r
+
+            size = max(map(abs, start))
+            found = solve_ivp(
+                slope, (0.0, HORIZON), start, method="DOP853", rtol=setting, atol=setting * size
+            )
+            ends.append(found.y[:, -1])
+        return np.array(ends)
+
+    return run

@@ -1,0 +1,193 @@
+"""The report of `bench --ensemble`: rates at an error, growth with the number, memory."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pyharness.bench.ensemble_growth import Memory, Size
+from pyharness.bench.ensemble_measure import STEPS, Rate, Rates
+from pyharness.model.build import build, machine
+from pyharness.model.report import (
+    Column,
+    Line,
+    Picture,
+    Report,
+    Section,
+    Table,
+    digits,
+    numbers,
+    short,
+)
+
+_DRIFT = (
+    "One process and one run: the shortest calls of interleaved rounds, on one core in the "
+    "processor's time, on more in that on the wall. Times drift with the machine and with what "
+    "else it does: compare the ratios, not the rates."
+)
+_STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
+
+
+@dataclass(frozen=True)
+class Ensembles:
+    """What a run found."""
+
+    rates: Rates
+    sizes: Sequence[Size]
+    memory: Sequence[Memory]
+
+
+def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
+    """Report a table for each load and error, then growth and memory."""
+    parts, notes = _parts(found), _notes(found)
+    here, built = machine(packages), build()
+    versions = [*here.items(), ("Fortran compiler", built.compiler), ("NumPy", built.numpy)]
+    shown: list[Section] = [[Line(title), table] for title, table in parts]
+    tables: list[Section] = [[Line(f"### {title}"), table] for title, table in parts]
+    page: list[Section] = [
+        [Line("## Ensembles")],
+        [Line(f"Made by `{command}`; run that again to have it for another machine.")],
+        [Line(_DRIFT)],
+        [Table((Column(""), Column("version")), versions)],
+        *tables,
+        [Line("### Notes")],
+        [Line(f"- {line}") for line in notes],
+    ]
+    return Report(
+        "bench",
+        text=[*shown, notes],
+        record=lambda: _record(found) | {"machine": here, "build": asdict(built)},
+        data=_data(found.rates),
+        page=page,
+        pictures={"growth": lambda: size_picture(found.sizes)},
+    )
+
+
+def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
+    """Return the best rate of ours among such rows, with as many threads, over a row's own.
+
+    What takes all cores is held against ours on the most threads.
+    """
+    ours = [each for each in rows if each.method in _STYLES]
+    threads = row.threads or max((each.threads for each in ours), default=0)
+    rates = [each.rate for each in ours if each.threads == threads]
+    return max(rates) / row.rate if rates else None
+
+
+def _parts(found: Ensembles) -> list[tuple[str, Table]]:
+    tables: dict[tuple[str, float | None], list[Rate]] = {}
+    for row in found.rates.rows:
+        tables.setdefault((row.load, row.target), []).append(row)
+    parts = []
+    for (load, target), rows in tables.items():
+        what = "body-steps" if target is None else "bodies"
+        columns = [
+            Column("", left=True), Column("cores", lambda n: "all" if n == 0 else str(n)),
+            Column("setting", _setting), Column("bodies"), Column("error", short),
+            Column(f"million {what}/s", digits(".3g", 1e-6)), Column("ours over it", _ratio),
+        ]  # fmt: skip
+        cells = [
+            [row.method, row.threads, row.setting, row.bodies, row.error, row.rate,
+             ours_over(rows, row)]
+            for row in rows
+        ]  # fmt: skip
+        title = f"{load[0].upper()}{load[1:]}, T = 3 s, "
+        title += f"{STEPS} steps of RK4" if target is None else f"to {short(target)}"
+        parts.append((title.replace("1.0e", "1e"), Table(columns, cells)))
+    time = digits(".3g", 1e9)
+    if found.sizes:
+        names = list(found.sizes[0].seconds)
+        heads = {"prepared": "closed form, prepared", "closed-form": "closed form"}
+        heads["taylor"] = "Taylor, 1e-12"
+        columns = [Column("bodies")]
+        columns += [Column(heads.get(name, f"RK4, {STEPS} steps"), time) for name in names]
+        rows_of_sizes = [[each.bodies, *each.seconds.values()] for each in found.sizes]
+        parts.append(("Growth with the number: ns a body, one core", Table(columns, rows_of_sizes)))
+    if found.memory:
+        mega = digits(".1f", 1e-6)
+        columns = [
+            Column("", left=True), Column("bodies"), Column("arrays in and out, MB", mega),
+            Column("process grew by, MB", mega), Column("ratio", digits(".2f")),
+        ]  # fmt: skip
+        cells = [[each.method, each.bodies, each.arrays, each.peak, each.ratio]
+                 for each in found.memory]  # fmt: skip
+        parts.append(("Memory", Table(columns, cells)))
+    return parts
+
+
+def _setting(value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.0f} steps" if value > 1.0 else f"{value:.0e}".replace("e-0", "e-")
+
+
+def _ratio(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}" if value < 1e3 else f"{value:.0f}"
+
+
+def _notes(found: Ensembles) -> list[str]:
+    lines = [
+        f"{found.rates.bodies} bodies with I = (40, 30, 20), starts and torques at random, seed "
+        f"{found.rates.seed}; who would take long gets fewer, and the rate is theirs. error: the "
+        "largest among the first 200, each over the body's largest omega at start and end, against "
+        "solve at 1e-15. setting: the coarsest that keeps the error in the title; of a tolerance "
+        "decades, of steps factors of 2**(1/4).",
+        "ours over it: the best rate of ours on as many cores over the own one. Compiling is not "
+        "in the times. JAX and diffrax take the cores they like. heyoka-ensemble copies its "
+        "integrator for each batch; heyoka-batch has one, in a loop of Python's.",
+    ]
+    reasons: dict[str, list[str]] = {}
+    for place, name, why in found.rates.refused:
+        reasons.setdefault(f"{name}: {why}", []).append(place)
+    return lines + [
+        text + (f" ({'; '.join(filter(None, places))})" if any(places) else "")
+        for text, places in reasons.items()
+    ]
+
+
+def _data(rates: Rates) -> Table:
+    rows = [
+        [row.load, row.target, row.method, row.threads or None, row.setting, row.bodies,
+         row.seconds, row.error, row.bodies_a_second]
+        for row in rates.rows
+    ]  # fmt: skip
+    return numbers("load target method cores setting bodies seconds error bodies_a_second", rows)
+
+
+def _record(found: Ensembles) -> dict[str, Any]:
+    return {
+        "seed": found.rates.seed,
+        "bodies": found.rates.bodies,
+        "rows": [
+            asdict(row) | {"threads": row.threads or None, "bodies_a_second": row.bodies_a_second}
+            for row in found.rates.rows
+        ],
+        "refused": [
+            {"place": place or None, "method": name, "reason": why}
+            for place, name, why in found.rates.refused
+        ],
+        "growth": [asdict(each) for each in found.sizes],
+        "memory": [asdict(each) | {"ratio": each.ratio} for each in found.memory],
+    }
+
+
+def size_picture(sizes: Sequence[Size]) -> Picture:
+    """Draw the time of a body over how many there are."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")
+    axes = figure.subplots()
+    names = list(sizes[0].seconds)
+    labels = {"prepared": "closed-form, prepared"}
+    for name in names:
+        axes.loglog(
+            [each.bodies for each in sizes], [1e9 * each.seconds[name] for each in sizes],
+            _STYLES[name], label=labels.get(name, name), linewidth=1.2, markersize=5.0,
+        )  # fmt: skip
+    axes.set_xlabel("bodies of a call")
+    axes.set_ylabel("ns a body, one core")
+    axes.set_title(f"To T = 3 s; taylor to 1e-12, rk4 in {STEPS} steps", fontsize=10)
+    axes.grid(visible=True, linewidth=0.3)
+    axes.legend(frameon=False)
+    rows = [[each.bodies, *(each.seconds[name] for name in names)] for each in sizes]
+    data = numbers(" ".join(["bodies", *(name.replace("-", "_") for name in names)]), rows)
+    return Picture(figure, data)

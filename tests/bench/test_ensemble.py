@@ -1,0 +1,167 @@
+"""`bench --ensemble`: all contenders come to the truth, and the report has what it promises."""
+
+import csv
+import io
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness.bench import ensemble_measure as measuring
+from pyharness.bench.ensemble_contenders import EnsembleContender, draw, own_ensembles
+from pyharness.bench.ensemble_growth import memory
+from pyharness.bench.ensemble_measure import Rate
+from pyharness.bench.ensemble_peers import ensemble_peers, is_installed
+from pyharness.bench.ensemble_report import ours_over
+from pyharness.cli.main import main
+from tests.issue_limit import IDLE, independent
+
+Capture = pytest.CaptureFixture[str]
+# Settings for an error of 1e-8.
+SETTINGS = {"tolerance": 1e-9, "steps": 400.0, "none": 1.0}
+BODIES = 70  # more than a block, and no whole number of them
+
+
+@pytest.fixture
+def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measuring, "ROUNDS", 1)
+    monkeypatch.setattr(measuring, "SAMPLE", 20)
+    monkeypatch.setattr(measuring, "_BATCH", 0.0)
+
+
+# Those that take seconds to compile are tried where they are measured.
+FAST = [each for each in (*own_ensembles(), *ensemble_peers()) if each.package != "diffrax"]
+
+
+@pytest.mark.parametrize("contender", FAST, ids=lambda each: each.name)
+@pytest.mark.filterwarnings("ignore")
+def test_contender_comes_to_the_truth(contender: EnsembleContender) -> None:
+    if not is_installed(contender):
+        pytest.skip(f"{contender.package} is not installed")
+    for load in draw("truth", BODIES):
+        if contender.torque_free and load.torque is not None:
+            continue
+        rows = [0, 1, 63, 64, 69]
+        wanted = load.part(rows).ends()
+        for threads in contender.threads:
+            run = contender.prepare(load, SETTINGS[contender.setting], threads)
+            run()  # the second call begins anew
+            np.testing.assert_allclose(run()[rows], wanted, rtol=0.0, atol=2e-8)
+
+
+def test_a_seed_says_which_bodies() -> None:
+    (free, pushed), (again, _), (other, _) = draw("a", 9), draw("a", 9), draw("b", 9)
+    assert free.torque is None
+    assert pushed.torque is not None
+    assert np.array_equal(free.omega0, again.omega0)
+    assert np.array_equal(free.omega0, pushed.omega0)
+    assert not np.array_equal(free.omega0, other.omega0)
+    # So large that it matters.
+    assert np.abs(pushed.ends() - free.ends()).max() > 0.5
+
+
+def some_rate(method: str, threads: int, seconds: float) -> Rate:
+    return Rate("load", 1e-6, method, threads, None, 100, seconds, 1e-7)
+
+
+def test_ratio_is_of_ours_on_as_many_cores() -> None:
+    rows = [
+        some_rate("taylor", 1, 2.0), some_rate("rk4", 1, 1.0), some_rate("taylor", 2, 0.5),
+        some_rate("heyoka-batch", 1, 5.0), some_rate("jax-rk4", 0, 5.0),
+    ]  # fmt: skip
+    assert [ours_over(rows, row) for row in rows] == [2.0, 1.0, 1.0, 5.0, 10.0]
+    assert ours_over(rows[3:], rows[3]) is None
+
+
+COMMAND = ["bench", "--ensemble", "--bodies", "100", "--seed", "1", "--peers", "numpy,scipy"]
+
+
+@pytest.mark.usefixtures("hurried")
+def test_table_has_every_part(capsys: Capture) -> None:
+    assert main(COMMAND) == 0
+    shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= 100
+    for title in ("No torque, T = 3 s, to 1e-6", "Constant torque, each its own, T = 3 s, to 1e-12",
+                  "300 steps of RK4", "Growth with the number", "Memory"):  # fmt: skip
+        assert title in shown
+    for name in ("closed-form", "taylor", "rk4", "numpy-rk4", "scipy-dop853-loop"):
+        assert re.search(rf"^{name} ", shown, flags=re.MULTILINE)
+    assert re.search(r"^ +10000 ", shown, flags=re.MULTILINE)  # bodies, a hundred times as many
+
+
+@pytest.mark.usefixtures("hurried")
+def test_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "growth.svg"
+    one = [*COMMAND[:-1], "none", "--methods", "taylor"]
+    assert main([*one, "--plot", str(picture), "--format", "json"]) == 0
+    record: dict[str, Any] = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert b"<svg" in picture.read_bytes()
+    assert {(row["method"], row["target"], row["threads"]) for row in record["rows"]} == {
+        ("taylor", target, threads) for target in (1e-6, 1e-12) for threads in (1, 2)
+    }
+    assert all(row["error"] <= row["target"] for row in record["rows"])
+    assert [each["bodies"] for each in record["growth"]] == [1, 10, 100, 1000, 10_000]
+    assert {each["method"] for each in record["memory"]} == {"closed-form", "taylor", "rk4"}
+    assert main([*one, "--format", "csv"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert len(rows) == 8
+    assert {"load", "target", "method", "cores", "error", "bodies_a_second"} <= set(rows[0])
+
+
+def test_memory_is_at_most_twice_the_arrays() -> None:
+    for each in memory(300_000):
+        assert each.ratio is None or 0.5 < each.ratio < 2.0
+
+
+@pytest.mark.usefixtures("hurried")
+def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    there: Callable[[EnsembleContender], bool] = lambda each: each.package == ""  # noqa: E731
+    monkeypatch.setattr("pyharness.bench.ensemble_peers.is_installed", there)
+    assert main([*COMMAND[:-1], "heyoka", "--methods", "closed-form"]) == 0
+    assert "heyoka-batch: not installed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("--ensemble --bodies 0", "--bodies: 0; allowed: 1 to"),
+        ("--ensemble --bodies x", "--bodies: 'x' where a whole number belongs"),
+        ("--ensemble --case 4", "--case has no meaning with --ensemble"),
+        ("--ensemble --peers heyoca", "unknown peer 'heyoca'; did you mean 'heyoka'"),
+        ("--ensemble --peers none --methods none", "no method and no peer is left"),
+        ("--bodies 5", "--bodies has no meaning without --ensemble"),
+    ],
+)
+def test_mistake_is_one_line(arguments: str, words: str, capsys: Capture) -> None:
+    assert main(["bench", *arguments.split()]) == 2
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err.count("\n")) == ("", 1)
+    assert words in captured.err
+
+
+LOOP = """\tvmovapd\t(%rdx), %zmm16
+\tvfmadd213pd\t2496(%rdx), %zmm15, %zmm26
+\tvaddpd\t%zmm26, %zmm14, %zmm3
+\tvmovapd\t%zmm3, -64(%rdx)
+\taddq\t$64, %rdx
+\tjne\t.L1""".splitlines()
+
+
+def test_without_dependencies_the_instructions_stay() -> None:
+    changed = independent(LOOP, "zmm")
+    assert [line.split()[0] for line in changed] == [line.split()[0] for line in LOOP]
+    assert changed[-2:] == LOOP[-2:]
+    memory_of = re.compile(r"-?\d*\(%rdx\)")
+    assert [memory_of.findall(line) for line in changed] == [
+        memory_of.findall(line) for line in LOOP
+    ]
+    for line in changed[:3]:
+        *sources, target = re.findall(r"%zmm(\d+)", line)
+        assert int(target) != IDLE
+        assert {*map(int, sources)} <= {IDLE}
+    assert f"%zmm{IDLE}, -64(%rdx)" in changed[3]

@@ -1,0 +1,225 @@
+"""`python -m tests.issue_limit`: how near the loop of RK4 on many bodies is to its issue limit.
+
+The kernels of many bodies are compiled to assembly as the build does it, and once more with the
+loop of RK4 so changed that none of its arithmetic waits for another: it reads one register, set to
+0 before the loop and not written in it. The instructions stay as many and of the same kinds; loads,
+stores and counting stay as they are. What a fused multiply-add writes it also reads: there the
+target goes round a number of registers, so that it was written long before. Both solve a block of
+bodies, in the nearest cache, in turn, and the shortest run of each counts; the time without
+dependencies over the time with them is the part of the limit that is reached.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.instruction_sets import LEVELS, level_here
+
+ROOT = Path(__file__).parent.parent
+FORTRAN = ROOT / "fortran"
+IDLE = 15  # the register that is read
+FUSED = 36  # of two bodies a step: four times three products, and twice three at the end
+BODIES, STEPS = 64, 400_000
+ROUNDS = 41
+SOURCES = (
+    "modern/two_words", "modern/torque_terms", "modern/taylor_plan", "many/many_circular",
+    "many/many_free", "many/many_fixed", "many/many_taylor",
+)  # fmt: skip
+COMMON = ("kinds", "interruption", "modern/problem", "many/bodies")
+KINDS = {
+    "fused": r"vfn?m(add|sub)\w+",
+    "add": r"v(add|sub)pd",
+    "multiply": r"vmulpd",
+    "move, load, store": r"vmov[au]pd",
+}
+DRIVER = """program driver
+  use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_long, c_ptr
+  use bodies, only: bodies_t, i1
+  use kinds, only: dp
+  use methods, only: RK4
+  implicit none (type, external)
+  interface
+    subroutine solve(bodies_at, method, omega, status, interrupted) &
+      bind(c, name="solve_many_fixed_LEVEL")
+      import :: c_int, c_ptr, dp, i1
+      type(c_ptr), intent(in), value :: bodies_at
+      integer(c_int), intent(in), value :: method
+      real(dp), intent(inout) :: omega(3, *)
+      integer(i1), intent(inout) :: status(*)
+      integer(c_int), intent(out) :: interrupted
+    end subroutine solve
+    integer(c_long) function processor_time() bind(c, name="clock")  ! us, of this process
+      import :: c_long
+    end function processor_time
+  end interface
+  integer, parameter :: n = N_BODIES
+  type(bodies_t), target :: given
+  real(dp) :: omega(3, n)
+  integer(i1) :: status(n)
+  integer(c_int) :: interrupted
+  integer(c_long) :: start, finish
+  integer :: i
+  given%by_moments = .true.
+  given%tolerance = 1e-12_dp
+  given%step = 0.01_dp
+  given%n = n
+  allocate (given%body(3, 1), given%constant(3, n), given%rate(3, 1), given%omega0(3, n))
+  allocate (given%sines(4, 0, 1), given%cosines(4, 0, 1), given%times(1))
+  given%body(:, 1) = [40.0_dp, 30.0_dp, 20.0_dp]
+  given%rate = 0.0_dp
+  given%times = 0.01_dp*N_STEPS
+  do i = 1, n
+    ! So little that the bodies are not spun up.
+    given%constant(:, i) = [1e-6_dp, 2e-6_dp, -1e-6_dp]*i
+    given%omega0(:, i) = [0.3_dp, 1.0_dp, -0.5_dp] + 0.01_dp*i
+  end do
+  start = processor_time()
+  call solve(c_loc(given), int(RK4, c_int), omega, status, interrupted)
+  finish = processor_time()
+  print *, real(finish - start, dp)*1e-6_dp, sum(omega)
+end program driver
+"""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Print steps of bodies a second as it is, at the limit, and the part reached."""
+    levels = [name for name in LEVELS[level_here() : 0 : -1] if not arguments or name in arguments]
+    if not levels:
+        print("no AVX2 or AVX-512 here, in this build or among the names given")
+        return 1
+    for level in levels:
+        with tempfile.TemporaryDirectory() as folder:
+            report(level, Path(folder))
+    return 0
+
+
+def report(level: str, folder: Path) -> None:
+    """Compile, time and print for one instruction set."""
+    assembly = compiled(level, folder)
+    changed, loop = without_dependencies(assembly, level)
+    programs = [
+        linked(text, name, level, folder)
+        for name, text in (("as_it_is", assembly), ("limit", changed))
+    ]
+    best = [float("inf")] * 2
+    for _ in range(ROUNDS):
+        for k, program in enumerate(programs):
+            told = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+            best[k] = min(best[k], float(told.split()[0]))
+    kinds = Counter(kind_of(line) for line in loop)
+    told = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+    lanes = 2 * (8 if level == "avx512" else 4)
+    print(f"{level}: a step of {lanes} bodies is {len(loop)} instructions: {told}")
+    rates = [BODIES * STEPS / seconds / 1e6 for seconds in best]
+    print(f"  as it is             {rates[0]:7.0f} million body-steps/s")
+    print(f"  without dependencies {rates[1]:7.0f}")
+    print(f"  part of the limit    {best[1] / best[0]:7.2f}", flush=True)
+
+
+def flags(level: str) -> list[str]:
+    """Return those of the build, from its record of what it compiled."""
+    (built,) = (ROOT / "build").glob("cp*/build.ninja")
+    text = built.read_text()
+    rule = re.search(rf"^build libbodies_{level}\.a\.p/\S*\.o: fortran.*?ARGS = (.*?)$",
+                     text, flags=re.DOTALL | re.MULTILINE)  # fmt: skip
+    assert rule is not None
+    return [each for each in rule[1].split() if not each.startswith(("-I", "-J", "-fdiag"))]
+
+
+def compiled(level: str, folder: Path) -> str:
+    """Return the assembly of the kernels of many bodies, what they stand on compiled beside it."""
+    given = [str(FORTRAN / f"{name}.f90") for name in SOURCES]
+    target = f"bodies_{level}.f90"
+    unroll = [sys.executable, str(FORTRAN / "modern/unroll.py"), level, target]
+    subprocess.run([*unroll, *given], cwd=folder, check=True)
+    codes = [sys.executable, str(FORTRAN / "make_codes.py"), str(ROOT / "pyharness/model/codes.py")]
+    subprocess.run([*codes, "codes.f90"], cwd=folder, check=True)
+    for source in ("codes.f90", *(str(FORTRAN / f"{name}.f90") for name in COMMON)):
+        gfortran(folder, "-O2", "-c", source)
+    gfortran(folder, *flags(level), "-S", target, "-o", "bodies.s")
+    return (folder / "bodies.s").read_text()
+
+
+def without_dependencies(assembly: str, level: str) -> tuple[str, list[str]]:
+    """Return the assembly with the loops of RK4 changed, and the first of them as it was."""
+    wide = "zmm" if level == "avx512" else "ymm"
+    lines = assembly.splitlines()
+    begin = next(i for i, line in enumerate(lines) if line == f"solve_many_fixed_{level}:")
+    end = next(i for i in range(begin, len(lines)) if ".cfi_endproc" in lines[i])
+    found: list[str] = []
+    label, first = "", begin
+    for i in range(begin, end):
+        if labelled := re.match(r"(\.L\w+):", lines[i]):
+            label, first = labelled[1], i + 1
+        if re.match(rf"\s+j\w+\s+{re.escape(label)}$", lines[i]) and label:
+            loop = lines[first : i + 1]
+            fused = [line for line in loop if kind_of(line) == "fused" and wide in line]
+            if len(fused) == FUSED:
+                lines[first : i + 1] = independent(loop, wide)
+                # Where all registers are written, one is set before the loop and left alone.
+                zero = f"%{wide}{IDLE}"
+                lines[first - 1] = f"\tvxorpd\t{zero}, {zero}, {zero}\n{lines[first - 1]}"
+                found = found or loop
+    assert found, "the loop of RK4 was not found"
+    return "\n".join(lines) + "\n", found
+
+
+def independent(loop: Sequence[str], wide: str) -> list[str]:
+    """Return a loop whose vector instructions wait for no other: as many, of the same kinds."""
+    count = 32 if wide == "zmm" else 16
+    register = re.compile(rf"%{wide}(\d+)")
+    free = [each for each in range(count) if each != IDLE]
+    # What is only written takes another register inside the processor each time.
+    plain_ones, round_ones = free[:2], free[2:]
+    used: Counter[str] = Counter()
+    result = []
+    for line in loop:
+        parts = line.rsplit(",", 1)
+        target = register.fullmatch(parts[-1].strip())
+        if not register.search(line):
+            result.append(line)
+        elif target is None:  # a store
+            result.append(register.sub(f"%{wide}{IDLE}", line))
+        else:
+            kind = "round" if kind_of(line) == "fused" else "plain"
+            some = round_ones if kind == "round" else plain_ones
+            place = some[used[kind] % len(some)]
+            used[kind] += 1
+            sources = register.sub(f"%{wide}{IDLE}", parts[0])
+            result.append(f"{sources}, %{wide}{place}")
+    return result
+
+
+def kind_of(line: str) -> str:
+    """Return what an instruction is for."""
+    name = line.split()[0]
+    return next((kind for kind, text in KINDS.items() if re.fullmatch(text, name)), "counting")
+
+
+def linked(text: str, name: str, level: str, folder: Path) -> str:
+    """Return a program that times the kernels of an assembly."""
+    (folder / f"{name}.s").write_text(text)
+    driver = DRIVER.replace("LEVEL", level).replace("N_BODIES", str(BODIES))
+    (folder / "driver.f90").write_text(driver.replace("N_STEPS", str(STEPS)))
+    never = str(ROOT / "tests/never_interrupted.f90")
+    gfortran(folder, "-O1", "driver.f90", f"{name}.s", never, *objects(), "-o", name)
+    return str(folder / name)
+
+
+def objects() -> list[str]:
+    """Return what the kernels stand on, compiled."""
+    return ["codes.o", *(f"{Path(name).name}.o" for name in COMMON)]
+
+
+def gfortran(folder: Path, *arguments: str) -> None:
+    """Call the compiler; CalledProcessError where it complains."""
+    subprocess.run([os.environ.get("FC", "gfortran"), *arguments], cwd=folder, check=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

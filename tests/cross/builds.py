@@ -60,7 +60,7 @@ def make(build: Build, folder: Path) -> Path:
         if done.returncode:
             end = "\n".join(done.stdout.splitlines()[-20:])
             raise RuntimeError(f"{build.name}: {shlex.join(command)} failed\n{end}")
-    for name in ("_kernels", "_solver"):
+    for name in ("_kernels", "_many", "_solver"):
         (module,) = (
             path for path in (tree / "build").glob(f"{name}.*") if path.suffix in (".so", ".pyd")
         )

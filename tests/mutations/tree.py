@@ -82,9 +82,9 @@ class Tree:
         self._build = folder / "build" / "mutated"
         self._stale = False
         shutil.copytree(ROOT, folder, ignore=LEFT_OUT, symlinks=True)
-        from pyharness import _build, _kernels, _solver
+        from pyharness import _build, _kernels, _many, _solver
 
-        for module in (_build, _kernels, _solver):
+        for module in (_build, _kernels, _many, _solver):
             shutil.copy(str(module.__file__), folder / "pyharness")
         # A limit on memory for whatever is run, and the threads of two jobs don't pay.
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))

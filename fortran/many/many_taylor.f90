@@ -21,7 +21,7 @@ module many_taylor
   integer, parameter :: BETWEEN_LOOKS = 100000 ! at the user, steps of all slots
   ! A step may leave out so much more than that of a single march, whose order it does not choose:
   ! what it leaves out is known and taken off.
-  real(dp), parameter :: MORE = 10.0_dp
+  real(dp), parameter :: MORE = 3.0_dp
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
   ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
   real(dp), parameter :: TRUSTED = 0.4_dp
@@ -37,7 +37,10 @@ module many_taylor
   real(dp), parameter :: DIFFERENCE(3) = [0.48_dp, -0.31_dp, 0.21_dp]
   real(dp), parameter :: RIDGE = 1.001_dp
   real(dp), parameter :: LEAST = 1e-290_dp
-  real(dp), parameter :: MOST_BITS = 2.0_dp**57
+  integer, parameter :: SPARE = 12           ! bits of a number that its logarithm can do without
+  real(dp), parameter :: MOST_BITS = 2.0_dp**45 ! of a ratio, without those
+  ! Whole numbers to reals and back by a sum: few processors convert many at once.
+  real(dp), parameter :: WHOLE = 1.5_dp*2.0_dp**52
 
   public :: many_taylor_solve
 
@@ -147,7 +150,7 @@ contains
     else if (tolerance >= 3e-8_dp) then
       order_for = 12
     else if (tolerance >= 3e-13_dp) then
-      order_for = 18
+      order_for = 20
     else
       order_for = 24
     end if
@@ -217,7 +220,7 @@ contains
       if (.not. (abs(r%w(i, 1)) + abs(r%w(i, 2)) + abs(r%w(i, 3)) <= FAR &
                  .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
       if (.not. (abs(r%rest(i)) <= FAR .and. abs(r%rest(i)) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
-      if (.not. sum(abs(r%a(i, :))) + sum(abs(r%constant(i, :))) + sum(abs(r%rate(i, :))) <= FAR) then
+    if (.not. sum(abs(r%a(i, :))) + sum(abs(r%constant(i, :))) + sum(abs(r%rate(i, :))) <= FAR) then
         r%fits(i) = -1.0_dp
       end if
       if (.not. abs(r%a(i, 1)) <= FAR) r%fits(i) = -1.0_dp
@@ -364,10 +367,11 @@ contains
     integer(int64) :: bits
     real(dp) :: power
 
-    bits = transfer(allowed, bits) - transfer(max(last, LEAST), bits)
-    power = real(bits, dp)*(1.0_dp/real(order, dp))
-    bits = transfer(1.0_dp, bits) + int(max(-MOST_BITS, min(MOST_BITS, power)), int64)
-    ratio = transfer(bits, 1.0_dp)
+    bits = ishft(transfer(allowed, bits), -SPARE) - ishft(transfer(max(last, LEAST), bits), -SPARE)
+    power = transfer(bits + transfer(WHOLE, bits), power) - WHOLE
+    power = max(-MOST_BITS, min(MOST_BITS, power*(1.0_dp/real(order, dp))))
+    bits = transfer(power + WHOLE, bits) - transfer(WHOLE, bits)
+    ratio = transfer(transfer(1.0_dp, bits) + ishft(bits, SPARE), 1.0_dp)
   end function ratio
 
   ! unroll: many_step

@@ -124,7 +124,7 @@ def fortran_source(text: str, level: str, file: str) -> str:
     blocks = re.split(r" *! unroll: (\w+)\n(.*?) *! end unroll\n", text, flags=re.DOTALL)
     parts = [blocks[0]]
     for name, as_written, rest in zip(blocks[1::3], blocks[2::3], blocks[3::3], strict=True):
-        lines = paired(as_written) if name == "paired" else written.get(name)
+        lines = paired(as_written) if name == "paired" and level == "avx512" else written.get(name)
         parts += [as_written] if lines is None else [f"  {line}\n" for line in lines]
         parts.append(rest)
     return "".join(parts)

@@ -4,7 +4,7 @@ import itertools
 import re
 from collections.abc import Iterator
 
-ORDERS = (8, 12, 18, 24)
+ORDERS = (8, 12, 20, 24)
 CARRIED = 7  # order of the exponential that carries differences
 MOMENTS = 8  # terms that count in the mean of omega over a step
 FACTORS = (("x", "y", "z", "fa"), ("y", "x", "z", "fb"), ("z", "x", "y", "fc"))

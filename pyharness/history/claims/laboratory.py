@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 
+from pyharness.history.claims.rules import Runs, largest_error, largest_of, spread_of
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, names_of, switches
 from pyharness.model.scene import Scene, Triple
@@ -16,8 +17,6 @@ from pyharness.original.collocation import interval
 from pyharness.original.equations import Vector, omega_rate
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
-
-COLLOCATION = ("two-term", "four-term")
 
 
 @dataclass(frozen=True)
@@ -66,12 +65,22 @@ class Laboratory:
         """Return the true solution of a case at its steps."""
         return _truth(self.scene(case))
 
+    def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
+        """Run a program on a case, for rules."""
+        run = self.run(program, case, may_stop, parts)
+        reached = run.omega[parts - 1 :: parts]
+        omega = np.full((self.assumptions.steps, 3), np.nan)
+        omega[: len(reached)] = reached
+        complete, overflow = (np.bool_(run.ended == each) for each in ("complete", "overflow"))
+        return Runs(omega, np.asarray(len(reached)), complete, overflow)
+
+    def solution(self, case: int) -> Array:
+        """Return the true omega of a case at its steps."""
+        return self.truth(case).omega
+
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
         """Return the largest error of omega (rad/s) at the steps of the case; inf on overflow."""
-        run = self.run(program, case, may_stop, parts)
-        if run.ended == "overflow":
-            return math.inf
-        return distance(run.omega[parts - 1 :: parts], self.truth(case).omega)
+        return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega of the collocation model of so many terms, at points k/(n+1).
@@ -111,12 +120,12 @@ def distance(first: Array, second: Array) -> float:
 
 def ranges(truth: Reference) -> Array:
     """Return how far each component moves (rad/s)."""
-    return np.asarray(np.ptp(truth.omega, axis=0))
+    return spread_of(truth.omega)
 
 
 def largest(truth: Reference) -> float:
     """Return the largest component of omega (rad/s)."""
-    return float(np.abs(truth.omega).max())
+    return float(largest_of(truth.omega))
 
 
 @cache

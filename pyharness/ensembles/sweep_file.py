@@ -173,7 +173,8 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
             raise InputError(f"axis {field}: the scene's body is given by {has}")
         if field in ("tilt", "azimuth") and scene.moments is None:
             raise InputError(f"axis {field}: the body is given by coefficients; it takes moments")
-        if field == "omega.magnitude" and not any(scene.omega) and "tilt" not in fields:
+        has_direction = any(name in fields for name in ("tilt", "height", "longitude"))
+        if field == "omega.magnitude" and not any(scene.omega) and not has_direction:
             raise InputError(f"axis {field}: the scene's omega is 0 and has no direction")
         if field == "lipschitz" and solver.program is None:
             raise InputError(f"axis {field} has no meaning without a program")

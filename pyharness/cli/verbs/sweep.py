@@ -9,10 +9,11 @@ from pyharness.ensembles.executors import EXECUTORS, check_dask
 from pyharness.ensembles.run import run_sweep, said
 from pyharness.ensembles.store import check_zarr, opened
 from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
 
 # Where the array version of a claim stands, by the claim's name.
-CLAIMS: dict[str, str] = {}
+CLAIMS = {name: f"{over_starts.__name__}:{name}" for name in over_starts.JUDGED}
 _MOST_WORKERS = 1024
 OPTIONS = {
     "file FILE.toml": "the sweep file: a scene, axes, what solves, reductions",

@@ -180,8 +180,24 @@ def by_literals(
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
-    a, b, c = np.array([each.euler_coefficients for each in scenes]).T
+    omega = np.array([each.omega for each in scenes])
+    bodies = np.array([each.euler_coefficients for each in scenes])
     torque = np.array([each.normalized_torque(0.0) for each in scenes])
+    rows = march_models(omega, bodies, torque, terms, dt, end, growth, round(steps * h / end))
+    every = round(h / end)
+    return rows[:, every - 1 :: every]
+
+
+def march_models(
+    omega: Array, coefficients: Array, torque: Array, terms: int,
+    dt: float, end: float, growth: float, steps: int,
+) -> Array:  # fmt: skip
+    """March collocation models of constant torque side by side, (n, 3), to rounding.
+
+    The points lie in (0, dt), which grows by `growth` with every step, and each step is `end` long.
+    Return omega (n, steps, 3); NaN from an overflow on.
+    """
+    a, b, c = coefficients.T
 
     def rates(x: Array) -> Array:
         u1, u2, u3 = x.T
@@ -190,18 +206,16 @@ def by_literals(
 
     inside = np.arange(1, terms + 1) / (terms + 1)
     powers = np.arange(1, terms + 1)
-    state = np.array([each.omega for each in scenes])
-    rows = [state]
+    found: Array = np.empty((len(omega), steps, 3))
+    state = omega
     with np.errstate(all="ignore"):
-        for _ in range(round(steps * h / end)):
+        for step in range(steps):
             first = rates(state)
             points = dt * inside
             at_points = np.array([rates(state + t * first) for t in points])
             matrix = powers * points[:, None] ** (powers - 1)
             weights = end**powers @ np.linalg.inv(matrix)
             state = state + np.tensordot(weights, at_points, 1)
-            rows.append(state)
+            found[:, step] = state
             dt += growth
-    every = round(h / end)
-    found: Array = np.array(rows)[every::every].swapaxes(0, 1)
     return found

@@ -13,13 +13,16 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 Columns = dict[str, Array]
+# What programs take as arrays.
+_OF_PROGRAMS = ("step_size", "lipschitz")
 
 
 @dataclass(frozen=True, eq=False)
 class Load:
     """Scenes that share what solves them; an array is None where the scene says it for all.
 
-    `scene` has their step size and steps, `listing` is None for a method.
+    `scene` has their steps, `listing` is None for a method. Step sizes and Lipschitz constants are
+    arrays for programs alone.
     """
 
     scene: Scene
@@ -31,6 +34,14 @@ class Load:
     coefficients: Array | None = None
     torque_constant: Array | None = None
     torque_rate: Array | None = None
+    step_size: Array | None = None  # (n,)
+    lipschitz: Array | None = None  # (n,)
+
+    @property
+    def step_sizes(self) -> Array:
+        """Step sizes, (n,)."""
+        one = np.full(self.n_scenes, self.scene.step_size)
+        return one if self.step_size is None else self.step_size
 
     @property
     def bodies(self) -> Array:
@@ -58,6 +69,8 @@ def loads(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Load]]:
     """Yield which of the scenes a load has, and the load."""
     columns = value_columns(sweep, where)
     looped = [name for name in columns if name in CHOICES or NUMBERS[name].looped]
+    if sweep.solver.program is not None:
+        looped = [name for name in looped if name not in _OF_PROGRAMS]
     for members, values in groups([columns[name] for name in looped], len(where[0])):
         own = {name: c[members] for name, c in columns.items() if name not in looped}
         shared: dict[str, Any] = dict(zip(looped, values, strict=True))
@@ -76,8 +89,8 @@ def _load(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Load:
     if "t_end" in own:
         t_end = own["t_end"]
     else:
-        given = scene.step_size * scene.steps if solver.t_end is None else solver.t_end
-        t_end = np.full(n, given)
+        sizes = own.get("step_size", np.full(n, scene.step_size))
+        t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
     body, values = _body(scene, own, n)
     law = scene.torque
     return Load(
@@ -88,6 +101,8 @@ def _load(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Load:
         t_end=t_end,
         torque_constant=_three("torque.constant", law.constant, own, n),
         torque_rate=_three("torque.rate", law.rate, own, n),
+        step_size=own.get("step_size"),
+        lipschitz=own.get("lipschitz"),
         **({body: values} if body else {}),
     )
 

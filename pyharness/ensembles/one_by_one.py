@@ -72,7 +72,7 @@ def run_each(load: Load, omega0: Array, at: list[int]) -> ProgramRows:
         found = run_program(
             scene,
             load.listing,
-            lipschitz=load.solver.lipschitz,
+            lipschitz=load.solver.lipschitz if load.lipschitz is None else load.lipschitz[i],
             may_stop=load.solver.may_stop,
             velocity=False,
         )
@@ -95,6 +95,8 @@ def _scenes(load: Load, omega0: Array) -> Iterator[Scene | None]:
             if load.torque_rate is not None:
                 law = replace(law, rate=load.torque_rate[i])
             scene = replace(load.scene, omega=start, torque=law, attitude=None)
+            if load.step_size is not None:
+                scene = replace(scene, step_size=load.step_size[i])
             if load.moments is not None:
                 scene = replace(scene, moments=load.moments[i])
             if load.coefficients is not None:

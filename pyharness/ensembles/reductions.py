@@ -13,6 +13,7 @@ from pyharness.ensembles.solved import Solved
 from pyharness.ensembles.sweep import Asked
 from pyharness.model.codes import Statuses
 from pyharness.model.trajectory import STOP_VARIABLES, Array
+from pyharness.theory.flips import flip_times
 
 Found = NDArray[Any]
 # The axes of a body, by their moments.
@@ -96,7 +97,7 @@ def _stop_variable(solved: Solved, _: Mapping[str, Any]) -> Found:
 
 def _overflow_time(solved: Solved, _: Mapping[str, Any]) -> Found:
     # Of the first step that gave no finite row.
-    time = (solved.n_rows + 1) * solved.load.scene.step_size
+    time = (solved.n_rows + 1) * solved.load.step_sizes
     return np.where(solved.status == Statuses.OVERFLOW, time, np.nan)
 
 
@@ -148,6 +149,10 @@ def _flips(solved: Solved, given: Mapping[str, Any]) -> Found:
     changes = (below[:, 1:] != below[:, :-1]) & np.isfinite(component[:, 1:])
     count: Found = changes.sum(axis=1)
     return count
+
+
+def _flip_time(solved: Solved, _: Mapping[str, Any]) -> Found:
+    return flip_times(solved.load.bodies, solved.omega0)
 
 
 def _growth(solved: Solved, given: Mapping[str, Any]) -> Found:
@@ -236,6 +241,12 @@ REDUCTIONS = {
         "i4",
         needs=("moments",),
         parameters=_SAMPLES,
+    ),
+    "flip-time": Reduction(
+        "time between changes of sign of the component about the middle axis",
+        "s",
+        _flip_time,
+        needs=("moments", "no torque"),
     ),
     "growth": Reduction(
         "logarithm of the growth of a small difference, over the time",

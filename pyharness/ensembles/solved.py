@@ -1,5 +1,6 @@
 """What a reduction may ask of a load: its ends, rows on the way, other starts. Each solved once."""
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +13,11 @@ from pyharness.methods.many import Ensemble, solve_many
 from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import REGISTRY
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
+from pyharness.original.many import run_many
+
+_EFFORT = 1e9  # chunks were asked for, and told how long they take
 
 
 class Solved:
@@ -141,4 +146,25 @@ def _many(
 
 def many_rows(load: Load, omega0: Array, at: list[int]) -> ProgramRows:
     """Return what a program makes of all scenes, with rows at some steps, in ascending order."""
-    return run_each(load, omega0, at)
+    if load.torque_rate is not None:  # `run_many` takes one rate for all
+        return run_each(load, omega0, at)
+    assert load.listing is not None
+    solver = load.solver
+    try:
+        found = run_many(
+            replace(load.scene, attitude=None),
+            load.listing,
+            omega0=omega0,
+            moments=load.moments,
+            coefficients=load.coefficients,
+            torque_constant=load.torque_constant,
+            step_size=load.step_size,
+            lipschitz=solver.lipschitz if load.lipschitz is None else load.lipschitz,
+            may_stop=solver.may_stop,
+            at=at,
+            effort=_EFFORT,
+        )
+    except InputError:
+        # One of them is no scene; the others are.
+        return run_each(load, omega0, at)
+    return ProgramRows(found.omega, found.n_rows, found.status, found.stop_variable)

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, run_program, solve
-from pyharness.ensembles.loads import listing_of
+from pyharness.ensembles.loads import listing_of, loads
+from pyharness.ensembles.one_by_one import run_each
 from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.sweep import Sweep, solve_chunk
+from pyharness.ensembles.solved import many_rows
+from pyharness.ensembles.sweep import Sweep, points, solve_chunk
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.scene import Scene
@@ -131,6 +133,31 @@ def test_programs_stop_where_they_stop_alone(tmp_path: Path) -> None:
                 else:
                     assert np.isnan(found["end"][at]).all()
     assert kinds == {"complete", "stopped"}
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        '[[axis]]\nfield = "lipschitz"\nfrom = 0.5\nto = 500.0\ncount = 5\nspacing = "log"',
+        '[[axis]]\nfield = "body.moments.1"\nvalues = [1.0, 1e-300]',
+        '[[axis]]\nfield = "torque.constant.1"\nvalues = [0.0, 2.0]',
+        '[[axis]]\nfield = "steps"\nvalues = [10, 20]',
+        '[[axis]]\nfield = "torque.rate.1"\nvalues = [0.0, 1.0]',
+    ],
+)
+def test_programs_side_by_side_have_the_bits_of_single_runs(axis: str, tmp_path: Path) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM + axis))
+    kinds = set()
+    for chunk in range(sweep.n_chunks):
+        for _, load in loads(sweep, points(sweep, sweep.box(chunk))):
+            at = [1, 7, load.scene.steps]
+            alone, found = run_each(load, load.omega0, at), many_rows(load, load.omega0, at)
+            for name in found._fields:
+                one, other = getattr(alone, name), getattr(found, name)
+                assert one.dtype == other.dtype
+                assert np.array_equal(one, other, equal_nan=one.dtype == float)
+            kinds.update(found.status.tolist())
+    assert len(kinds) > 1
 
 
 def test_overflow_has_its_time(tmp_path: Path) -> None:

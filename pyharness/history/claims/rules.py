@@ -184,7 +184,7 @@ def share_of_range(omega: Array, truth: Array) -> Array:
 
 def spread_of(omega: Array) -> Array:
     """Return how far each component moves (rad/s), (..., 3)."""
-    return np.asarray(np.ptp(omega, axis=-2))
+    return np.moveaxis(np.ptp(_by_component(omega), axis=-1), 0, -1)
 
 
 def largest_of(omega: Array) -> Array:
@@ -195,8 +195,14 @@ def largest_of(omega: Array) -> Array:
 def _farthest(first: Array, second: Array) -> Array:
     """Return the largest difference of each component at the rows that both have, (..., 3)."""
     with np.errstate(all="ignore"):
-        apart = np.abs(first - second)
-        return np.asarray(np.fmax.reduce(apart, axis=-2, initial=0.0))
+        apart = _by_component(first - second)
+        np.abs(apart, out=apart)
+        return np.moveaxis(np.fmax.reduce(apart, axis=-1, initial=0.0), 0, -1)
+
+
+def _by_component(omega: Array) -> Array:
+    """Return (3, ..., steps), in whose rows NumPy is ten times as fast."""
+    return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 
 def _most(numbers: Mapping[Any, Any]) -> Any:

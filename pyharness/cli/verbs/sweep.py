@@ -12,8 +12,8 @@ from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
 
-# Where the array version of a claim stands, by the claim's name.
-CLAIMS = {name: f"{over_starts.__name__}:{name}" for name in over_starts.JUDGED}
+# Where the function of a claim over many starts stands, by the claim's name.
+CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {
     "file FILE.toml": "the sweep file: a scene, axes, what solves, reductions",

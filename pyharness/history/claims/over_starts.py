@@ -166,6 +166,8 @@ class Solved(Protocol):
 
 JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))
 """The claims that have a rule over starts."""
+FUNCTIONS = {name: f"{__name__}:{name}" for name in JUDGED}
+"""Where the function of each stands, for a sweep."""
 
 
 def __getattr__(name: str) -> Callable[[Solved], NDArray[np.int8]]:

@@ -13,7 +13,7 @@ from pyharness.views.csv import csv_text
 from tests.conftest import Printed
 
 ROOT = Path(__file__).parent.parent
-DOCS = sorted((ROOT / "docs").glob("*.md"))
+DOCS = sorted((ROOT / "docs").rglob("*.md"))
 README = ROOT / "README.md"
 
 

@@ -58,6 +58,11 @@ class Atlas:
         """Return the points of all claims (magnitude, height, longitude)."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
+    def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
+        """Return from where every claim is reproduced, at least in part."""
+        held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
+        return np.asarray(np.all(held, axis=0))
+
     def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
         """Return omega(0) at a place of the grid (rad/s)."""
         size, height = self.magnitudes[at[0]], self.heights[at[1]]
@@ -94,8 +99,8 @@ def sum_of_points(codes: Sequence[Codes]) -> Array:
 
 def shares(codes: Codes) -> tuple[float, float, float]:
     """Return the shares of starts where a claim is reproduced, in part, and not."""
-    whole, part = (float((codes == code).mean()) for code in (HOLDS, IN_PART))
-    return whole, part, 1.0 - whole - part
+    whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
+    return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:

@@ -42,14 +42,18 @@ def atlas_report(atlas: Atlas) -> Report:
         [f"Claims, those first that tell most of a start ({first}; shares of all starts):", claims],
         [f"Starts by points ({first}):", _by_points(score)],
         [
-            f"The most points are {best:g}, from {len(places)} starts; by magnitude:",
+            f"The most points are {best:g}, from {len(places)} starts; from "
+            f"{int(atlas.none_fails().sum())} no claim fails. By magnitude:",
             _by_magnitude(atlas, score),
         ],
         ["Starts from which all claims about one case hold, at least in part:", _by_case(atlas)],
         ["Starts that the thesis shows, and (1, 1, 1), which is ours:", _shown(atlas, score)],
-        ["Readings and steps:", _by_choice(atlas)],
-        ["Where another reading, or more steps, turn the verdict:", _turned(atlas)],
     ]
+    if len(atlas.choices()) > 1:
+        sections += [
+            ["Readings and steps:", _by_choice(atlas)],
+            ["Starts whose verdict another reading turns, or other steps:", _turned(atlas)],
+        ]
     return Report(
         "claims",
         sections,
@@ -83,18 +87,17 @@ def _by_points(score: Any) -> Table:
 
 
 def _by_magnitude(atlas: Atlas, score: Any) -> Table:
-    best = score.max()
+    best, none = score.max(), atlas.none_fails()
     rows = []
     for k, magnitude in enumerate(atlas.magnitudes):
         most = np.argwhere(score[k] == best)
         one = atlas.start((k, *most[0])) if len(most) else (None, None, None)
-        rows.append(
-            (float(magnitude), float(score[k].mean()), float(score[k].max()), len(most), *one)
-        )
+        mean, largest = float(score[k].mean()), float(score[k].max())
+        rows.append((float(magnitude), mean, largest, int(none[k].sum()), len(most), *one))
     points = digits(".4g")
     columns = [
         Column("magnitude", points, unit="rad/s"), Column("mean", points),
-        Column("most", points), Column("of the best"), *_OMEGA,
+        Column("most", points), Column("none fails"), Column("of the best"), *_OMEGA,
     ]  # fmt: skip
     return Table(columns, rows)
 
@@ -103,14 +106,18 @@ def _by_case(atlas: Atlas) -> Table:
     rows = []
     for case, names in sorted(about(list(atlas.codes)).items()):
         points = np.stack([sum_of_points([atlas.codes[name][0, 0]]) for name in names])
-        held = (points > 0.0).all(axis=0)
-        whole = (points == 1.0).all(axis=0)
-        sizes = atlas.magnitudes[np.any(held, axis=(1, 2))]
-        least, largest = (float(sizes[0]), float(sizes[-1])) if len(sizes) else (None, None)
-        rows.append((case, len(names), float(held.mean()), float(whole.mean()), least, largest))
+        row: list[Any] = [case, len(names)]
+        for least in (0.5, 1.0):
+            held = (points >= least).all(axis=0)
+            sizes = atlas.magnitudes[np.any(held, axis=(1, 2))]
+            ends = (float(sizes[0]), float(sizes[-1])) if len(sizes) else (None, None)
+            row += [float(held.mean()), *ends]
+        rows.append(row)
+    size = digits(".3g")
     columns = [
-        Column("case"), Column("claims"), Column("hold %", _PERCENT), Column("whole %", _PERCENT),
-        Column("from rad/s", digits(".3g")), Column("to rad/s", digits(".3g")),
+        Column("case"), Column("claims"),
+        Column("hold %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
+        Column("whole %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
     ]  # fmt: skip
     return Table(columns, rows)
 
@@ -134,10 +141,11 @@ def _by_choice(atlas: Atlas) -> Table:
         for m, steps in enumerate(atlas.steps):
             score = atlas.score(k, m)
             most = float(score.max())
-            rows.append((reading, steps, float(score.mean()), most, int((score == most).sum())))
+            best, none = int((score == most).sum()), int(atlas.none_fails(k, m).sum())
+            rows.append((reading, steps, float(score.mean()), most, best, none))
     columns = [
         *words("reading"), Column("steps"), Column("mean", digits(".4f")),
-        Column("most", digits("g")), Column("starts with it"),
+        Column("most", digits("g")), Column("starts with it"), Column("none fails"),
     ]  # fmt: skip
     return Table(columns, rows)
 

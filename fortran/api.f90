@@ -384,7 +384,7 @@ end subroutine solve_packed_attitude
 subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, body, n_constant, &
                           constant, n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
                           n_cosine_sets, cosines, n, omega0, n_times, times, n_attitudes, &
-                          attitude0, omega, n_results, attitude, status, raised)
+                          attitude0, given_up, omega, n_results, attitude, status, raised)
   ! Many bodies in one call: omega, and the attitude where it is given, of each at its time. Arrays
   ! of one column are shared by all.
   !f2py threadsafe
@@ -412,6 +412,7 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   real(8), intent(in), target :: times(n_times) ! s
   integer(4), intent(in) :: n_attitudes
   real(8), intent(in) :: attitude0(4, n_attitudes)
+  integer(4), intent(inout), target :: given_up(1) ! not 0: by another thread, while this one runs
   real(8), intent(inout) :: omega(3, n)         ! rad/s; NaN unless the status is 0 or 6
   integer(4), intent(in) :: n_results           ! n with attitude, else 0
   real(8), intent(inout) :: attitude(4, n_results)
@@ -431,10 +432,12 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   bodies%cosines => cosines
   bodies%omega0 => omega0
   bodies%times => times
+  bodies%given_up => given_up(1)
   call solve_bodies(bodies, code, effort, packed, attitude0, omega, attitude, status, raised)
 end subroutine solve_ensemble
 
-subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, omega, status, raised)
+subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_up, omega, &
+                             status, raised)
   ! Many starts of a prepared solver: as solve_packed, and called as that is.
   !f2py threadsafe
   use many_bodies, only: solve_packed_bodies
@@ -445,9 +448,11 @@ subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, omega,
   real(8), intent(in) :: omega0(3, n)  ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times) ! 1 or n, s
+  integer(4), intent(inout), target :: given_up(1) ! as above
   real(8), intent(inout) :: omega(3, n)
   integer(1), intent(inout) :: status(n)
   integer(4), intent(out) :: raised
 
-  call solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, raised)
+  call solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, given_up, omega, status, &
+                           raised)
 end subroutine solve_packed_many

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pyharness.model.scene import Scene, TorqueLaw
     from pyharness.model.scene_file import case_scene, read_scene
     from pyharness.model.trajectory import Stop, Trajectory
+    from pyharness.original.many import ProgramEnsemble, run_many
     from pyharness.original.programs import run_program
 
     __version__: str
@@ -27,6 +28,7 @@ __all__ = [
     "InputError",
     "Listing",
     "NotBuiltError",
+    "ProgramEnsemble",
     "Scene",
     "Solver",
     "Stop",
@@ -37,6 +39,7 @@ __all__ = [
     "prepare",
     "principal",
     "read_scene",
+    "run_many",
     "run_program",
     "solve",
     "solve_many",
@@ -52,6 +55,7 @@ _ROOMS = {
     "model.scene": ("Scene", "TorqueLaw"),
     "model.scene_file": ("case_scene", "read_scene"),
     "model.trajectory": ("Stop", "Trajectory"),
+    "original.many": ("ProgramEnsemble", "run_many"),
     "original.programs": ("run_program",),
     "methods.many": ("Ensemble", "solve_many"),
     "methods.prepared": ("Solver", "prepare"),

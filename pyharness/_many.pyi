@@ -10,9 +10,10 @@ class ManyStarts:
     def __new__(
         cls,
         kernel: Callable[..., int],
+        single: Callable[..., tuple[Array, int, int, Array]],
         packed: Array,
+        brief: Array | None,
         slowly: Callable[..., tuple[Array, NDArray[np.int8]]],
-        is_brief: bool,
     ) -> ManyStarts: ...
     def __call__(
         self, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None

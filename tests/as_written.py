@@ -1,4 +1,4 @@
-"""The Taylor kernel from its source as it stands, or with a part of it replaced."""
+"""Kernels from their sources as they stand, or with a part of one replaced."""
 
 import ctypes
 import os
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness import Scene
 from pyharness.methods.problem import normalized
@@ -18,10 +19,12 @@ from pyharness.model.trajectory import Array
 
 COMPILER = os.environ.get("FC", "gfortran")
 _FORTRAN = Path(__file__).parent.parent / "fortran"
-_MODULES = (
+_TAYLOR = (
     "two_words", "problem", "torque_terms", "taylor_plan", "taylor_series", "taylor_attitude",
     "taylor_error", "taylor_rows", "taylor_march", "taylor",
 )  # fmt: skip
+_MANY = ("two_words", "problem", "torque_terms", "taylor_plan")
+_BODIES = ("bodies", "many_circular", "many_free", "many_fixed", "many_taylor")
 
 
 class Found(NamedTuple):
@@ -47,21 +50,9 @@ def as_written(folder: Path, changes: Mapping[str, tuple[str, str]] | None = Non
 
     `changes` has by module a piece that stands in it once, and what is put in its place.
     """
-    sources = ["kinds.f90", "interruption.f90", "../tests/never_interrupted.f90"]
-    sources += [f"modern/{name}.f90" for name in _MODULES]
+    sources = [f"modern/{name}.f90" for name in _TAYLOR]
     sources += ["../tests/taylor_as_written.f90"]
-    for source in sources:
-        text = (_FORTRAN / source).read_text()
-        old, new = (changes or {}).get(Path(source).stem, ("", ""))
-        if old:
-            assert text.count(old) == 1, old
-            text = text.replace(old, new)
-        (folder / Path(source).name).write_text(text)
-    maker = [sys.executable, str(_FORTRAN / "make_codes.py"), codes.__file__, "codes.f90"]
-    subprocess.run(maker, cwd=folder, check=True)
-    command = [COMPILER, "-shared", "-fPIC", "-O1", "-o", "loops.so", "codes.f90"]
-    subprocess.run([*command, *(Path(each).name for each in sources)], cwd=folder, check=True)
-    loops = ctypes.CDLL(str(folder / "loops.so")).taylor_as_written
+    loops = _compiled(folder, sources, changes or {}).taylor_as_written
 
     def solved(scene: Scene, times: Sequence[float], tolerance: float) -> Found:
         coefficients, constant, rate, sines, cosines = normalized(scene)
@@ -77,3 +68,46 @@ def as_written(folder: Path, changes: Mapping[str, tuple[str, str]] | None = Non
         return Found(rows[: n_rows.value], status.value, steps.value, found[0], found[1])
 
     return solved
+
+
+def many_as_written(folder: Path) -> Callable[..., tuple[Array, NDArray[np.int8]]]:
+    """Compile the loops over bodies as they are written; return what solves by them."""
+    sources = [f"modern/{name}.f90" for name in _MANY]
+    # `bodies` needs `problem`, and the rest both.
+    sources += [f"many/{name}.f90" for name in _BODIES] + ["../tests/many_as_written.f90"]
+    loops = _compiled(folder, sources, {}).many_as_written
+    loops.argtypes = [ctypes.c_int] * 3 + [ctypes.c_double] * 2 + [ctypes.c_void_p] * 6 + [
+        ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p
+    ]  # fmt: skip
+
+    def solved(
+        method: int, tolerance: float, step: float, *arrays: Array
+    ) -> tuple[Array, NDArray[np.int8]]:
+        body, constant, rate, sines, omega0, times = map(np.ascontiguousarray, arrays)
+        omega, status = np.empty_like(omega0), np.empty(len(omega0), np.int8)
+        loops(
+            method, len(omega0), sines.shape[1], tolerance, step, body.ctypes, constant.ctypes,
+            rate.ctypes, sines.ctypes, omega0.ctypes, times.ctypes, len(times), omega.ctypes,
+            status.ctypes,
+        )  # fmt: skip
+        return omega, status
+
+    return solved
+
+
+def _compiled(
+    folder: Path, kernels: Sequence[str], changes: Mapping[str, tuple[str, str]]
+) -> ctypes.CDLL:
+    sources = ["kinds.f90", "interruption.f90", "../tests/never_interrupted.f90", *kernels]
+    for source in sources:
+        text = (_FORTRAN / source).read_text()
+        old, new = changes.get(Path(source).stem, ("", ""))
+        if old:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
+        (folder / Path(source).name).write_text(text)
+    maker = [sys.executable, str(_FORTRAN / "make_codes.py"), codes.__file__, "codes.f90"]
+    subprocess.run(maker, cwd=folder, check=True)
+    command = [COMPILER, "-shared", "-fPIC", "-O1", "-o", "loops.so", "codes.f90"]
+    subprocess.run([*command, *(Path(each).name for each in sources)], cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / "loops.so"))

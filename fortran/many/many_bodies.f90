@@ -20,12 +20,14 @@ module many_bodies
 
 contains
 
-  subroutine solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, raised)
+  subroutine solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, given_up, omega, &
+                                 status, raised)
     !! Many starts of one prepared scene.
     integer, intent(in) :: n_packed, n, n_times
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in), target :: omega0(3, n)
     real(dp), intent(in), target :: times(n_times)
+    integer, intent(inout), target :: given_up(1)
     real(dp), intent(inout) :: omega(3, n)
     integer(i1), intent(inout) :: status(n)
     integer, intent(out) :: raised
@@ -47,6 +49,7 @@ contains
     bodies%cosines(1:4, 1:int(packed(N_COSINES)), 1:1) => packed(middle:n_packed - 1)
     bodies%omega0 => omega0
     bodies%times => times
+    bodies%given_up => given_up(1)
     call solve_bodies(bodies, code, packed(EFFORT), packed, no_attitude, omega, no_attitude, &
                       status, raised)
   end subroutine solve_packed_bodies
@@ -71,11 +74,11 @@ contains
     if (size(attitude0) > 0 .or. bodies%n == 1) then
       status = LEFT
     else if (code == CLOSED_FORM .or. (code == CLOSED_FORM_OR_TAYLOR .and. .not. with_torque)) then
-      call many_free(c_loc(bodies), omega, status)
+      call many_free(c_loc(bodies), bodies%n, omega, status)
     else if (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR) then
-      call many_taylor(c_loc(bodies), omega, status, raised)
+      call many_taylor(c_loc(bodies), bodies%n, omega, status, raised)
     else if (code >= IMPROVED_EULER .and. code <= RK4) then
-      call many_fixed(c_loc(bodies), code, omega, status, raised)
+      call many_fixed(c_loc(bodies), code, bodies%n, omega, status, raised)
     else
       status = LEFT
     end if
@@ -123,7 +126,7 @@ contains
                             steps, found)
       end if
       status(i) = int(ended, i1)
-      if (ended == INTERRUPTED) raised = 1
+      if (ended == INTERRUPTED .or. bodies%given_up /= 0) raised = 1
       if (raised /= 0) return
     end do
   end subroutine solve_left
@@ -162,7 +165,7 @@ contains
       omega(:, i) = state(:3)
       attitude(:, i) = state(4:)
       status(i) = int(ended, i1)
-      if (ended == INTERRUPTED) raised = 1
+      if (ended == INTERRUPTED .or. bodies%given_up /= 0) raised = 1
       if (raised /= 0) return
     end do
   end subroutine solve_left_with_attitude

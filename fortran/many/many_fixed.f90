@@ -20,6 +20,8 @@ module many_fixed
   real(dp), parameter :: FAR = 1e60_dp      ! from 1: products of such scales are numbers
   real(dp), parameter :: THIRD = 1.0_dp/3.0_dp
 
+  public :: many_fixed_solve
+
   type :: scaled_t
     real(dp), dimension(LANES) :: x, y, z          !! omega, scaled; x' = y z, y' = -x z, z' = x y
     real(dp), dimension(LANES) :: mx, my, mz       !! torque of half a step
@@ -29,13 +31,14 @@ module many_fixed
 
 contains
 
-  subroutine many_fixed_solve(bodies_at, method, omega, status, interrupted) &
+  subroutine many_fixed_solve(bodies_at, method, n, omega, status, interrupted) &
     bind(c, name="solve_many_fixed_level")
     !! Angular velocity of each body at the one time of all; status is COMPLETE or LEFT.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     integer(c_int), intent(in), value :: method           !! IMPROVED_EULER, TAYLOR_3 or RK4
-    real(c_double), intent(inout) :: omega(3, *)          !! rad/s
-    integer(i1), intent(inout) :: status(*)
+    integer(c_int), intent(in), value :: n                !! bodies
+    real(c_double), intent(inout) :: omega(3, n)          !! rad/s
+    integer(i1), intent(inout) :: status(n)
     integer(c_int), intent(out) :: interrupted            !! 1: by the user
     type(bodies_t), pointer :: bodies
     type(scaled_t) :: s
@@ -52,13 +55,13 @@ contains
     end if
     if (.not. (n_steps >= 1.0_dp .and. n_steps <= MOST_STEPS) .or. size(bodies%sines, 2) > 0 &
         .or. size(bodies%cosines, 2) > 0 .or. any(abs(bodies%rate) > 0.0_dp)) then
-      status(:bodies%n) = LEFT
+      status(:n) = LEFT
       return
     end if
     h = sign(bodies%step, bodies%times(1))
     last = bodies%times(1) - h*(n_steps - 1.0_dp)
-    do first = 0, bodies%n - 1, LANES
-      there = min(LANES, bodies%n - first)
+    do first = 0, n - 1, LANES
+      there = min(LANES, n - first)
       m = PAIR*((there + PAIR - 1)/PAIR)
       call columns_of(bodies%body, first, m, a)
       call columns_of(bodies%constant, first, m, constant)
@@ -74,7 +77,9 @@ contains
         piece = min(left_over, BETWEEN_LOOKS)
         call advance(method, m, piece, s)
         left_over = left_over - piece
-        if (piece == BETWEEN_LOOKS) interrupted = merge(1, 0, interrupt_raised() /= 0)
+        if (piece == BETWEEN_LOOKS) then
+          interrupted = merge(1, 0, interrupt_raised() /= 0 .or. bodies%given_up /= 0)
+        end if
         if (interrupted /= 0) return
       end do
       call lengthen(m, last/h, s)

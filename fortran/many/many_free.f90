@@ -2,7 +2,7 @@ module many_free
   !! Many bodies without torque, side by side: the closed form of torque_free.f90 in numbers of one
   !! word and without a branch. Bodies for which that is not exact enough, or that stand near the
   !! end of a range, are left to the single kernel.
-  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: A_GROUP, bodies_t, columns_of, i1, LANES, LEFT
   use kinds, only: dp
@@ -38,11 +38,12 @@ module many_free
 
 contains
 
-  subroutine many_free_solve(bodies_at, omega, status) bind(c, name="solve_many_free_level")
+  subroutine many_free_solve(bodies_at, n, omega, status) bind(c, name="solve_many_free_level")
     !! Angular velocity of each body at its time; status is COMPLETE or LEFT.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
-    real(c_double), intent(inout) :: omega(3, *)          !! rad/s
-    integer(i1), intent(inout) :: status(*)
+    integer(c_int), intent(in), value :: n                !! bodies
+    real(c_double), intent(inout) :: omega(3, n)          !! rad/s
+    integer(i1), intent(inout) :: status(n)
     type(bodies_t), pointer :: bodies
     type(orbits_t) :: o
     real(dp), dimension(LANES, 3) :: a, w, moments
@@ -51,8 +52,8 @@ contains
 
     call c_f_pointer(bodies_at, bodies)
     if (size(bodies%times) == 1) t = bodies%times(1)
-    do first = 0, bodies%n - 1, LANES
-      there = min(LANES, bodies%n - first)
+    do first = 0, n - 1, LANES
+      there = min(LANES, n - first)
       m = A_GROUP*((there + A_GROUP - 1)/A_GROUP)
       if (first == 0 .or. size(bodies%body, 2) > 1) then
         if (bodies%by_moments) then

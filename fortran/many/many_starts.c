@@ -10,8 +10,8 @@
 
 /* solve_packed_many of api.f90. */
 typedef void kernel(const double *packed, const int *n_packed, const int *n, const double *omega0,
-                    const int *n_times, const double *times, double *omega, int8_t *status,
-                    int *raised);
+                    const int *n_times, const double *times, int *given_up, double *omega,
+                    int8_t *status, int *raised);
 
 /* solve_packed, for a start alone. */
 typedef void single_kernel(const double *packed, const int *n_packed, const double *start,
@@ -45,7 +45,7 @@ static int enter(const many_starts *self, PyArrayObject *packed, int n, const do
 {
   const int n_packed = (int)PyArray_DIM(packed, 0);
   const double *numbers = PyArray_DATA(packed);
-  int raised = 0, is_complete = 1;
+  int given_up = 0, raised = 0, is_complete = 1;
   if (n == 1) {
     int ended;
     int64_t steps;
@@ -54,7 +54,7 @@ static int enter(const many_starts *self, PyArrayObject *packed, int n, const do
     *status = (int8_t)ended;
     return ended == 0;
   }
-  self->address(numbers, &n_packed, &n, start, &n_times, times, omega, status, &raised);
+  self->address(numbers, &n_packed, &n, start, &n_times, times, &given_up, omega, status, &raised);
   for (int i = 0; i < n && is_complete; i++) is_complete = status[i] == 0;
   return is_complete;
 }

@@ -22,10 +22,11 @@ module many_taylor
   ! A step may leave out so much more than that of a single march, whose order it does not choose:
   ! what it leaves out is known and taken off.
   real(dp), parameter :: MORE = 10.0_dp
+  real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
   ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
   real(dp), parameter :: TRUSTED = 0.4_dp
-  real(dp), parameter :: DOUBTED = 16.0_dp   ! growth at which it is half of that
-  real(dp), parameter :: MOST_GROWTH = 100.0_dp
+  real(dp), parameter :: DOUBTED = 6.0_dp    ! growth at which it is half of that
+  real(dp), parameter :: MOST_GROWTH = 60.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: SURE = 0.03_dp      ! rounding times growth, in tolerances
   real(dp), parameter :: A_STEP = 3.0_dp     ! norm up to which an exponential is taken at once
@@ -37,6 +38,8 @@ module many_taylor
   real(dp), parameter :: RIDGE = 1.001_dp
   real(dp), parameter :: LEAST = 1e-290_dp
   real(dp), parameter :: MOST_BITS = 2.0_dp**57
+
+  public :: many_taylor_solve
 
   type :: slots_t
     real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding, rad/s
@@ -64,12 +67,13 @@ module many_taylor
 
 contains
 
-  subroutine many_taylor_solve(bodies_at, omega, status, interrupted) &
+  subroutine many_taylor_solve(bodies_at, n, omega, status, interrupted) &
     bind(c, name="solve_many_taylor_level")
     !! Angular velocity of each body at its time; status is COMPLETE or LEFT.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
-    real(c_double), intent(inout) :: omega(3, *)          !! rad/s
-    integer(i1), intent(inout) :: status(*)
+    integer(c_int), intent(in), value :: n                !! bodies
+    real(c_double), intent(inout) :: omega(3, n)          !! rad/s
+    integer(i1), intent(inout) :: status(n)
     integer(c_int), intent(out) :: interrupted            !! 1: by the user
     type(bodies_t), pointer :: bodies
     type(slots_t) :: s
@@ -84,7 +88,7 @@ contains
     n_sines = size(bodies%sines, 2)
     n_waves = n_sines + size(bodies%cosines, 2)
     if (n_waves > MOST_WAVES) then
-      status(:bodies%n) = LEFT
+      status(:n) = LEFT
       return
     end if
     order = order_for(bodies%tolerance)
@@ -105,7 +109,7 @@ contains
           body(i) = 0
           do
             if (ready%taken == ready%there) then
-              if (first + ready%there >= bodies%n) exit
+              if (first + ready%there >= n) exit
               first = first + LANES
               call make_ready(bodies, first, ready_waves, ready)
             end if
@@ -127,7 +131,7 @@ contains
       unseen = unseen + 1
       if (unseen >= BETWEEN_LOOKS) then
         unseen = 0
-        interrupted = merge(1, 0, interrupt_raised() /= 0)
+        interrupted = merge(1, 0, interrupt_raised() /= 0 .or. bodies%given_up /= 0)
         if (interrupted /= 0) return
       end if
     end do
@@ -240,7 +244,7 @@ contains
     do i = 1, LANES
       call share_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
                           r%rest(i), r%share(i), r%h(i))
-      r%share(i) = MORE*r%share(i)
+      r%share(i) = merge(MORE_WITH_WAVES, MORE, n_waves > 0)*r%share(i)
       push = sqrt(abs(r%a(i, 1)))
       ramp = sqrt(abs(r%a(i, 2)))
       rate(i) = sqrt(abs(r%a(i, 3)))

@@ -14,9 +14,9 @@
 
 typedef void solver(ARGUMENTS);
 typedef void quick_solver(QUICK_ARGUMENTS);
-typedef void free_solver(const void *bodies, double *omega, int8_t *status);
-typedef void series_solver(const void *bodies, double *omega, int8_t *status, int *interrupted);
-typedef void fixed_solver(const void *bodies, int method, double *omega, int8_t *status,
+typedef void free_solver(const void *bodies, int n, double *omega, int8_t *status);
+typedef void series_solver(const void *bodies, int n, double *omega, int8_t *status, int *interrupted);
+typedef void fixed_solver(const void *bodies, int method, int n, double *omega, int8_t *status,
                           int *interrupted);
 typedef void runner(void *ensemble);
 
@@ -88,19 +88,19 @@ void quick_solve(QUICK_ARGUMENTS)
   chosen.quick(problem, omega, tolerance, effort, t_end, contest, result, status, steps, error);
 }
 
-void many_free(const void *bodies, double *omega, int8_t *status)
+void many_free(const void *bodies, int n, double *omega, int8_t *status)
 {
-  chosen.free(bodies, omega, status);
+  chosen.free(bodies, n, omega, status);
 }
 
-void many_taylor(const void *bodies, double *omega, int8_t *status, int *interrupted)
+void many_taylor(const void *bodies, int n, double *omega, int8_t *status, int *interrupted)
 {
-  chosen.series(bodies, omega, status, interrupted);
+  chosen.series(bodies, n, omega, status, interrupted);
 }
 
-void many_fixed(const void *bodies, int method, double *omega, int8_t *status, int *interrupted)
+void many_fixed(const void *bodies, int method, int n, double *omega, int8_t *status, int *interrupted)
 {
-  chosen.fixed(bodies, method, omega, status, interrupted);
+  chosen.fixed(bodies, method, n, omega, status, interrupted);
 }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

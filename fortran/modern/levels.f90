@@ -1,6 +1,6 @@
 module levels
-  !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a problem_t,
-  !! a bodies_t or an ensemble_t on as it is, and knows no more of it than its address.
+  !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a
+  !! problem_t, a bodies_t or an ensemble_t on as it is, and knows no more of it than its address.
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
   use bodies, only: i1
   implicit none(type, external)
@@ -48,33 +48,35 @@ module levels
       real(c_double), intent(out) :: error
     end subroutine quick_solve
 
-    subroutine many_free(bodies, omega, status) bind(c, name="many_free")
+    subroutine many_free(bodies, n, omega, status) bind(c, name="many_free")
       !! As in many_free.f90.
-      import :: c_double, c_ptr, i1
+      import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
-      real(c_double), intent(inout) :: omega(3, *)
-      integer(i1), intent(inout) :: status(*)
+      integer(c_int), intent(in), value :: n
+      real(c_double), intent(inout) :: omega(3, n)
+      integer(i1), intent(inout) :: status(n)
     end subroutine many_free
 
-    subroutine many_taylor(bodies, omega, status, interrupted) bind(c, name="many_taylor")
+    subroutine many_taylor(bodies, n, omega, status, interrupted) bind(c, name="many_taylor")
       !! As in many_taylor.f90.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
-      real(c_double), intent(inout) :: omega(3, *)
-      integer(i1), intent(inout) :: status(*)
+      integer(c_int), intent(in), value :: n
+      real(c_double), intent(inout) :: omega(3, n)
+      integer(i1), intent(inout) :: status(n)
       integer(c_int), intent(out) :: interrupted
     end subroutine many_taylor
 
-    subroutine many_fixed(bodies, method, omega, status, interrupted) bind(c, name="many_fixed")
+    subroutine many_fixed(bodies, method, n, omega, status, interrupted) bind(c, name="many_fixed")
       !! As in many_fixed.f90.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
-      integer(c_int), intent(in), value :: method
-      real(c_double), intent(inout) :: omega(3, *)
-      integer(i1), intent(inout) :: status(*)
+      integer(c_int), intent(in), value :: method, n
+      real(c_double), intent(inout) :: omega(3, n)
+      integer(i1), intent(inout) :: status(n)
       integer(c_int), intent(out) :: interrupted
     end subroutine many_fixed
 

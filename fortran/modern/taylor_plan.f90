@@ -72,10 +72,10 @@ contains
     end if
   end subroutine steady_rates
 
- elemental subroutine share_and_step(coupling, scale, gain, rate, turned, tolerance, time, share, h)
-    !! An error turns into one of phase and grows with it, and the phase of all later ones with that;
-    !! the weights are from random scenes.
-    !! Waves ask for more steps, and those may all err alike.
+  elemental subroutine share_and_step(coupling, scale, gain, rate, turned, tolerance, time, &
+                                      share, h)
+    !! An error turns into one of phase and grows with it, and the phase of all later ones with
+    !! that; the weights are from random scenes. Waves ask for more steps, which may all err alike.
     real(dp), intent(in) :: coupling, scale, gain, rate, turned, tolerance, time
     real(dp), intent(out) :: share          !! part of the scale that the last terms may have
     real(dp), intent(out) :: h              !! the first step, s

@@ -16,7 +16,7 @@ CHOICES = {
 class Field:
     """A number of a scene, or of what solves it.
 
-    `looped` says that scenes of one call share it.
+    `looped` says that scenes of one call share it; programs take two of these as arrays.
     """
 
     units: str

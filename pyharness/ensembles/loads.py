@@ -65,12 +65,18 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
     return subset(program, listing, readings=readings)
 
 
+def looped_fields(sweep: Sweep) -> list[str]:
+    """Return the fields of which a load has one value."""
+    fields = [axis.field for axis in sweep.axes]
+    found = [name for name in fields if name in CHOICES or NUMBERS[name].looped]
+    of_arrays = () if sweep.solver.program is None else _OF_PROGRAMS
+    return [name for name in found if name not in of_arrays]
+
+
 def loads(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Load]]:
     """Yield which of the scenes a load has, and the load."""
     columns = value_columns(sweep, where)
-    looped = [name for name in columns if name in CHOICES or NUMBERS[name].looped]
-    if sweep.solver.program is not None:
-        looped = [name for name in looped if name not in _OF_PROGRAMS]
+    looped = looped_fields(sweep)
     for members, values in groups([columns[name] for name in looped], len(where[0])):
         own = {name: c[members] for name, c in columns.items() if name not in looped}
         shared: dict[str, Any] = dict(zip(looped, values, strict=True))

@@ -8,15 +8,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from pyharness.ensembles.executors import Engine, engine
+from pyharness.ensembles.loads import looped_fields
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import Store, check_store, opened
-from pyharness.ensembles.sweep import Sweep, solve_points, spread
+from pyharness.ensembles.sweep import Indices, Sweep, solve_points, spread
 from pyharness.model.errors import InputError
 
 # Of a sample: scenes from all over the grid, first a few.
 _SAMPLES = (8, 256, 8192)
 _ENOUGH = 0.2  # s
+_PLACES = 5  # of the sample, along what scenes of one load share
 _PACE = 3e8  # bytes that are compressed and written in a second
 # Chunks that a process holds at once, with what it takes to compute them.
 _COPIES = 12
@@ -89,7 +93,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
     """Return the time of a scene, by a sample from all over the grid; of this process alone."""
     seconds = math.nan
     for count in _SAMPLES:
-        where = spread(sweep, count)
+        where = _together(sweep, spread(sweep, count))
         begin = time.perf_counter()
         solve_points(sweep, where)
         took = time.perf_counter() - begin
@@ -97,6 +101,18 @@ def seconds_per_scene(sweep: Sweep) -> float:
         if took > _ENOUGH or len(where[0]) < count:
             break
     return seconds
+
+
+def _together(sweep: Sweep, where: list[Indices]) -> list[Indices]:
+    """Move a sample to a few of the places that scenes of one load share, as a chunk has many."""
+    shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
+    found = []
+    for (name, count), places in zip(sweep.dimensions.items(), where, strict=True):
+        if name in shared and count > _PLACES:
+            part = np.rint(places * ((_PLACES - 1) / (count - 1))) / (_PLACES - 1)
+            places = np.rint(part * (count - 1)).astype(np.int64)
+        found.append(places)
+    return found
 
 
 def run_sweep(

@@ -5,6 +5,7 @@ The blocks and the threads change no bit of a result: each body is solved by its
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -200,10 +201,10 @@ class _Bodies:
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
         """Return the ends."""
         found = self._place(out)
-        for_each_piece(lambda piece: self._enter(piece, found), self.n, threads)
+        for_each_piece(partial(self._enter, found), self.n, threads)
         return found
 
-    def _enter(self, piece: slice, found: Ensemble) -> None:
+    def _enter(self, found: Ensemble, piece: slice, given_up: NDArray[np.int32]) -> None:
         def part(array: Array) -> Array:
             cut = array if len(array) in (0, 1) else array[piece]
             return cut.T
@@ -213,7 +214,7 @@ class _Bodies:
             self.code, self.tolerance, self.step, self.effort, self.by_moments,
             part(self.body), part(self.constant), part(self.rate), part(self.sines),
             part(self.cosines), self.omega0[piece].T, part(self.times), part(self.attitude),
-            found.omega[piece].T,
+            given_up, found.omega[piece].T,
             nothing if found.attitude is None else found.attitude[piece].T, found.status[piece],
         )  # fmt: skip
 

@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
+from pyharness.model.pieces import share
 from pyharness.model.trajectory import Array
 from pyharness.model.values import whole
 
@@ -34,29 +34,30 @@ def many_starts(
     omega = np.empty((n, 3)) if out is None else buffer_of("out", out, (n, 3), "d")
     status = np.empty(n, np.int8)
 
-    def enter(piece: slice) -> None:
+    def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
         own = times if len(times) == 1 else times[piece]
-        extension().solve_packed_many(packed, starts[piece].T, own, omega[piece].T, status[piece])
+        extension().solve_packed_many(
+            packed, starts[piece].T, own, given_up, omega[piece].T, status[piece]
+        )
 
     for_each_piece(enter, n, threads_of(threads))
     return omega, status
 
 
-def for_each_piece(work: Callable[[slice], None], n: int, threads: int) -> None:
+def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
     """Call `work` for the pieces that n bodies fall into, in so many threads.
+
+    It is given a number too, which is not 0 where the rest is not wanted any more.
 
     Pieces as large as each other: a body alone in one would be solved another way.
     """
+    if not n:
+        return
+    given_up = np.zeros(1, dtype=np.int32)
     count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
     ends = [n * piece // count for piece in range(count + 1)]
     pieces = [slice(*each) for each in itertools.pairwise(ends)]
-    if threads == 1 or len(pieces) < 2:
-        for piece in pieces:
-            work(piece)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        for done in [pool.submit(work, piece) for piece in pieces]:
-            done.result()
+    share(lambda piece: work(piece, given_up), pieces, threads, given_up)
 
 
 def threads_of(threads: int) -> int:

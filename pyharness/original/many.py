@@ -1,7 +1,6 @@
 """The programs of the appendix on many bodies in one call, with the bits of the single runs."""
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import SupportsIndex
 
@@ -13,6 +12,7 @@ from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
 from pyharness.model.extension import columns, extension
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
+from pyharness.model.pieces import share
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, several, truth, whole
@@ -220,7 +220,7 @@ def _run(
             stop_variable[part], quotient[part],
         )  # fmt: skip
 
-    _share(some, list(_pieces(n, scene.steps, threads)), threads, given_up)
+    share(some, list(_pieces(n, scene.steps, threads)), threads, given_up)
     return ProgramEnsemble(
         at=wanted,
         omega=omega_rows[:, back],
@@ -243,26 +243,6 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
         size = -(-size // Blocks.LANE_COUNT) * Blocks.LANE_COUNT
     for begin in range(0, n, max(1, size)):
         yield slice(begin, min(n, begin + size))
-
-
-def _share(
-    some: Callable[[slice], None], pieces: list[slice], threads: int, given_up: NDArray[np.int32]
-) -> None:
-    if threads == 1 or len(pieces) < 2:
-        # Here and not in a thread of its own: Python gives signals to this one.
-        for piece in pieces:
-            some(piece)
-        return
-    with ThreadPoolExecutor(min(threads, len(pieces))) as pool:
-        jobs = [pool.submit(some, piece) for piece in pieces]
-        try:
-            for job in jobs:
-                job.result()
-        except BaseException:
-            # Signals don't reach the others: they look at this.
-            given_up[0] = 1
-            pool.shutdown(cancel_futures=True)
-            raise
 
 
 def _check_ends(step_size: Array, steps: int) -> None:

@@ -21,7 +21,7 @@ OPTIONS = {
     "--executor E": f"{', '.join(EXECUTORS)} (default: here)",
     "--workers N": "processes, of processes and dask (default: as many as processors)",
     "--scheduler ADDRESS": "of a Dask cluster, as in tcp://host:8786 (default: one of our own)",
-    "--quantity NAME": "the reduction to draw (default: the first)",
+    "--quantity NAME": "the reduction to draw (default: the file's picture, or the first)",
     **{key: told for key, told in shared.outputs().items() if key != "--out FILE"},
 }
 
@@ -66,9 +66,13 @@ def run(options: argparse.Namespace) -> int:
     with opened(sweep, options.out) as store:
         report = sweep_report(store, outcome, options.out)
         if quantity is not None:
+            from pyharness.ensembles.atlas import atlas_picture
             from pyharness.ensembles.picture import sweep_picture
 
-            report = report._replace(pictures={"sweep": partial(sweep_picture, store, quantity)})
+            draw = partial(sweep_picture, store, quantity)
+            if sweep.picture and options.quantity is None:
+                draw = partial(atlas_picture, store)
+            report = report._replace(pictures={"sweep": draw})
         shared.show(report, shown)
     return 0
 

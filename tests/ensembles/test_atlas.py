@@ -1,0 +1,222 @@
+"""The atlas: its sweep files with few places on each axis, and what its pages say of them."""
+
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness.ensembles.atlas import PAGES, atlas_picture
+from pyharness.ensembles.atlas_collocation import tenfold
+from pyharness.ensembles.atlas_maps import place_of
+from pyharness.ensembles.atlas_stops import case_scenes, foretold
+from pyharness.ensembles.run import _together, run_sweep
+from pyharness.ensembles.store import opened
+from pyharness.ensembles.sweep import Sweep, solve_chunk, spread
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.codes import Statuses
+from pyharness.model.errors import InputError
+from pyharness.model.trajectory import Array
+from pyharness.theory.flips import flip_times
+from tests.ensembles.sweeps import written
+
+ATLAS = Path(__file__).parent.parent.parent / "docs/atlas"
+
+
+def _coarse(folder: Path, name: str, count: int, **more: str) -> Sweep:
+    """Read a sweep file of the atlas with other counts, and other texts in place of some."""
+    content = re.sub(r"count = \d+", f"count = {count}", (ATLAS / f"{name}.toml").read_text())
+    for old, new in more.items():
+        content, n = re.subn(rf"(?m)^{old} = .*$", f"{old} = {new}", content)
+        assert n
+    return read_sweep(written(folder, content))
+
+
+def _whole(sweep: Sweep) -> dict[str, Any]:
+    """Return the arrays of all of a sweep."""
+    found: dict[str, Any] = {}
+    for chunk in range(sweep.n_chunks):
+        for name, values in solve_chunk(sweep, chunk).items():
+            shape = (*sweep.shape, *values.shape[len(sweep.shape) :])
+            found.setdefault(name, np.empty(shape, values.dtype))[sweep.box(chunk)] = values
+    return found
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_page_draws_its_sweep(name: str, tmp_path: Path) -> None:
+    sweep = _coarse(tmp_path, name, 4)
+    assert sweep.picture == name
+    run_sweep(sweep, str(tmp_path / "store"))
+    with opened(sweep, str(tmp_path / "store")) as store:
+        picture = atlas_picture(store)
+    picture.figure.savefig(io.BytesIO(), format="png")
+    assert len(picture.numbers.rows) > 20
+    assert (ATLAS / f"{name}.png").stat().st_size < 300_000
+    assert f"{name}.toml" in (ATLAS / "README.md").read_text()
+
+
+def test_the_sizes_are_those_of_the_pages() -> None:
+    sizes = {name: read_sweep(ATLAS / f"{name}.toml").n_scenes for name in PAGES}
+    assert sizes["stability"] >= 10**8
+    assert sizes["torque"] >= 10**6
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('picture = "stops"', 'picture = "stars"', "unknown picture 'stars'"),
+        ('picture = "stops"', 'picture = "torque"', "allowed: torque, tilt"),
+        ('picture = "stops"', "picture = 1", "must be text"),
+        ('"stop-variable", ', "", "it takes the reduction stop-variable"),
+    ],
+)
+def test_page_that_does_not_fit_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
+    content = (ATLAS / "stops.toml").read_text()
+    assert old in content
+    with pytest.raises(InputError, match=words):
+        read_sweep(written(tmp_path, content.replace(old, new)))
+
+
+def test_square_of_all_bodies_is_symmetric_about_its_diagonal(tmp_path: Path) -> None:
+    sweep = _coarse(tmp_path, "stability", 8)
+    found = _whole(sweep)["flip-time"]
+    other = _coarse(tmp_path, "stability", 8).text.replace("0.7853981633974483", f"{np.pi / 2}")
+    mirrored = _whole(read_sweep(written(tmp_path, other)))["flip-time"]
+    # The least moment's axis and the largest's change places, b/a and c/b too.
+    assert found[0] == pytest.approx(mirrored[1].swapaxes(1, 2), rel=1e-9)
+    assert (np.diff(found[0], axis=0) < 0.0).all()
+    # Half way between them the diagonal is the separatrix.
+    at = np.arange(1, 8)
+    for beside in (found[1][:, at, at - 1], found[1][:, at - 1, at]):
+        assert (found[1][:, at, at] > beside).all()
+
+
+def test_bodies_of_the_thesis_have_their_place_in_the_square() -> None:
+    assert place_of((40.0, 30.0, 20.0)) == pytest.approx((0.6, 1.0 / 3.0))
+    assert place_of((41.0, 39.0, 20.0)) == pytest.approx((11.0 / 30.0, 9.0 / 11.0))
+
+
+def test_flips_without_torque_are_those_of_the_closed_form(tmp_path: Path) -> None:
+    sweep = _coarse(tmp_path, "torque", 6)
+    found = _whole(sweep)["flips"][0]
+    tilts, up, across = (axis.coordinates() for axis in sweep.axes[3:])
+    tilt, c_b, b_a = (each.ravel() for each in np.meshgrid(tilts, up, across, indexing="ij"))
+    times = flip_times(_bodies(b_a, c_b), _starts(tilt))
+    # It begins half way between two flips.
+    expected = np.floor(50.0 / times + 0.5)
+    near = np.abs(50.0 / times + 0.5 - np.rint(50.0 / times + 0.5)) < 1e-6
+    assert (found.ravel() == expected)[~near].all()
+
+
+def test_torque_along_the_middle_axis_holds_nobody(tmp_path: Path) -> None:
+    sweep = _coarse(tmp_path, "torque", 6)
+    found = _whole(sweep)["flips"]
+    tilts, up, across = (axis.coordinates() for axis in sweep.axes[3:])
+    tilt, c_b, b_a = (each.ravel() for each in np.meshgrid(tilts, up, across, indexing="ij"))
+    for place in (0, 1, 2):
+        torque = sweep.axes[1].coordinates()[place]
+        times = _first_flip(_bodies(b_a, c_b), tilt, torque)
+        assert np.isfinite(times).all()
+        flips = found[place].ravel() > 0
+        assert (flips == (times < 50.0))[np.abs(times - 50.0) > 1e-3].all()
+
+
+def test_sample_of_the_estimate_shares_what_loads_share() -> None:
+    sweep = read_sweep(ATLAS / "stops.toml")
+    places = _together(sweep, spread(sweep, 256))
+    steps = sorted({*places[2].tolist()})
+    assert (len(steps), steps[0], steps[-1]) == (5, 0, 600)
+    assert len({*places[3].tolist()}) > 100
+
+
+def _bodies(b_a: Array, c_b: Array) -> Array:
+    parts = np.ones_like(b_a), b_a, b_a * c_b
+    found: Array = np.stack(
+        [parts[1] + parts[2], parts[0] + parts[2], parts[0] + parts[1]], axis=1
+    ) / (1.0 + b_a[:, None])
+    return found
+
+
+def _starts(tilt: Array) -> Array:
+    return np.stack([np.sin(tilt), np.cos(tilt), 0.0 * tilt], axis=1)
+
+
+def _first_flip(bodies: Array, tilt: Array, torque: float) -> Array:
+    """Return when omega2 first is 0, by a quadrature over its angle.
+
+    Over the angle both others are hyperbolic functions, torque or not, so that omega2 squared is
+    cos^2(tilt) + 2 M angle / I2 - (s2 / s1) sin^2(tilt) sinh^2(rate angle).
+    """
+    i1, i2, i3 = bodies.T
+    s1, s2, s3 = (i3 - i2) / i1, (i3 - i1) / i2, (i2 - i1) / i3
+    rate = np.sqrt(s1 * s3)
+
+    def square(angle: Array) -> Array:
+        shift = np.sqrt(s3 / s1) * np.sin(tilt) * np.sinh(rate * angle)
+        found: Array = np.cos(tilt) ** 2 + 2.0 * torque / i2 * angle - s2 / s3 * shift**2
+        return found
+
+    low, high = np.zeros_like(tilt), 700.0 / rate * np.ones_like(tilt)
+    with np.errstate(over="ignore"):
+        for _ in range(200):
+            middle = 0.5 * (low + high)
+            above = square(middle) > 0.0
+            low, high = np.where(above, middle, low), np.where(above, high, middle)
+    # The end is a root of omega2 squared: a substitution makes it smooth.
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    u = 0.5 * (nodes + 1.0)
+    values = [
+        0.5 * w * 2.0 * at * low / np.sqrt(np.maximum(square(low * (1.0 - at * at)), 1e-300))
+        for at, w in zip(u, weights, strict=True)
+    ]
+    total: Array = np.sum(values, axis=0)
+    return total
+
+
+def test_corrected_program_stops_where_it_is_foretold(tmp_path: Path) -> None:
+    sweep = _coarse(tmp_path, "stops", 41)
+    found = _whole(sweep)
+    stopped = found["status"] == Statuses.STOPPED
+    steps, constants = (
+        next(axis for axis in sweep.axes if axis.field == field).coordinates()
+        for field in ("step_size", "lipschitz")
+    )
+    scenes = case_scenes(sweep)
+    assert [scene.name for scene in scenes] == ["Case 2", "Case 3", "Case 4", "Case 5"]
+    for i, scene in enumerate(scenes):
+        constant, step = foretold(scene, 10.0)
+        short = steps < 0.1 * step
+        below, above = constants < constant * (1.0 - 1e-3), constants > constant * (1.0 + 1e-3)
+        assert stopped[2, i][np.ix_(short, below)].all()
+        assert not stopped[2, i][np.ix_(short, above)].any()
+        if 1 <= i <= 2:
+            # Beyond rk4's region what grows ends in the test.
+            assert stopped[2, i][steps > 1.05 * step].all()
+            assert not stopped[2, i][np.ix_(steps < 0.95 * step, constants > 10.0)].any()
+    # By component it is a comb; one norm, and every other defect, make a clean edge.
+    changes = [
+        (np.diff(stopped[i].astype(int), axis=1) != 0)[:, :, constants > 100.0].sum()
+        for i in range(3)
+    ]
+    assert changes[0] > 5 * changes[1] > 0
+    stops = found["stop-variable"][0][stopped[0]]
+    assert 0.5 < np.isin(stops, (4, 5, 6)).mean() < 0.95
+
+
+def test_collocation_diverges_where_a_wobble_grows(tmp_path: Path) -> None:
+    sweep = _coarse(tmp_path, "collocation", 25)
+    found = _whole(sweep)
+    steps, sizes = (
+        next(axis for axis in sweep.axes if axis.field == field).coordinates()
+        for field in ("step_size", "omega.magnitude")
+    )
+    line = tenfold(sweep.scene.euler_coefficients, sweep.scene.omega, sizes, 10.0)
+    changed = ~(found["drift"][..., 0] < 1.0)
+    for program, listing in ((0, 1), (1, 0), (1, 1)):
+        assert not changed[program, listing][steps[:, None] < 0.8 * line].any()
+        assert changed[program, listing][(steps[:, None] > 1.25 * line) & (line < 0.5)].all()
+    assert (changed[1, 0] == changed[1, 1]).all()
+    # What the original two-term program solves diverges however small the step.
+    assert changed[0, 0][:, sizes > 15.0].mean() > 0.95

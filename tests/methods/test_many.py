@@ -1,0 +1,307 @@
+"""Many bodies in one call: the promise of the single calls, whatever the others and the threads."""
+
+import tracemalloc
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import Ensemble, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
+from pyharness.model.codes import Methods, Statuses
+from pyharness.model.extension import extension
+from pyharness.model.trajectory import Array
+from tests.as_written import compiler_here, many_as_written
+
+TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
+KINDS = ("free", "constant", "ramp", "waves")
+LEVELS = [0, 1, 2]
+
+
+@pytest.fixture(params=LEVELS)
+def level(request: pytest.FixtureRequest) -> Iterator[int]:
+    """One instruction set; skipped where the processor has it not."""
+    if extension().choose_instructions(request.param) != request.param:
+        extension().choose_instructions(2)
+        pytest.skip("this processor has it not")
+    yield request.param
+    extension().choose_instructions(2)
+
+
+def bodies(kind: str, n: int, seed: int) -> dict[str, Any]:
+    """Draw bodies, starts, times and torques that matter."""
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    moments = 10.0 ** rng.uniform(-1.5, 1.5, (n, 3))
+    omega0 = rng.standard_normal((n, 3)) * 10.0 ** rng.uniform(-2, 2, (n, 1))
+    rate = np.abs(omega0).max(axis=1, keepdims=True)
+    drawn = {"moments": moments, "omega0": omega0, "t_end": rng.uniform(0.3, 10.0, n) / rate[:, 0]}
+    if kind != "free":
+        drawn["torque_constant"] = moments * rate**2 * rng.standard_normal((n, 3))
+    if kind in ("ramp", "waves"):
+        drawn["torque_rate"] = 0.1 * moments * rate**3 * rng.standard_normal((n, 3))
+    if kind == "waves":
+        for name in ("sines", "cosines"):
+            amplitude = moments * rate**2 * rng.standard_normal((n, 3))
+            frequency = rate * rng.uniform(0.1, 3.0, (n, 1))
+            drawn[name] = np.concatenate([amplitude, frequency], axis=1)[:, None, :]
+    drawn["t_end"][::3] *= -1.0
+    return drawn
+
+
+def scene_of(drawn: dict[str, Any], row: int) -> Scene:
+    """Return one of them."""
+    waves = {
+        name: [(tuple(wave[:3]), wave[3]) for wave in drawn[name][row]] if name in drawn else ()
+        for name in ("sines", "cosines")
+    }
+    zero = np.zeros((row + 1, 3))
+    law = TorqueLaw(
+        drawn.get("torque_constant", zero)[row], drawn.get("torque_rate", zero)[row], **waves
+    )
+    return replace(TOP, omega=drawn["omega0"][row], moments=drawn["moments"][row], torque=law)
+
+
+def only(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
+    """Return some of them."""
+    return {name: values[rows] for name, values in drawn.items()}
+
+
+def errors(drawn: dict[str, Any], found: Ensemble) -> Array:
+    """Return errors over the largest omega of start and end; NaN where growth is large."""
+    relative = np.full(len(found.omega), np.nan)
+    for row, omega in enumerate(found.omega):
+        truth = solve(scene_of(drawn, row), [drawn["t_end"][row]], "taylor", 1e-15)
+        if truth.has_all_rows and (truth.growth or np.inf) < 1e3:
+            scale = max(np.abs(truth.omega).max(), np.abs(drawn["omega0"][row]).max())
+            relative[row] = np.abs(omega - truth.omega[-1]).max() / scale
+    return relative
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
+    drawn = bodies(kind, 60, 1982)
+    found = solve_many(TOP, tolerance=tolerance, **drawn)
+    off = errors(drawn, found)
+    assert np.count_nonzero(np.isfinite(off)) > 50
+    assert np.nanmax(off) <= tolerance + 4e-12
+    assert found.has_result.all()
+    # Found side by side, not one by one: that would be the single solver's bits.
+    alone = [prepare(scene_of(drawn, row), tolerance=tolerance) for row in range(60)]
+    same = [
+        np.array_equal(solver(drawn["omega0"][row], drawn["t_end"][row]), found.omega[row])
+        for row, solver in enumerate(alone)
+    ]
+    assert np.count_nonzero(same) < 30
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_body_does_not_depend_on_the_others(kind: str, level: int) -> None:
+    n = 200
+    drawn = bodies(kind, n, 7)
+    whole = solve_many(TOP, **drawn).omega
+    order = np.random.default_rng(3).permutation(n)
+    assert np.array_equal(solve_many(TOP, **only(drawn, order)).omega, whole[order])
+    for count in (2, 7, 8, 9, 63, 64, 65, 129):
+        assert np.array_equal(solve_many(TOP, **only(drawn, slice(count))).omega, whole[:count])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_threads_change_no_bit(kind: str, threads: int) -> None:
+    drawn = bodies(kind, 1801, 11)
+    whole = solve_many(TOP, **drawn)
+    dealt = solve_many(TOP, threads=threads, **drawn)
+    assert np.array_equal(whole.omega, dealt.omega)
+    assert np.array_equal(whole.status, dealt.status)
+
+
+@pytest.mark.parametrize("case", range(1, 8))
+def test_every_case(case: int, level: int) -> None:
+    scene = case_scene(case)
+    starts = np.array(scene.omega) * np.linspace(0.5, 1.5, 30)[:, None]
+    many, status = prepare(scene).many(starts, 3.0)
+    assert (status == Statuses.COMPLETE).all()
+    solver = prepare(scene)
+    for start, omega in zip(starts, many, strict=True):
+        assert np.abs(omega - solver(start, 3.0)).max() <= 3e-12 * np.abs(many).max()
+
+
+@pytest.mark.parametrize("method", ["rk4", "improved-euler", "taylor-3"])
+@pytest.mark.parametrize("torque", [(0.0, 0.0, 0.0), (3.0, -2.0, 1.0)])
+def test_fixed_steps_are_those_of_the_single_method(
+    method: str, torque: tuple[float, float, float], level: int
+) -> None:
+    rng = np.random.default_rng(5)
+    starts, moments = rng.standard_normal((90, 3)), rng.uniform(1.0, 3.0, (90, 3))
+    scene = replace(TOP, torque=TorqueLaw(torque), step_size=0.07)
+    for t_end in (2.1, -1.0, 0.01):
+        found = solve_many(scene, t_end, omega0=starts, moments=moments, method=method)
+        assert found.has_result.all()
+        for start, body, omega in zip(starts, moments, found.omega, strict=True):
+            alone = prepare(replace(scene, moments=body), method)(start, t_end)
+            assert np.abs(omega - alone).max() <= 2e-14 * np.abs(alone).max()
+
+
+def test_what_has_no_lanes_is_solved_one_by_one() -> None:
+    starts = np.random.default_rng(1).standard_normal((5, 3))
+    law = TorqueLaw(rate=(1.0, 0.0, 2.0), sines=[((1.0, 2.0, 0.0), 3.0)])
+    ways = [
+        (replace(TOP, torque=law), "rk4"),
+        (replace(TOP, moments=(2.0, 2.0, 1.0)), "rk4"),
+        (replace(TOP, torque=law), "gauss-3"),
+        (TOP, "quick"),
+        (replace(TOP, moments=(2.0, 2.0, 2.0), torque=law), "auto"),
+    ]
+    for scene, method in ways:
+        solver = prepare(scene, method, 1e-6)
+        alone = [solver(start, 1.5) for start in starts]
+        found = solver.many(starts, 1.5)[0]
+        assert np.allclose(found, alone, rtol=0, atol=1e-5 if method == "auto" else 0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_body_alone_is_a_single_solution(kind: str) -> None:
+    drawn = bodies(kind, 12, 23)
+    for row in range(12):
+        solver = prepare(scene_of(drawn, row), tolerance=1e-9)
+        alone = solver(drawn["omega0"][row], drawn["t_end"][row])
+        start, t_end = drawn["omega0"][row : row + 1], float(drawn["t_end"][row])
+        assert np.array_equal(solver.many(start, t_end)[0][0], alone)
+        found = solve_many(TOP, tolerance=1e-9, **only(drawn, slice(row, row + 1)))
+        assert np.array_equal(found.omega[0], alone)
+
+
+def test_a_bad_body_spoils_no_other() -> None:
+    for kind in KINDS:
+        drawn = bodies(kind, 40, 31)
+        good = solve_many(TOP, **drawn).omega.copy()
+        drawn["omega0"][3, 1] = np.nan
+        drawn["omega0"][8] = np.inf
+        drawn["moments"][13, 0] = 0.0
+        drawn["moments"][17, 2] = -2.0
+        drawn["moments"][19, 1] = np.nan
+        drawn["t_end"][23] = np.inf
+        drawn["omega0"][29] = 1e300
+        drawn["omega0"][33] = 1e-300
+        found = solve_many(TOP, **drawn)
+        spoilt = [3, 8, 13, 17, 19, 23, 29, 33]
+        rest = np.setdiff1d(np.arange(40), spoilt)
+        assert np.array_equal(found.omega[rest], good[rest])
+        assert np.isnan(found.omega[[3, 8, 13, 17, 19, 23]]).all()
+        assert (found.status[[13, 17, 19]] == Statuses.REFUSED).all()
+        assert not found.has_result[[3, 8, 13, 17, 19, 23]].any()
+        assert set(found.ended) <= {"complete", "overflow", "refused", "gave up", "sensitive"}
+
+
+def test_bodies_near_the_ends_of_the_range_and_on_edges() -> None:
+    """Middle axis, separatrix, symmetry, spheres, rest, extreme scales: as the single solver."""
+    edges = [
+        ((0.0, 1.0, 0.0), (40.0, 30.0, 20.0)), ((1e-9, 1.0, 0.0), (40.0, 30.0, 20.0)),
+        ((1.0, 1.0, np.sqrt(0.75)), (3.0, 2.0, 1.0)), ((1.0, 2.0, 3.0), (2.0, 2.0, 1.0)),
+        ((1.0, 2.0, 3.0), (1.0, 2.0, 2.0)), ((1.0, 2.0, 3.0), (5.0, 5.0, 5.0)),
+        ((0.0, 0.0, 0.0), (3.0, 2.0, 1.0)), ((1e150, 2e150, 3e150), (3.0, 2.0, 1.0)),
+        ((1e-150, 2e-150, 3e-150), (3.0, 2.0, 1.0)), ((1.0, 2.0, 3.0), (1e9, 1.0, 1e9 + 1e-3)),
+        ((1.0, 0.0, 0.0), (3.0, 2.0, 1.0)), ((-1.0, -2.0, 0.5), (1.0, 3.0, 2.5)),
+    ]  # fmt: skip
+    omega0, moments = (np.array(each) for each in zip(*edges, strict=True))
+    for t_end in (0.0, 1.0, 1e4):
+        found = solve_many(TOP, t_end, omega0=omega0, moments=moments)
+        for row, (start, body) in enumerate(edges):
+            solver = prepare(replace(TOP, moments=body))
+            alone = solver(start, t_end)
+            allowed = 1e-12 * np.nan_to_num(np.abs(alone).max())
+            assert np.allclose(found.omega[row], alone, rtol=0, atol=allowed, equal_nan=True)
+
+
+def test_attitudes_are_those_of_a_prepared_solver() -> None:
+    rng = np.random.default_rng(2)
+    starts, attitudes = rng.standard_normal((20, 3)), rng.standard_normal((20, 4))
+    for law in (TorqueLaw(), TorqueLaw((1.0, 2.0, 3.0))):
+        scene = replace(TOP, torque=law)
+        solver = prepare(scene, attitude=True)
+        found = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes)
+        assert found.attitude is not None
+        for row, start in enumerate(starts):
+            omega, attitude = solver(start, 2.0, attitudes[row])
+            assert np.allclose(found.omega[row], omega, rtol=0, atol=1e-14)
+            assert np.allclose(found.attitude[row], attitude, rtol=0, atol=1e-14)
+
+
+def test_scenes_and_coefficients() -> None:
+    scenes = [
+        replace(TOP, torque=TorqueLaw((1.0, 0.0, 0.0), sines=[((1.0, 0.0, 0.0), 2.0)])),
+        replace(TOP, omega=(1.0, 2.0, 3.0)),
+        replace(TOP, moments=(3.0, 2.0, 1.0), torque=TorqueLaw((0.0, 0.0, 1.0))),
+    ]
+    found = solve_many(scenes, [1.0, 2.0, 3.0])
+    for scene, t_end, omega in zip(scenes, [1.0, 2.0, 3.0], found.omega, strict=True):
+        assert np.allclose(omega, solve(scene, [t_end]).omega[-1], rtol=0, atol=1e-11)
+    body = Scene("coefficients", (1.0, 1.0, 1.0), coefficients=(0.25, -0.5, 0.3))
+    given = np.array([[0.25, -0.5, 0.3], [0.3, 0.3, -0.2]])
+    found = solve_many(body, 2.0, coefficients=given)
+    for row, omega in zip(given, found.omega, strict=True):
+        alone = solve(replace(body, coefficients=tuple(row)), [2.0]).omega[-1]
+        assert np.allclose(omega, alone, rtol=0, atol=1e-11)
+
+
+def test_no_bodies() -> None:
+    assert solve_many(TOP, 1.0, omega0=np.empty((0, 3))).omega.shape == (0, 3)
+    assert prepare(TOP).many(np.empty((0, 3)), 1.0)[0].shape == (0, 3)
+
+
+def test_results_go_where_the_caller_says() -> None:
+    starts = np.random.default_rng(1).standard_normal((20000, 3))
+    first = solve_many(TOP, 1.0, omega0=starts)
+    array = np.empty((20000, 3))
+    assert solve_many(TOP, 1.0, omega0=starts, out=array).omega is array
+    assert prepare(TOP).many(starts, 1.0, out=array)[0] is array
+    tracemalloc.start()
+    again = solve_many(TOP, 2.0, omega0=starts, out=first)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert again is first
+    assert peak < 20000  # bytes: not one for a body
+    assert np.array_equal(again.omega, solve_many(TOP, 2.0, omega0=starts).omega)
+
+
+def test_any_array_will_do() -> None:
+    solver = prepare(TOP)
+    starts = np.random.default_rng(4).standard_normal((6, 3))
+    found = solver.many(starts, 1.0)[0]
+    for other in (starts.tolist(), np.asfortranarray(starts), starts.astype(">f8"), starts[::1]):
+        assert np.array_equal(solver.many(other, 1.0)[0], found)
+    assert np.array_equal(solver.many(starts, np.ones(6))[0], found)
+    assert np.array_equal(solver.many(starts, 1.0, threads=2)[0], found)
+
+
+@pytest.mark.external
+@pytest.mark.skipif(not compiler_here(), reason="no compiler")
+def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path, level: int) -> None:
+    """The plain text is what unroll.py writes out: the same steps, other roundings."""
+    loops = many_as_written(tmp_path)
+    for kind, method, tolerance in (
+        ("constant", 0, 1e-12), ("waves", 0, 1e-9), ("waves", 0, 1e-6), ("ramp", 0, 1e-3),
+        ("constant", Methods.RK4, 1.0),
+    ):  # fmt: skip
+        drawn = bodies(kind, 50, 3)
+        if method:
+            drawn["t_end"] = np.array([0.02])
+        zero = np.zeros((50, 3))
+        omega, status = loops(
+            method, tolerance, 0.001, drawn["moments"], drawn["torque_constant"],
+            drawn.get("torque_rate", zero), drawn.get("sines", np.empty((50, 0, 4))),
+            drawn["omega0"], drawn["t_end"],
+        )  # fmt: skip
+        drawn.pop("cosines", None)
+        name = "rk4" if method else "taylor"
+        if method:
+            drawn["t_end"] = 0.02
+        found = solve_many(TOP, method=name, tolerance=tolerance, step=0.001, **drawn)
+        solved = status == Statuses.COMPLETE
+        assert np.count_nonzero(solved) > 20
+        scale = np.abs(found.omega).max(axis=1, keepdims=True)
+        off = np.abs(omega - found.omega) / scale
+        assert off[solved].max() <= (2e-12 if method == 0 else 1e-11)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,14 @@ import pytest
 
 from pyharness import InputError
 from pyharness.cli.main import main
+from pyharness.ensembles.sweep import solve_chunk
+from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims.atlas import Atlas, atlas_of, bits, shares, sum_of_points
-from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, JUDGED
+from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED
 from tests.conftest import Printed
 
 pytestmark = pytest.mark.claims
-ROOT = Path(__file__).parents[2]
+ATLAS = Path(__file__).parents[2] / "docs" / "atlas"
 # Of 24 starts: reproduced, in part, not.
 COARSE = {
     "v2-case-1-agree": (24, 0, 0),
@@ -37,7 +40,7 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return the options that name a coarse atlas and its sweep file."""
     pytest.importorskip("zarr")
     folder = tmp_path_factory.mktemp("atlas")
-    text = (ROOT / "docs" / "atlas" / "history.toml").read_text()
+    text = (ATLAS / "history.toml").read_text()
     for before, after in ((25, 3), (48, 2), (96, 4)):
         assert f"count = {before}\n" in text
         text = text.replace(f"count = {before}\n", f"count = {after}\n")
@@ -57,6 +60,39 @@ def test_a_coarse_atlas_has_the_shares_that_were_seen(coarse: str, printed: Prin
     assert told == sorted(told, reverse=True)
 
 
+def _stored() -> dict[str, dict[float, float]]:
+    """Return the mean points beside the picture, by claim and magnitude."""
+    found: dict[str, dict[float, float]] = {}
+    for row in csv.DictReader((ATLAS / "history.csv").read_text().splitlines()):
+        of_claim = found.setdefault(row["claim"], {})
+        of_claim[float(row["omega.magnitude"])] = float(row["mean_points"])
+    return found
+
+
+def test_numbers_of_the_page_are_those_beside_its_picture() -> None:
+    page = (ATLAS / "history.md").read_text()
+    for name, means in _stored().items():
+        (line,) = [each for each in page.splitlines() if re.match(rf"{name} +\d", each)]
+        whole, part, _, _ = map(float, line.split()[1:])
+        assert len(means) == 25
+        assert np.mean(list(means.values())) == pytest.approx(
+            (whole + part / 2.0) / 100.0, abs=1e-4
+        )
+
+
+def test_a_chunk_of_the_atlas_has_the_stored_means() -> None:
+    """The directions of one magnitude, as adopted, over 100 steps."""
+    sweep = read_sweep(ATLAS / "history.toml", FUNCTIONS)
+    magnitude = 10
+    chunks = [solve_chunk(sweep, 2 * magnitude + half) for half in (0, 1)]
+    for name, means in _stored().items():
+        codes = np.concatenate([each[f"claim-{name}"] for each in chunks], axis=3)
+        assert codes.shape == (1, 1, 1, 48, 96)
+        # A few verdicts may lie so near to a threshold that another processor turns them.
+        told = list(means.values())[magnitude]
+        assert sum_of_points([codes]).mean() == pytest.approx(told, abs=1e-3)
+
+
 def test_an_atlas_is_told_and_drawn(coarse: str, printed: Printed, tmp_path: Path) -> None:
     picture = tmp_path / "atlas.svg"
     text = printed(f"claims {coarse} --plot {picture}")
@@ -71,8 +107,8 @@ def test_an_atlas_is_told_and_drawn(coarse: str, printed: Printed, tmp_path: Pat
 
 
 def test_mistakes_are_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    store, sweep = tmp_path / "store", ROOT / "docs" / "atlas" / "history.toml"
-    other = ROOT / "docs" / "tumbling.toml"
+    store, sweep = tmp_path / "store", ATLAS / "history.toml"
+    other = ATLAS.parent / "tumbling.toml"
     for options in (
         ["--atlas", str(store)],
         ["--sweep", str(sweep)],

@@ -24,7 +24,7 @@ module bodies
     real(dp), pointer, contiguous :: cosines(:, :, :)   !! (4, waves, 1 or n)
     real(dp), pointer, contiguous :: omega0(:, :)       !! (3, n), rad/s
     real(dp), pointer, contiguous :: times(:)           !! (1 or n), s
-    integer, pointer :: given_up  !! not 0: by the thread that waits for this one
+    integer, pointer :: given_up => null() !! not 0: by the thread that waits for this one
   end type bodies_t
 
   public :: coefficients_of, columns_of, has_torque, of_body, single_of

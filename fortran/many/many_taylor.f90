@@ -25,8 +25,8 @@ module many_taylor
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
   ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
   real(dp), parameter :: TRUSTED = 0.4_dp
-  real(dp), parameter :: DOUBTED = 6.0_dp    ! growth at which it is half of that
-  real(dp), parameter :: MOST_GROWTH = 60.0_dp
+  real(dp), parameter :: DOUBTED = 16.0_dp   ! growth at which it is half of that
+  real(dp), parameter :: MOST_GROWTH = 100.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: SURE = 0.03_dp      ! rounding times growth, in tolerances
   real(dp), parameter :: A_STEP = 3.0_dp     ! norm up to which an exponential is taken at once
@@ -46,6 +46,7 @@ module many_taylor
     real(dp), dimension(SLOTS, 3) :: a        !! A, B, C
     real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment
     real(dp), dimension(SLOTS, 3) :: error    !! left out and carried so far, rad/s
+    real(dp), dimension(SLOTS) :: worst       !! its largest size so far: it may shrink again
     real(dp), dimension(SLOTS, 3) :: small    !! a difference
     real(dp), dimension(SLOTS) :: growth      !! its largest size
     real(dp), dimension(SLOTS) :: t, rest     !! s
@@ -163,6 +164,7 @@ contains
     s%rate = 0.0_dp
     s%error = 0.0_dp
     s%small = 0.0_dp
+    s%worst = 0.0_dp
     s%growth = 0.0_dp
     s%t = 0.0_dp
     s%rest = 0.0_dp
@@ -212,9 +214,12 @@ contains
       call steady_rates(coupling(i), r%scale(i), push, ramp, r%rest(i), gain(i), rate(i))
       ! Of numbers that are none, or not far from the end of the range, a product may be.
       r%fits(i) = 1.0_dp
-      if (.not. (r%scale(i) <= FAR .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
+      if (.not. (abs(r%w(i, 1)) + abs(r%w(i, 2)) + abs(r%w(i, 3)) <= FAR &
+                 .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
       if (.not. (abs(r%rest(i)) <= FAR .and. abs(r%rest(i)) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
-      if (.not. (coupling(i) <= FAR .and. push <= FAR .and. ramp <= FAR)) r%fits(i) = -1.0_dp
+      if (.not. sum(abs(r%a(i, :))) + sum(abs(r%constant(i, :))) + sum(abs(r%rate(i, :))) <= FAR) then
+        r%fits(i) = -1.0_dp
+      end if
       if (.not. abs(r%a(i, 1)) <= FAR) r%fits(i) = -1.0_dp
     end do
     turned = 0.0_dp
@@ -270,6 +275,7 @@ contains
       s%small(i, axis) = DIFFERENCE(axis)
     end do
     s%growth(i) = 1.0_dp
+    s%worst(i) = 0.0_dp
     s%t(i) = 0.0_dp
     s%rest(i) = r%rest(j)
     s%h(i) = r%h(j)
@@ -296,14 +302,14 @@ contains
     integer, intent(in) :: i
     real(dp), intent(inout) :: omega(3)
     integer(i1), intent(out) :: status
-    real(dp) :: error, scale
+    real(dp) :: scale
 
     omega = s%w(i, :) + (s%low(i, :) - s%error(i, :))
-    error = max(abs(s%error(i, 1)), abs(s%error(i, 2)), abs(s%error(i, 3)))
     scale = max(s%scale(i), abs(omega(1)), abs(omega(2)), abs(omega(3)))
     status = LEFT
-    if (.not. abs(s%rest(i)) > 0.0_dp .and. scale <= FAR &
-        .and. error*(1.0_dp + s%growth(i)/DOUBTED) <= TRUSTED*tolerance*scale &
+    ! A sum, as a NaN may be lost in a maximum.
+    if (.not. abs(s%rest(i)) > 0.0_dp .and. sum(abs(omega)) + s%scale(i) <= FAR &
+        .and. s%worst(i)*(1.0_dp + s%growth(i)/DOUBTED) <= TRUSTED*tolerance*scale &
         .and. s%growth(i) <= min(MOST_GROWTH, SURE*tolerance/ROUNDING)) then
       status = COMPLETE
     end if
@@ -460,7 +466,10 @@ contains
         e = [o(1, 2)*e(2) + o(1, 3)*e(3), o(2, 1)*e(1) + o(2, 3)*e(3), &
              o(3, 1)*e(1) + o(3, 2)*e(2)]/real(k, dp) + d
       end do
-      if (j == 1) s%error(i, :) = e - left
+      if (j == 1) then
+        s%error(i, :) = e - left
+        s%worst(i) = max(s%worst(i), sum(abs(s%error(i, :))))
+      end if
       if (j == 2) s%small(i, :) = e
     end do
     s%growth(i) = max(s%growth(i), sum(abs(s%small(i, :))))

@@ -162,8 +162,11 @@ def one_step(order: int, waves: bool) -> Iterator[str]:
             yield from ("ex = gx", "ey = gy")
         for axis, x in enumerate("xyz", 1):
             # What it leaves out, the step takes away.
-            left = f" - (p*l{x} - q*u{x})" if name == "error" else ""
-            yield f"s%{name}(i, {axis}) = e{x}{left}"
+            if name == "error":
+                yield f"e{x} = e{x} - (p*l{x} - q*u{x})"
+            yield f"s%{name}(i, {axis}) = e{x}"
+        if name == "error":
+            yield "s%worst(i) = max(s%worst(i), abs(ex) + abs(ey) + abs(ez))"
     yield "s%growth(i) = max(s%growth(i), abs(ex) + abs(ey) + abs(ez))"
     yield from END.splitlines()
 

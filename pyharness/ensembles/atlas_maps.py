@@ -64,6 +64,16 @@ def square_map(plot: "Axes", store: Store, values: Array, **style: Any) -> Any:
     return drawn
 
 
+def square_rows(store: Store, what: str, values: Array, most: int) -> list[list[Any]]:
+    """Return some values over the square as rows: what, b/a, c/b, value."""
+    across, up = values_of(store, "body.square.1"), values_of(store, "body.square.2")
+    return [
+        [what, float(across[j]), float(up[i]), float(f"{values[i, j]:.6g}")]
+        for i in thinned(len(up), most)
+        for j in thinned(len(across), most)
+    ]
+
+
 def place_of(moments: Triple) -> tuple[float, float]:
     """Return where a body stands in the square."""
     low, middle, high = sorted(moments)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.ensembles.atlas_maps import COLORS, nearest, square_map, thinned, values_of
+from pyharness.ensembles.atlas_maps import COLORS, nearest, square_map, square_rows, values_of
 from pyharness.ensembles.store import Store
 from pyharness.model.report import Picture, numbers
 from pyharness.model.trajectory import Array
@@ -41,7 +41,7 @@ def stability_picture(store: Store) -> Picture:
         toward = f"azimuth {math.degrees(azimuths[azimuth]):.0f} degrees"
         title = f"tilt {tilts[at]:.0e} rad" + ("" if tilt < 1.0 else f", {toward}")
         plot.set_title(title, fontsize=9)
-        rows += _few(store, f"flip-time at {title}", values)
+        rows += square_rows(store, f"flip-time at {title}", values, _FEW)
     figure.colorbar(drawn, ax=list(plots[:, :2].ravel()), label="time between flips (s)",
                     shrink=0.6, extend="both", location="left")  # fmt: skip
     shares, last = _scanned(store)
@@ -54,7 +54,7 @@ def stability_picture(store: Store) -> Picture:
     shown = square_map(plot, store, last, norm=LogNorm(tilts[0], tilts[-1]), cmap="magma")
     plot.set_title(f"largest tilt with {_LONG:g} s between flips; white: none", fontsize=9)
     figure.colorbar(shown, ax=plot, label="tilt (rad)", shrink=0.8)
-    rows += _few(store, f"largest tilt with {_LONG:g} s between flips", last)
+    rows += square_rows(store, f"largest tilt with {_LONG:g} s between flips", last, _FEW)
     told = [store.sweep.name, f"{store.sweep.n_scenes:.4g} bodies, 1 rad/s"]
     return Picture(figure, numbers("what x y value", rows), told)
 
@@ -99,12 +99,3 @@ def _curves(plot: "Axes", tilts: Array, azimuths: Array, shares: Array) -> None:
     plot.set_title("all bodies; dashed: the second azimuth", fontsize=9)
     plot.grid(visible=True, linewidth=0.3)
     plot.legend(fontsize=7)
-
-
-def _few(store: Store, what: str, values: Array) -> list[list[Any]]:
-    across, up = values_of(store, "body.square.1"), values_of(store, "body.square.2")
-    return [
-        [what, float(across[j]), float(up[i]), float(f"{values[i, j]:.6g}")]
-        for i in thinned(len(up), _FEW)
-        for j in thinned(len(across), _FEW)
-    ]

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.ensembles.atlas_maps import COLORS, nearest, square_map, thinned, values_of
+from pyharness.ensembles.atlas_maps import COLORS, nearest, square_map, square_rows, values_of
 from pyharness.ensembles.store import Store
 from pyharness.model.report import Picture, numbers
 from pyharness.model.trajectory import Array
@@ -37,7 +37,7 @@ def torque_picture(store: Store) -> Picture:
         values = np.asarray(flips[i, at], dtype=float)
         drawn = square_map(plot, store, values, norm=norm, cmap="viridis")
         plot.set_title(name, fontsize=9)
-        rows += _few(store, f"flips: {name}, tilt {tilts[at]:.0e}", values)
+        rows += square_rows(store, f"flips: {name}, tilt {tilts[at]:.0e}", values, _FEW)
     figure.colorbar(drawn, ax=list(plots[:, :3].ravel()), label=f"flips, tilt {tilts[at]:.0e} rad",
                     shrink=0.6, ticks=range(_MOST_FLIPS + 1), location="left")  # fmt: skip
     shares = np.array([np.mean(np.asarray(flips[i]) > 0, axis=(1, 2)) for i in range(len(told))])
@@ -73,12 +73,3 @@ def _lines(plot: "Axes", tilts: Array, values: Array, told: list[str], label: st
     plot.set_ylabel(label, fontsize=8)
     plot.set_ylim(0.0)
     plot.grid(visible=True, linewidth=0.3)
-
-
-def _few(store: Store, what: str, values: Array) -> list[list[Any]]:
-    across, up = values_of(store, "body.square.1"), values_of(store, "body.square.2")
-    return [
-        [what, float(across[j]), float(up[i]), float(values[i, j])]
-        for i in thinned(len(up), _FEW)
-        for j in thinned(len(across), _FEW)
-    ]

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import scipy.integrate  # noqa: F401  (what Ctrl-C meets within its import may be lost)
 
+from pyharness.methods.many import solve_many
 from pyharness.methods.prepared import prepare
 from pyharness.methods.solve import solve
 from pyharness.model import extension as room
@@ -63,6 +64,13 @@ def _many(program: str, threads: int) -> object:
     )
 
 
+def _bodies(method: str, threads: int) -> object:
+    starts = np.full((2000, 3), PUSHED.omega)
+    return solve_many(
+        PUSHED, 1e6, omega0=starts, method=method, step=1e-4, threads=threads, effort=1e6
+    )
+
+
 LONG: dict[str, Callable[[], object]] = {
     "taylor": _method(PUSHED, "taylor", 1e5),
     "taylor-waves": _method(CROWDED, "taylor", 1e5),
@@ -80,6 +88,8 @@ LONG: dict[str, Callable[[], object]] = {
     **{name: partial(run, BUSY, corrected(name), may_stop=False) for name in PROGRAMS},
     **{f"many-{name}": partial(_many, name, 1) for name in PROGRAMS},
     "many-threads": partial(_many, "four-term", 2),
+    **{f"bodies-{name}": partial(_bodies, name, 1) for name in ("taylor", "rk4", "gauss-2")},
+    "bodies-threads": partial(_bodies, "taylor", 2),
     "linear-solver": _linear,
     "dop853": _method(PUSHED, "dop853", 1e4, 1e-3),
     "lsoda": _method(PUSHED, "lsoda", 1e4, 1e-3),
@@ -118,7 +128,7 @@ def keyboard() -> Iterator[_Keyboard]:
 def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rooms = [f"methods.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss")]
+    rooms = [f"methods.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss", "many")]
     for each in (*rooms, "original.compiled", "original.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:

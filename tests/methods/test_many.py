@@ -58,7 +58,10 @@ def scene_of(drawn: dict[str, Any], row: int) -> Scene:
     }
     zero = np.zeros((row + 1, 3))
     law = TorqueLaw(
-        drawn.get("torque_constant", zero)[row], drawn.get("torque_rate", zero)[row], **waves
+        drawn.get("torque_constant", zero)[row],
+        drawn.get("torque_rate", zero)[row],
+        waves["sines"],
+        waves["cosines"],
     )
     return replace(TOP, omega=drawn["omega0"][row], moments=drawn["moments"][row], torque=law)
 

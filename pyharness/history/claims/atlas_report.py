@@ -1,5 +1,6 @@
 """The report of `claims --atlas`: claims that discriminate, starts that are likely; a picture."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,8 @@ from pyharness.history.claims.atlas import (
     shown_starts,
     sum_of_points,
 )
+from pyharness.history.claims.laboratory import starts
+from pyharness.history.claims.over_starts import FAILS
 from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, words
 from pyharness.model.trajectory import Array
 
@@ -178,14 +181,19 @@ def atlas_picture(atlas: Atlas) -> Picture:
     )
     _draw_claims(claims, atlas, names, means)
     rows = [
-        (name, float(magnitude), float(means[k, m]))
+        (
+            name,
+            float(magnitude),
+            float(means[k, m]),
+            float((atlas.codes[name][0, 0, m] != FAILS).mean()),
+        )
         for k, name in enumerate(names)
         for m, magnitude in enumerate(atlas.magnitudes)
     ]
     title = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
     return Picture(
         figure,
-        numbers("claim omega.magnitude mean_points", rows),
+        numbers("claim omega.magnitude mean_points share_not_failing", rows),
         [f"claims of section V over starts omega(0) ({title})"],
     )
 
@@ -194,8 +202,11 @@ def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
     import matplotlib as mpl
 
     # Not the ends, which look like what is beside them.
-    chosen = np.unique(np.linspace(0, len(atlas.magnitudes) - 1, _MAPS + 2)[1:-1].round())
+    count = len(atlas.magnitudes)
+    inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
+    chosen = np.unique(inside) if count > _MAPS else np.arange(count)
     plots = figure.subplots(-(-len(chosen) // 2), 2, squeeze=False, sharex=True, sharey=True)
+    none = atlas.none_fails()
     least, largest = float(score.min()), float(score.max())
     count = max(1, round(2.0 * (largest - least)))
     colours = mpl.colormaps["viridis"].resampled(count + 1)
@@ -205,19 +216,30 @@ def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
             np.degrees(atlas.longitudes), atlas.heights, score[k], cmap=colours,
             vmin=least - 0.25, vmax=largest + 0.25, shading="nearest", rasterized=True,
         )  # fmt: skip
+        if none[k].any() and not none[k].all():
+            plot.contour(
+                np.degrees(atlas.longitudes), atlas.heights, none[k].astype(float), [0.5],
+                colors="#b02018", linewidths=0.8,
+            )  # fmt: skip
+        for start in starts():
+            size = math.hypot(*start)
+            if math.isclose(size, atlas.magnitudes[k], rel_tol=1e-3):
+                longitude = math.degrees(math.atan2(start[1], start[0])) % 360.0
+                plot.plot(longitude, start[2] / size, "w+", markersize=9, markeredgewidth=2.0)
         plot.set_title(f"|omega(0)| = {atlas.magnitudes[k]:.3g} rad/s", fontsize=9)
         plot.set_xticks([0, 90, 180, 270, 360])
     for plot in plots.ravel()[len(chosen) :]:
         plot.set_axis_off()
     plots[0, 0].set_xlim(0.0, 360.0)
-    plots[0, 0].set_ylim(-1.0, 1.0)
+    step = float(np.ptp(atlas.heights)) / max(1, len(atlas.heights) - 1)
+    plots[0, 0].set_ylim(atlas.heights[0] - step / 2.0, atlas.heights[-1] + step / 2.0)
     for plot in plots[-1]:
         plot.set_xlabel("longitude from axis 1 (degrees)", fontsize=8)
     for plot in plots[:, 0]:
         plot.set_ylabel("omega3 / |omega|", fontsize=8)
     figure.colorbar(
         drawn, ax=list(plots.ravel()), location="bottom", aspect=40,
-        label=f"points of {len(atlas.codes)}",
+        label=f"points of {len(atlas.codes)}; red: the edge of where no claim fails",
     )  # fmt: skip
 
 

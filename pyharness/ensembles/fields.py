@@ -48,6 +48,10 @@ NUMBERS = {
     "omega.magnitude": Field("rad/s", "its length", "a number from 0", lambda value: value >= 0.0),
     "tilt": Field("rad", "its angle from the axis of the middle moment"),
     "azimuth": Field("rad", "its angle about that axis, from the axis of the least moment"),
+    "height": Field(
+        "1", "its third component over its length", "-1 to 1", lambda v: -1.0 <= v <= 1.0
+    ),
+    "longitude": Field("rad", "its angle about the third axis, from the first"),
     **_three("body.moments", "kg m2", "moments", positive=True),
     **_three("body.coefficients", "1", "coefficients A, B, C"),
     "body.ratio.1": Field("1", "I1 over I3", "a number above 0", _above_zero),
@@ -70,7 +74,11 @@ NUMBERS = {
 }
 # Ways to say one thing, of which a sweep takes one.
 RIVALS = (
-    (("omega.1", "omega.2", "omega.3"), ("omega.magnitude", "tilt", "azimuth")),
+    (
+        ("omega.1", "omega.2", "omega.3"),
+        ("omega.magnitude", "tilt", "azimuth", "height", "longitude"),
+    ),
+    (("tilt", "azimuth"), ("height", "longitude")),
     (("body.moments",), ("body.coefficients", "body.ratio", "body.square")),
     (("body.coefficients",), ("body.ratio", "body.square")),
     (("body.ratio",), ("body.square",)),

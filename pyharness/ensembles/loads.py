@@ -155,6 +155,9 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
         zero = np.zeros(n)
         unit = _tilted(scene, moments, own.get("tilt", zero), own.get("azimuth", zero))
         return magnitude[:, None] * unit
+    if "height" in own or "longitude" in own:
+        unit = _on_sphere(own.get("height", np.zeros(n)), own.get("longitude", np.zeros(n)))
+        return magnitude[:, None] * unit
     if "omega.magnitude" in own:
         return magnitude[:, None] * (start / length)
     return np.tile(start, (n, 1))
@@ -169,3 +172,9 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
     for rank, column in enumerate((sine * np.cos(azimuth), np.cos(tilt), sine * np.sin(azimuth))):
         np.put_along_axis(found, order[:, rank : rank + 1], column[:, None], axis=1)
     return found
+
+
+def _on_sphere(height: Array, longitude: Array) -> Array:
+    """Return unit vectors by their third component; equal steps of it are equal areas."""
+    across = np.sqrt(1.0 - height * height)
+    return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

@@ -213,12 +213,12 @@ REDUCTIONS = {
         parameters={"samples": 10},
     ),
     "claim": Reduction(
-        "whether a claim holds; 2: it says nothing of the scene",
+        "whether a claim holds; 2: it says nothing of the scene; 3: it holds in part",
         "1",
         _claim,
         "i1",
         parameters={"id": ""},
-        flags={0: "fails", 1: "holds", 2: "silent"},
+        flags={0: "fails", 1: "holds", 2: "silent", 3: "in part"},
     ),
     "largest-tilt": Reduction(
         "largest angle of the angular velocity from where it was",

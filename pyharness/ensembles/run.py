@@ -18,8 +18,12 @@ from pyharness.ensembles.sweep import Indices, Sweep, solve_points, spread
 from pyharness.model.errors import InputError
 
 # Of a sample: scenes from all over the grid, first a few.
-_SAMPLES = (8, 256, 8192)
+_SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # s
+# A larger sample is taken beyond that where it is a small part of the sweep, and takes at most so
+# long: what a load takes whatever its size would else count as its scenes'.
+_PART = 0.01
+_LONGEST = 60.0  # s
 _PLACES = 5  # of the sample, along what scenes of one load share
 _PACE = 3e8  # bytes that are compressed and written in a second
 # Chunks that a process holds at once, with what it takes to compute them.
@@ -92,13 +96,14 @@ def _scene_memory(sweep: Sweep) -> int:
 def seconds_per_scene(sweep: Sweep) -> float:
     """Return the time of a scene, by a sample from all over the grid; of this process alone."""
     seconds = math.nan
-    for count in _SAMPLES:
+    for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
         where = _together(sweep, spread(sweep, count))
         begin = time.perf_counter()
         solve_points(sweep, where)
         took = time.perf_counter() - begin
         seconds = took / len(where[0])
-        if took > _ENOUGH or len(where[0]) < count:
+        is_small = larger <= _PART * sweep.n_scenes and larger * seconds <= _LONGEST
+        if len(where[0]) < count or (took > _ENOUGH and not is_small):
             break
     return seconds
 

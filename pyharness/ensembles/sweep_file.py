@@ -1,8 +1,10 @@
 """Sweep files: TOML in, a sweep out, checked once."""
 
 import hashlib
+import itertools
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -178,7 +180,8 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
             raise InputError(f"axis {field}: the scene's body is given by {has}")
         if field in ("tilt", "azimuth") and scene.moments is None:
             raise InputError(f"axis {field}: the body is given by coefficients; it takes moments")
-        if field == "omega.magnitude" and not any(scene.omega) and "tilt" not in fields:
+        has_direction = any(name in fields for name in ("tilt", "height", "longitude"))
+        if field == "omega.magnitude" and not any(scene.omega) and not has_direction:
             raise InputError(f"axis {field}: the scene's omega is 0 and has no direction")
         if field == "lipschitz" and solver.program is None:
             raise InputError(f"axis {field} has no meaning without a program")
@@ -227,15 +230,25 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
     return [] if default is None else [default]
 
 
+def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
+    """Yield the words that meet in a scene: those along one dimension go together."""
+    words = [axis for axis in axes if axis.is_choice]
+    counts = {axis.dimension: axis.count for axis in words}
+    for at in itertools.product(*map(range, counts.values())):
+        place = dict(zip(counts, at, strict=True))
+        yield {axis.field: axis.values[place[axis.dimension]] for axis in words}
+
+
 def _check_solvers(sweep: Sweep) -> None:
     """Refuse a name that is no program, method, listing or reading, and what can't be combined."""
     solver = sweep.solver
     for program in _choices(sweep, "program", solver.program):
         if program not in PROGRAMS:
             raise unknown("program", program, PROGRAMS)
-        for listing in _choices(sweep, "listing", solver.listing):
-            for reading in _choices(sweep, "reading", solver.reading):
-                listing_of(program, listing, reading)
+    for chosen in _chosen_together(sweep.axes):
+        one = replace(solver, **chosen)
+        if one.program is not None:
+            listing_of(one.program, one.listing, one.reading)
     varied = [axis for axis in sweep.axes if axis.field == "tolerance"]
     for method in _choices(sweep, "method", solver.method):
         if method not in REGISTRY:

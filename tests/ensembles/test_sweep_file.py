@@ -29,6 +29,10 @@ MISTAKES = {
     text('[[axis]]\nfield = "body.coefficients.1"\nvalues = [0.1]'): "given by moments",
     text('[[axis]]\nfield = "listing"\nvalues = ["original"]'): "without a program",
     text('[[axis]]\nfield = "omega.1"\nvalues = [1.0]', TILT): "omega.1 beside tilt",
+    text('[[axis]]\nfield = "height"\nvalues = [1.5]'): "allowed: -1 to 1",
+    text('[[axis]]\nfield = "longitude"\nvalues = [1.0]', TILT): "tilt beside longitude",
+    text('[[axis]]\nfield = "height"\nvalues = [1.0]\n[[axis]]\nfield = "omega.1"\nvalues = [1.0]'):
+        "omega.1 beside height",
     text(TILT, TILT): "two axes vary it",
     text(
         '[[axis]]\nfield = "omega.1"\nvalues = [1.0]\ndimension = "both"',
@@ -73,6 +77,46 @@ def test_chunks_cover_the_grid_once_and_hold_one_listing(tmp_path: Path) -> None
         (held,) = {load.listing for _, load in loads(sweep, points(sweep, sweep.box(chunk)))}
         assert held is not None
     assert (count == 1).all()
+
+
+READINGS = """
+reductions = ["status"]
+[scene]
+case = 3
+[[axis]]
+field = "program"
+dimension = "reading"
+values = ["four-term", "runge-kutta"]
+[[axis]]
+field = "reading"
+dimension = "reading"
+values = ["adopted", "do-variable"]
+"""
+
+
+def test_words_along_one_dimension_go_together(tmp_path: Path) -> None:
+    """The four-term program has no DO variable: across each other, the two are refused."""
+    sweep = read_sweep(written(tmp_path, READINGS))
+    where = points(sweep, tuple(slice(0, n) for n in sweep.shape))
+    listings = [load.listing for _, load in loads(sweep, where)]
+    assert [(each.program, set(each.readings)) for each in listings if each] == [
+        ("four-term", set()),
+        ("runge-kutta", {"do-variable"}),
+    ]
+    with pytest.raises(InputError, match="four-term has no reading"):
+        read_sweep(written(tmp_path, READINGS.replace('dimension = "reading"\n', "")))
+
+
+def test_height_and_longitude_go_over_the_sphere(tmp_path: Path) -> None:
+    axes = (
+        '[[axis]]\nfield = "height"\nvalues = [-1.0, 0.6]',
+        f'[[axis]]\nfield = "longitude"\nvalues = [0.0, {np.pi / 2.0}]',
+        '[[axis]]\nfield = "omega.magnitude"\nvalues = [10.0]',
+    )
+    sweep = read_sweep(written(tmp_path, text(*axes)))
+    ((_, load),) = loads(sweep, points(sweep, tuple(slice(0, n) for n in sweep.shape)))
+    wanted = [[0.0, 0.0, -10.0], [0.0, 0.0, -10.0], [8.0, 0.0, 6.0], [0.0, 8.0, 6.0]]
+    assert np.abs(load.omega0 - wanted).max() < 1e-14
 
 
 def test_sample_reaches_the_ends_of_any_grid(tmp_path: Path) -> None:

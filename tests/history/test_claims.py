@@ -250,6 +250,7 @@ def _lab(run: Any = None, error: Any = None, truth: Any = None) -> Any:
         is_original=False,
         assumptions=Assumptions(),
         run=lambda program, case: run(case),
+        runs=lambda program, case: run(case),
         scene=lambda case: SimpleNamespace(step_size=1.0),
         error=lambda program, case: error,
         truth=lambda case: SimpleNamespace(omega=np.array(truth)),

@@ -5,12 +5,15 @@ import argparse
 from pyharness.cli import options as shared
 from pyharness.history.claims.ledger import assignments, claim, claims, judge
 from pyharness.history.claims.report import assignments_report, claims_report, explanation
+from pyharness.model.errors import InputError
 
 OPTIONS = {
     "--explain ID": "one claim, with its numbers",
     "--assignments": "which initial conditions let all claims hold",
     "--evidence": "score every combination of starts, readings, conjectures and steps",
-    **shared.outputs(plot="draw the claims that discriminate (--evidence)"),
+    "--atlas STORE": "what a sweep of claims over starts found; with --sweep",
+    "--sweep FILE.toml": "the sweep file of the store",
+    **shared.outputs(plot="draw the claims that discriminate (--evidence, --atlas)"),
 }
 
 
@@ -19,6 +22,9 @@ def run(options: argparse.Namespace) -> int:
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence"))
         shared.check_known("format", options.format, ("table", "json"))
+    if options.atlas is not None:
+        return _atlas(options)
+    shared.refuse(options, "the ledger; give --atlas", ("sweep",))
     if options.evidence:
         return _evidence(options)
     shared.refuse(options, "the ledger; give --evidence", ("plot",))
@@ -48,4 +54,29 @@ def _evidence(options: argparse.Namespace) -> int:
         found.append(combination)
         shared.progress(f"{len(found)} of {every} combinations")
     shared.show(evidence_report(found), options)
+    return 0
+
+
+def _atlas(options: argparse.Namespace) -> int:
+    from pyharness.ensembles.store import check_store, opened
+    from pyharness.ensembles.sweep_file import read_sweep
+    from pyharness.history.claims import over_starts
+    from pyharness.history.claims.atlas import atlas_of
+    from pyharness.history.claims.atlas_report import atlas_report
+
+    shared.refuse(options, "--atlas", ("explain", "assignments", "evidence"))
+    if options.sweep is None:
+        raise InputError("--atlas: give --sweep FILE.toml, the sweep file of the store")
+    shared.check_outputs(options)
+    sweep = read_sweep(options.sweep, over_starts.FUNCTIONS)
+    if not check_store(sweep, options.atlas):
+        raise InputError(f"--atlas '{options.atlas}': is not there; 'sweep' makes it")
+    axes = {axis.dimension: axis.coordinates() for axis in reversed(sweep.axes)}
+    with opened(sweep, options.atlas) as store:
+        codes = {
+            dict(asked.parameters)["id"]: store.array(asked.name)[...]
+            for asked in sweep.reductions
+            if asked.reduction == "claim"
+        }
+    shared.show(atlas_report(atlas_of(codes, {d: axes[d] for d in sweep.dimensions})), options)
     return 0

@@ -9,10 +9,11 @@ from pyharness.ensembles.executors import EXECUTORS, check_dask
 from pyharness.ensembles.run import run_sweep, said
 from pyharness.ensembles.store import check_zarr, opened
 from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
 
-# Where the array version of a claim stands, by the claim's name.
-CLAIMS: dict[str, str] = {}
+# Where the function of a claim over many starts stands, by the claim's name.
+CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {
     "file FILE.toml": "the sweep file: a scene, axes, what solves, reductions",

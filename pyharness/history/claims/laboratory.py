@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 
+from pyharness.history.claims.rules import Runs, largest_error, largest_of, spread_of
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, names_of, switches
 from pyharness.model.scene import Scene, Triple
@@ -16,8 +17,6 @@ from pyharness.original.collocation import interval
 from pyharness.original.equations import Vector, omega_rate
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
-
-COLLOCATION = ("two-term", "four-term")
 
 
 @dataclass(frozen=True)
@@ -66,12 +65,22 @@ class Laboratory:
         """Return the true solution of a case at its steps."""
         return _truth(self.scene(case))
 
+    def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
+        """Run a program on a case, for rules."""
+        run = self.run(program, case, may_stop, parts)
+        reached = run.omega[parts - 1 :: parts]
+        omega = np.full((self.assumptions.steps, 3), np.nan)
+        omega[: len(reached)] = reached
+        complete, overflow = (np.bool_(run.ended == each) for each in ("complete", "overflow"))
+        return Runs(omega, np.asarray(len(reached)), complete, overflow)
+
+    def solution(self, case: int) -> Array:
+        """Return the true omega of a case at its steps."""
+        return self.truth(case).omega
+
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
         """Return the largest error of omega (rad/s) at the steps of the case; inf on overflow."""
-        run = self.run(program, case, may_stop, parts)
-        if run.ended == "overflow":
-            return math.inf
-        return distance(run.omega[parts - 1 :: parts], self.truth(case).omega)
+        return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
         """Return omega of the collocation model of so many terms, at points k/(n+1).
@@ -111,12 +120,12 @@ def distance(first: Array, second: Array) -> float:
 
 def ranges(truth: Reference) -> Array:
     """Return how far each component moves (rad/s)."""
-    return np.asarray(np.ptp(truth.omega, axis=0))
+    return spread_of(truth.omega)
 
 
 def largest(truth: Reference) -> float:
     """Return the largest component of omega (rad/s)."""
-    return float(np.abs(truth.omega).max())
+    return float(largest_of(truth.omega))
 
 
 @cache
@@ -171,8 +180,24 @@ def by_literals(
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
-    a, b, c = np.array([each.euler_coefficients for each in scenes]).T
+    omega = np.array([each.omega for each in scenes])
+    bodies = np.array([each.euler_coefficients for each in scenes])
     torque = np.array([each.normalized_torque(0.0) for each in scenes])
+    rows = march_models(omega, bodies, torque, terms, dt, end, growth, round(steps * h / end))
+    every = round(h / end)
+    return rows[:, every - 1 :: every]
+
+
+def march_models(
+    omega: Array, coefficients: Array, torque: Array, terms: int,
+    dt: float, end: float, growth: float, steps: int,
+) -> Array:  # fmt: skip
+    """March collocation models of constant torque side by side, (n, 3), to rounding.
+
+    The points lie in (0, dt), which grows by `growth` with every step, and each step is `end` long.
+    Return omega (n, steps, 3); NaN from an overflow on.
+    """
+    a, b, c = coefficients.T
 
     def rates(x: Array) -> Array:
         u1, u2, u3 = x.T
@@ -181,18 +206,16 @@ def by_literals(
 
     inside = np.arange(1, terms + 1) / (terms + 1)
     powers = np.arange(1, terms + 1)
-    state = np.array([each.omega for each in scenes])
-    rows = [state]
+    found: Array = np.empty((len(omega), steps, 3))
+    state = omega
     with np.errstate(all="ignore"):
-        for _ in range(round(steps * h / end)):
+        for step in range(steps):
             first = rates(state)
             points = dt * inside
             at_points = np.array([rates(state + t * first) for t in points])
             matrix = powers * points[:, None] ** (powers - 1)
             weights = end**powers @ np.linalg.inv(matrix)
             state = state + np.tensordot(weights, at_points, 1)
-            rows.append(state)
+            found[:, step] = state
             dt += growth
-    every = round(h / end)
-    found: Array = np.array(rows)[every::every].swapaxes(0, 1)
     return found

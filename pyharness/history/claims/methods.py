@@ -5,20 +5,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import (
-    COLLOCATION,
     LITERALS,
     Laboratory,
     by_literals,
     distance,
     largest,
 )
+from pyharness.history.claims.rules import COLLOCATION
 from pyharness.history.claims.verdicts import (
     FALSE,
     NOT_TESTABLE,
     UNDECIDED,
     Judged,
     graded,
+    judged,
 )
 from pyharness.history.family.members import WEIGHTINGS, Member, run
 from pyharness.model.facts import facts
@@ -114,20 +116,11 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Measure what a tenth of the step gains the collocation programs."""
-    numbers, improved, excepted = {}, [], False
-    for program in COLLOCATION:
-        for case in cases:
-            before, after = lab.error(program, case), lab.error(program, case, parts=10)
-            gain = before / after if math.isfinite(before) else float(math.isfinite(after))
-            numbers[f"{program}, case {case}: gain"] = gain
-            if (program, case) == ("two-term", exception):
-                excepted = gain < 2.0
-            else:
-                improved.append(gain >= 2.0)
-    share = sum(improved) / len(improved)
+    found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
-        numbers |= _by_literals(lab, [case for case in cases if not lab.scene(case).torque.varies])
-    return graded(numbers, share >= 0.8 and excepted, share >= 0.5)
+        constant = [case for case in cases if not lab.scene(case).torque.varies]
+        found.numbers.update(_by_literals(lab, constant))
+    return found
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
@@ -149,12 +142,7 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Measure what a tenth of the step gains the Runge-Kutta program, without its stop test."""
-    numbers = {}
-    for case in cases:
-        before, after = (lab.error("runge-kutta", case, False, parts) for parts in (1, 10))
-        numbers[f"case {case}: gain"] = before / after
-    better = sum(gain >= 2.0 for gain in numbers.values())
-    return graded(numbers, better == 0, 3 * better <= len(numbers))
+    return judged(rules.small_step_runge_kutta(lab, cases))
 
 
 def suffices(

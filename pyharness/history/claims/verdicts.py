@@ -11,20 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.history.claims.laboratory import (
-    COLLOCATION,
-    Laboratory,
-    distance,
-    largest,
-    ranges,
-    starts,
-)
-from pyharness.model.listing import PROGRAMS, Listing, names_of, original
+from pyharness.history.claims import rules
+from pyharness.history.claims.laboratory import Laboratory, distance, largest, ranges, starts
+from pyharness.history.claims.rules import COLLOCATION
+from pyharness.model.listing import Listing, names_of, original
 from pyharness.model.scene import Triple
-from pyharness.model.trajectory import Trajectory
 from pyharness.original.cells import subsets
 from pyharness.original.programs import run_program
-from pyharness.truth.reference import Reference
 
 REPRODUCED = "reproduced"
 IN_PART = "reproduced in part"
@@ -49,6 +42,12 @@ def graded(
     return Judged(REPRODUCED if whole else IN_PART if part else otherwise, numbers)
 
 
+def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
+    """Return the verdict of a rule on one start."""
+    numbers = {name: float(each) for name, each in grade.numbers.items()}
+    return graded(numbers, bool(grade.whole), bool(grade.part), otherwise)
+
+
 def constant_solution(lab: Laboratory, case: int) -> Judged:
     """Measure how far the solution moves."""
     moved = float(ranges(lab.truth(case)).max())
@@ -68,19 +67,17 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
     """Measure how far the third component moves."""
-    moved = float(ranges(lab.truth(case))[2])
-    return graded({"range of omega3 (rad/s)": moved}, moved > limit, otherwise=FALSE)
+    return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Hold all programs against the known solution, at the precision of the page."""
-    numbers = {f"{name}: largest error (rad/s)": lab.error(name, case) for name in PROGRAMS}
-    close = max(numbers.values()) < limit
+    found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
         other = replace(lab, assumptions=replace(lab.assumptions, start=start))
         steps = other.run("runge-kutta", case).steps
-        numbers[f"runge-kutta from ({_shown(start)}): steps that it ran"] = float(steps)
-    return graded(numbers, close)
+        found.numbers[f"runge-kutta from ({_shown(start)}): steps that it ran"] = float(steps)
+    return found
 
 
 def _shown(start: Triple) -> str:
@@ -91,7 +88,8 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
     """Hold collocation against the known solution, on the scale of the graph."""
     numbers = {}
     for program in COLLOCATION:
-        error = _share_of_range(lab.run(program, case), lab.truth(case))
+        runs, truth = lab.runs(program, case), lab.solution(case)
+        error = float(rules.share_of_range(runs.omega, truth))
         numbers[f"{program}: largest share of a component's range"] = error
     return graded(numbers, max(numbers.values()) <= share)
 
@@ -163,30 +161,12 @@ def no_error(lab: Laboratory, case: int) -> Judged:
 
 def concur(lab: Laboratory, case: int, share: float) -> Judged:
     """Hold the two collocation programs against one another."""
-    truth = lab.truth(case)
-    two, four = (lab.run(program, case) for program in COLLOCATION)
-    n = min(two.steps, four.steps)
-    apart = np.abs(two.omega[:n] - four.omega[:n]).max(axis=0)
-    complete = two.ended == four.ended == "complete"
-    spread = np.maximum(ranges(truth), 1e-12 * largest(truth))
-    whole = float(apart.max()) / largest(truth) if complete else math.inf
-    detail = float((apart / spread).max()) if complete else math.inf
-    numbers = {
-        "difference over the largest omega": whole,
-        "difference over the range of a component": detail,
-        "two-term error (rad/s)": lab.error("two-term", case),
-        "four-term error (rad/s)": lab.error("four-term", case),
-    }
-    return graded(numbers, whole <= share and detail <= 0.1, whole <= share)
+    return judged(rules.concur(lab, case, share))
 
 
 def fails(lab: Laboratory, case: int, share: float) -> Judged:
     """See how the Runge-Kutta program ended, and how far from the truth."""
-    run = lab.run("runge-kutta", case)
-    error = _share_of_range(run, lab.truth(case))
-    ended, far = run.ended != "complete", error > share
-    numbers = {"steps": float(run.steps), "error over the range of a component": error}
-    return graded(numbers, ended and far, ended or far)
+    return judged(rules.fails(lab, case, share))
 
 
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
@@ -204,9 +184,7 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 
 def diverged(lab: Laboratory, case: int) -> Judged:
     """See whether the two-term run left its bounds."""
-    run, error = lab.run("two-term", case), lab.error("two-term", case)
-    numbers = {"steps": float(run.steps), "largest error (rad/s)": error}
-    return graded(numbers, run.ended == "overflow" or error > largest(lab.truth(case)))
+    return judged(rules.diverged(lab, case))
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
@@ -222,29 +200,9 @@ def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
 
 def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]) -> Judged:
     """Hold models of several numbers of terms against one another."""
-    first, *others = terms
-    model = lab.models(case, first)
-    numbers = {}
-    for n in others:
-        apart = distance(lab.models(case, n), model) / largest(lab.truth(case))
-        numbers[f"{n} terms against {first}, over the largest omega"] = apart
-    return graded(numbers, max(numbers.values()) <= share)
+    return judged(rules.models_concur(lab, case, share, terms))
 
 
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
     """Measure the largest angular acceleration of the four-term run, case by case."""
-    rates = {}
-    for each in range(1, 8):
-        steps = np.diff(lab.run("four-term", each).omega, axis=0) / lab.scene(each).step_size
-        rates[each] = float(np.linalg.norm(steps, axis=1).max())
-    others = max(rate for each, rate in rates.items() if each != case)
-    numbers = {f"case {each}: largest acceleration (rad/s2)": rate for each, rate in rates.items()}
-    return graded(numbers, rates[case] >= factor * others)
-
-
-def _share_of_range(run: Trajectory, truth: Reference) -> float:
-    """Return the largest error of a component that moves, over its range."""
-    spread = ranges(truth)
-    moving = spread > 1e-12 * largest(truth)
-    errors = np.abs(run.omega - truth.omega[: run.steps]).max(axis=0, initial=0.0)
-    return float((errors[moving] / spread[moving]).max(initial=0.0))
+    return judged(rules.dynamic(lab, case, factor))

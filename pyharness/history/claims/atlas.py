@@ -1,0 +1,134 @@
+"""The atlas of history: over starts all over the sphere, which claims of the thesis hold where.
+
+Verdicts count as in the evidence: 1 for reproduced, 1/2 in part, 0 otherwise, and no weights.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.history.claims.evidence import POINTS
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
+from pyharness.history.claims.ledger import claim
+from pyharness.history.claims.over_starts import (
+    FAILS,
+    HOLDS,
+    IN_PART,
+    Starts,
+    judged,
+)
+from pyharness.history.claims.verdicts import IN_PART as PARTLY
+from pyharness.history.claims.verdicts import REPRODUCED
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Triple
+from pyharness.model.trajectory import Array
+
+WHERE = ("omega.magnitude", "height", "longitude")
+CHOSEN = ("reading", "steps")
+_CODES = (FAILS, HOLDS, IN_PART)
+_POINTS = {HOLDS: POINTS[REPRODUCED], IN_PART: POINTS[PARTLY]}
+Codes = NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """What a sweep found: codes of each claim over reading, steps, magnitude, height, longitude."""
+
+    codes: Mapping[str, Codes]
+    readings: Sequence[str]
+    steps: Sequence[int]
+    magnitudes: Array
+    heights: Array
+    longitudes: Array
+
+    @property
+    def n_starts(self) -> int:
+        """How many starts there are, of any reading and steps."""
+        return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
+
+    def choices(self) -> list[tuple[str, int]]:
+        """Return all readings with all steps, in the order of the arrays."""
+        return list(product(self.readings, self.steps))
+
+    def score(self, reading: int = 0, steps: int = 0) -> Array:
+        """Return the points of all claims (magnitude, height, longitude)."""
+        return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
+
+    def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
+        """Return from where every claim is reproduced, at least in part."""
+        held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
+        return np.asarray(np.all(held, axis=0))
+
+    def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
+        """Return omega(0) at a place of the grid (rad/s)."""
+        size, height = self.magnitudes[at[0]], self.heights[at[1]]
+        across, longitude = np.sqrt(1.0 - height * height), self.longitudes[at[2]]
+        found = size * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
+        return (float(found[0]), float(found[1]), float(found[2]))
+
+
+def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
+    """Return the atlas of a sweep's claims; `axes` are its dimensions with their values, in order.
+
+    InputError where they are not those of an atlas.
+    """
+    if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
+        allowed = ", ".join((*CHOSEN, *WHERE))
+        raise InputError(f"--atlas: the sweep must be of claims, along {allowed}")
+    if any((each < 0).any() for each in codes.values()):
+        raise InputError("--atlas: the store lacks chunks; let 'sweep' go on with it first")
+    return Atlas(
+        codes,
+        [str(each) for each in axes["reading"]],
+        [int(each) for each in axes["steps"]],
+        *(axes[name] for name in WHERE),
+    )
+
+
+def sum_of_points(codes: Sequence[Codes]) -> Array:
+    """Return the points that verdicts add up to."""
+    values = np.zeros(len(_CODES) + 1)
+    for code, points in _POINTS.items():
+        values[code] = points
+    return np.asarray(sum(values[each] for each in codes))
+
+
+def shares(codes: Codes) -> tuple[float, float, float]:
+    """Return the shares of starts where a claim is reproduced, in part, and not."""
+    whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
+    return whole, part, not_at_all
+
+
+def bits(codes: Codes) -> float:
+    """Return how much the verdict tells of the start, on average: its entropy.
+
+    0 where it is the same from every start, 1 where it halves them.
+    """
+    parts = np.array([(codes == code).mean() for code in _CODES])
+    parts = parts[parts > 0.0]
+    return float(-(parts * np.log2(parts)).sum()) + 0.0
+
+
+def about(names: Sequence[str]) -> dict[int, list[str]]:
+    """Return the claims about one case each, by the case."""
+    found: dict[int, list[str]] = {}
+    for name in names:
+        case = claim(name)["parameters"].get("case")
+        if case is not None:
+            found.setdefault(case, []).append(name)
+    return found
+
+
+def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
+    """Return the codes of claims from the starts that the thesis shows, and from ours."""
+    given = starts()
+    bench = Starts(Laboratory(True, Assumptions()), np.array(given))
+    found = {name: judged(claim(name), bench, len(given)) for name in names}
+    return {
+        start: {name: int(codes[k]) for name, codes in found.items()}
+        for k, start in enumerate(given)
+    }

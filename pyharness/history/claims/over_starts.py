@@ -1,0 +1,228 @@
+"""Claims over many starts at once: the rules of the ledger on a bench of arrays.
+
+A sweep gives the starts, the listing, the readings and the steps; one start stands for all cases
+in which the thesis gives none. `getattr` of this module, by the name of a claim in `JUDGED`, is the
+function that a sweep calls.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, lru_cache, partial
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.history.claims import rules
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, march_models
+from pyharness.history.claims.ledger import claim, claims
+from pyharness.history.claims.rules import Runs
+from pyharness.methods.many import solve_many
+from pyharness.model.codes import Statuses
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array
+from pyharness.original.many import run_many
+
+FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
+_EFFORT = 1e9  # of a sweep, whose time was told before
+
+
+class Starts:
+    """A bench of n starts, where the case's is not given; the listing and the rest as one's.
+
+    The solution is marched from row to row by the series, each to 1e-12.
+    """
+
+    def __init__(self, one: Laboratory, omega0: Array) -> None:
+        """Run nothing yet."""
+        self._one, self._omega0 = one, omega0
+        self._solution = cache(self._marched)
+        self._error = cache(partial(rules.largest_error, self))
+        self._kept = cache(self._run)
+        self._models = cache(self._modelled)
+
+    def scene(self, case: int, parts: int = 1) -> Scene:
+        """Return a case; its own start stands for those of the bench."""
+        return self._one.scene(case, parts)
+
+    def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
+        """Run a program on a case; (n, steps, 3), or (steps, 3) where the start is given."""
+        # Runs of smaller steps are asked for once, for their error, which is kept.
+        return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
+
+    def solution(self, case: int) -> Array:
+        """Return the true omega of a case at its steps, with shapes as of `runs`."""
+        return self._solution(case)
+
+    def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
+        """Return the largest errors (rad/s) at the steps of the case; inf on overflow."""
+        return self._error(program, case, may_stop, parts)
+
+    def models(self, case: int, terms: int) -> Array:
+        """Return omega of the collocation models, in arithmetic that is theirs to rounding."""
+        return self._models(case, terms)
+
+    def _starts(self, case: int) -> Array:
+        is_open = case in facts("claims")["assumed"]["cases"]
+        return self._omega0 if is_open else np.array([self.scene(case).omega])
+
+    def _shaped(self, case: int, array: NDArray[Any]) -> NDArray[Any]:
+        return array if case in facts("claims")["assumed"]["cases"] else array[0]
+
+    def _run(self, program: str, case: int, may_stop: bool, parts: int) -> Runs:
+        scene = self.scene(case, parts)
+        found = run_many(
+            scene,
+            self._one.listing(program),
+            omega0=self._starts(case),
+            may_stop=may_stop,
+            at=range(parts, scene.steps + 1, parts),
+            effort=_EFFORT,
+        )
+        return Runs(
+            self._shaped(case, found.omega),
+            self._shaped(case, found.n_rows // parts),
+            self._shaped(case, found.status == Statuses.COMPLETE),
+            self._shaped(case, found.status == Statuses.OVERFLOW),
+        )
+
+    def _marched(self, case: int) -> Array:
+        scene, state = self.scene(case), self._starts(case)
+        rows = np.empty((len(state), scene.steps, 3))
+        for step in range(scene.steps):
+            later = replace(scene, torque=_later(scene.torque, step * scene.step_size))
+            state = solve_many(later, scene.step_size, omega0=state, effort=_EFFORT).omega
+            rows[:, step] = state
+        return self._shaped(case, rows)
+
+    def _modelled(self, case: int, terms: int) -> Array:
+        scene, omega0 = self.scene(case), self._starts(case)
+        assert not scene.torque.varies
+        h = scene.step_size
+        growth = h if self._one.is_original and "dt-accumulates" not in self._one.fixed else 0.0
+        bodies, torque = np.array(scene.euler_coefficients), np.array(scene.normalized_torque(0.0))
+        rows = march_models(omega0, bodies, torque, terms, h, h, growth, scene.steps)
+        return self._shaped(case, rows)
+
+
+def _later(law: TorqueLaw, time: float) -> TorqueLaw:
+    """Return a torque law that begins at a later time (s)."""
+    sines, cosines = [], []
+    for amplitude, frequency in law.sines:
+        sines.append((np.cos(frequency * time) * np.array(amplitude), frequency))
+        cosines.append((np.sin(frequency * time) * np.array(amplitude), frequency))
+    for amplitude, frequency in law.cosines:
+        cosines.append((np.cos(frequency * time) * np.array(amplitude), frequency))
+        sines.append((-np.sin(frequency * time) * np.array(amplitude), frequency))
+    constant = np.array(law.constant) + time * np.array(law.rate)
+    return TorqueLaw(constant, law.rate, sines, cosines)
+
+
+class Chosen(Protocol):
+    """What solves the scenes of a sweep."""
+
+    @property
+    def lipschitz(self) -> float:
+        """Constant of the stop test, 1/s."""
+
+    @property
+    def may_stop(self) -> bool:
+        """Whether it may end runs."""
+
+
+class Load(Protocol):
+    """Scenes of a sweep; an array is None where the scene says it for all."""
+
+    @property
+    def scene(self) -> Scene:
+        """What they have in common."""
+
+    @property
+    def listing(self) -> Listing | None:
+        """Of a program; None for a method."""
+
+    @property
+    def solver(self) -> Chosen:
+        """How it runs."""
+
+    moments: Array | None
+    coefficients: Array | None
+    torque_constant: Array | None
+    torque_rate: Array | None
+
+
+class Solved(Protocol):
+    """What a sweep hands over: n scenes."""
+
+    load: Any
+    omega0: Array
+
+    def __hash__(self) -> int:
+        """Tell one from another."""
+
+
+JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))
+"""The claims that have a rule over starts."""
+FUNCTIONS = {name: f"{__name__}:{name}" for name in JUDGED}
+"""Where the function of each stands, for a sweep."""
+
+
+def __getattr__(name: str) -> Callable[[Solved], NDArray[np.int8]]:
+    if name not in JUDGED:
+        raise AttributeError(name)
+    return partial(codes, name)
+
+
+def codes(identity: str, solved: Solved) -> NDArray[np.int8]:
+    """Return for each start of a sweep whether a claim holds of the programs.
+
+    Silent where the sweep is of no case of Table 1, or varies more of it than starts, readings and
+    steps. Of the case a claim is about nothing is asked: it is the claim's own.
+    """
+    load: Load = solved.load
+    entry = claim(identity)
+    chosen = Assumptions(readings=frozenset(load.listing.readings if load.listing else ()))
+    if "steps" in entry["assumptions"]:
+        chosen = replace(chosen, steps=load.scene.steps)
+    one = _laboratory(load, chosen)
+    if one is None:
+        return np.full(len(solved.omega0), SILENT, np.int8)
+    return judged(entry, _bench(one, solved), len(solved.omega0))
+
+
+def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
+    """Return the codes of a claim over the n starts of a bench."""
+    grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
+    found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
+    return np.broadcast_to(found, (n,)).astype(np.int8)
+
+
+@lru_cache(maxsize=2)
+def _bench(one: Laboratory, solved: Solved) -> Starts:
+    # Two: of the steps asked for, and of those of claims that do not hang on them.
+    return Starts(one, solved.omega0)
+
+
+def _laboratory(load: Load, assumptions: Assumptions) -> Laboratory | None:
+    """Return where claims about a sweep are tested; None where they say nothing of it."""
+    varied = (load.moments, load.coefficients, load.torque_constant, load.torque_rate)
+    if load.listing is None or any(each is not None for each in varied):
+        return None
+    deck = facts("cases")["deck"]
+    if load.solver.lipschitz != deck["lipschitz"] or not load.solver.may_stop:
+        return None
+    about = [_without_start(case_scene(case)) for case in range(1, 8)]
+    if _without_start(load.scene) not in about:
+        return None
+    for is_original in (True, False):
+        one = Laboratory(is_original, assumptions)
+        if one.listing(load.listing.program) == load.listing:
+            return one
+    return None
+
+
+def _without_start(scene: Scene) -> tuple[Any, ...]:
+    return scene.moments, scene.torque, scene.step_size

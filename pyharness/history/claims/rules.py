@@ -1,0 +1,212 @@
+"""Rules of claims that hang on starts: of one start, or of many side by side.
+
+A bench gives runs and solutions: `Laboratory` those of one start, `Starts` those of many. Their
+arrays end in (steps, 3), and what stands before that is the starts' shape: () or (n,). A rule gives
+numbers of this shape, and where they reproduce the claim as a whole, or in part.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+COLLOCATION = ("two-term", "four-term")
+Flags = NDArray[np.bool_]
+
+
+class Runs(NamedTuple):
+    """Runs of a program: omega (..., steps, 3) is NaN where a run has no row.
+
+    `steps` is how many rows it has.
+    """
+
+    omega: Array
+    steps: NDArray[Any]
+    complete: Flags | np.bool_
+    overflow: Flags | np.bool_
+
+
+class Grade(NamedTuple):
+    """What a rule found: its numbers, where the claim is reproduced, and where in part."""
+
+    numbers: Mapping[str, Any]
+    whole: Any
+    part: Any = False
+
+
+class Bench(Protocol):
+    """What rules ask for; `parts` makes steps so much smaller, and keeps the rows of the case."""
+
+    def scene(self, case: int, parts: int = 1) -> Scene:
+        """Return a case; its own start stands for those of the bench."""
+
+    def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
+        """Run a program on a case."""
+
+    def solution(self, case: int) -> Array:
+        """Return the true omega of a case at its steps."""
+
+    def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
+        """Return what `largest_error` finds."""
+
+    def models(self, case: int, terms: int) -> Array:
+        """Return omega of the collocation model of so many terms; NaN from an overflow on."""
+
+
+def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
+    """Measure how far the third component moves."""
+    moved = spread_of(bench.solution(case))[..., 2]
+    return Grade({"range of omega3 (rad/s)": moved}, moved > limit)
+
+
+def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
+    """Hold all programs against the known solution, at the precision of the page."""
+    numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
+    return Grade(numbers, _most(numbers) < limit)
+
+
+def concur(bench: Bench, case: int, share: float) -> Grade:
+    """Hold the two collocation programs against one another."""
+    truth = bench.solution(case)
+    two, four = (bench.runs(program, case) for program in COLLOCATION)
+    apart = _farthest(two.omega, four.omega)
+    complete = two.complete & four.complete
+    largest = largest_of(truth)
+    spread = np.maximum(spread_of(truth), 1e-12 * largest[..., None])
+    whole = np.where(complete, apart.max(axis=-1) / largest, np.inf)
+    detail = np.where(complete, (apart / spread).max(axis=-1), np.inf)
+    numbers = {
+        "difference over the largest omega": whole,
+        "difference over the range of a component": detail,
+        "two-term error (rad/s)": bench.error("two-term", case),
+        "four-term error (rad/s)": bench.error("four-term", case),
+    }
+    return Grade(numbers, (whole <= share) & (detail <= 0.1), whole <= share)
+
+
+def fails(bench: Bench, case: int, share: float) -> Grade:
+    """See how the Runge-Kutta program ended, and how far from the truth."""
+    runs = bench.runs("runge-kutta", case)
+    error = share_of_range(runs.omega, bench.solution(case))
+    ended, far = ~runs.complete, error > share
+    numbers = {"steps": runs.steps, "error over the range of a component": error}
+    return Grade(numbers, ended & far, ended | far)
+
+
+def diverged(bench: Bench, case: int) -> Grade:
+    """See whether the two-term run left its bounds."""
+    runs, error = bench.runs("two-term", case), bench.error("two-term", case)
+    numbers = {"steps": runs.steps, "largest error (rad/s)": error}
+    return Grade(numbers, runs.overflow | (error > largest_of(bench.solution(case))))
+
+
+def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
+    """Hold models of several numbers of terms against one another."""
+    first, *others = terms
+    model, largest = bench.models(case, first), largest_of(bench.solution(case))
+    numbers = {}
+    for n in others:
+        other = bench.models(case, n)
+        # What overflowed concurs with nothing.
+        lost = ~(np.isfinite(other) & np.isfinite(model)).all(axis=(-1, -2))
+        apart = np.where(lost, np.inf, _farthest(other, model).max(axis=-1)) / largest
+        numbers[f"{n} terms against {first}, over the largest omega"] = apart
+    return Grade(numbers, _most(numbers) <= share)
+
+
+def dynamic(bench: Bench, case: int, factor: float) -> Grade:
+    """Measure the largest angular acceleration of the four-term run, case by case."""
+    rates = {}
+    for each in range(1, 8):
+        omega = bench.runs("four-term", each).omega
+        with np.errstate(all="ignore"):
+            changes = np.diff(omega, axis=-2) / bench.scene(each).step_size
+            lengths = np.linalg.norm(changes, axis=-1)
+        rates[each] = np.fmax.reduce(lengths, axis=-1, initial=0.0)
+    others = _most({each: rate for each, rate in rates.items() if each != case})
+    numbers = {f"case {each}: largest acceleration (rad/s2)": rate for each, rate in rates.items()}
+    return Grade(numbers, rates[case] >= factor * others)
+
+
+def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
+    """Measure what a tenth of the step gains the collocation programs."""
+    numbers, improved, excepted = {}, [], np.False_
+    for program in COLLOCATION:
+        for case in cases:
+            before = np.asarray(bench.error(program, case))
+            after = np.asarray(bench.error(program, case, parts=10))
+            with np.errstate(all="ignore"):
+                gain = np.where(np.isfinite(before), before / after, np.isfinite(after))
+            numbers[f"{program}, case {case}: gain"] = gain
+            if (program, case) == ("two-term", exception):
+                excepted = gain < 2.0
+            else:
+                improved.append(gain >= 2.0)
+    share = sum(each.astype(float) for each in improved) / len(improved)
+    return Grade(numbers, (share >= 0.8) & excepted, share >= 0.5)
+
+
+def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
+    """Measure what a tenth of the step gains the Runge-Kutta program, without its stop test."""
+    numbers = {}
+    for case in cases:
+        before, after = (
+            np.asarray(bench.error("runge-kutta", case, False, parts)) for parts in (1, 10)
+        )
+        with np.errstate(all="ignore"):
+            numbers[f"case {case}: gain"] = before / after
+    better = sum((gain >= 2.0).astype(int) for gain in numbers.values())
+    return Grade(numbers, better == 0, 3 * better <= len(numbers))
+
+
+def largest_error(
+    bench: Bench, program: str, case: int, may_stop: bool = True, parts: int = 1
+) -> Array:
+    """Return the largest error of omega (rad/s) at the steps of the case; inf on overflow."""
+    runs = bench.runs(program, case, may_stop, parts)
+    error = _farthest(runs.omega, bench.solution(case)).max(axis=-1)
+    return np.where(runs.overflow, np.inf, error)
+
+
+def share_of_range(omega: Array, truth: Array) -> Array:
+    """Return the largest error of a component that moves, over its range."""
+    spread = spread_of(truth)
+    moving = spread > 1e-12 * largest_of(truth)[..., None]
+    with np.errstate(all="ignore"):
+        shares = np.where(moving, _farthest(omega, truth) / spread, 0.0)
+    return np.asarray(shares.max(axis=-1))
+
+
+def spread_of(omega: Array) -> Array:
+    """Return how far each component moves (rad/s), (..., 3)."""
+    return np.moveaxis(np.ptp(_by_component(omega), axis=-1), 0, -1)
+
+
+def largest_of(omega: Array) -> Array:
+    """Return the largest component of omega (rad/s), (...)."""
+    return np.asarray(np.abs(omega).max(axis=(-1, -2)))
+
+
+def _farthest(first: Array, second: Array) -> Array:
+    """Return the largest difference of each component at the rows that both have, (..., 3)."""
+    with np.errstate(all="ignore"):
+        apart = _by_component(first - second)
+        np.abs(apart, out=apart)
+        return np.moveaxis(np.fmax.reduce(apart, axis=-1, initial=0.0), 0, -1)
+
+
+def _by_component(omega: Array) -> Array:
+    """Return (3, ..., steps), in whose rows NumPy is ten times as fast."""
+    return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
+
+
+def _most(numbers: Mapping[Any, Any]) -> Any:
+    first, *others = numbers.values()
+    for other in others:
+        first = np.maximum(first, other)
+    return first

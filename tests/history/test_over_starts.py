@@ -1,0 +1,111 @@
+"""Claims over many starts have the verdicts of the ledger, start by start."""
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness.history.claims import over_starts
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
+from pyharness.history.claims.ledger import claim, outcome
+from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, JUDGED, SILENT
+from pyharness.history.claims.verdicts import IN_PART as PARTLY
+from pyharness.history.claims.verdicts import REPRODUCED
+from pyharness.model.listing import corrected, original, subset
+from pyharness.model.scene import Triple
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array
+
+pytestmark = pytest.mark.claims
+CODES = {REPRODUCED: HOLDS, PARTLY: IN_PART}
+
+
+def _random(n: int) -> list[Triple]:
+    source = np.random.default_rng(1982)
+    omega = source.normal(size=(n, 3)) * 10.0 ** source.uniform(-1.0, 1.5, (n, 1))
+    return [(float(a), float(b), float(c)) for a, b, c in omega]
+
+
+STARTS = [*starts(), *_random(20)]
+
+
+@dataclass(eq=False)
+class _Solved:
+    """What a sweep hands over."""
+
+    load: Any
+    omega0: Array
+
+
+def _solved(omega0: list[Triple] | Array, listing: Any, steps: int = 100, **more: Any) -> Any:
+    nothing = dict.fromkeys(["moments", "coefficients", "torque_constant", "torque_rate"])
+    solver = SimpleNamespace(lipschitz=500.0, may_stop=True)
+    scene = replace(case_scene(4), steps=steps)
+    load = {"scene": scene, "listing": listing, "solver": solver, **nothing, **more}
+    return _Solved(SimpleNamespace(**load), np.array(omega0))
+
+
+def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[int]:
+    """Return the ledger's verdicts."""
+    found = []
+    for start in omega0:
+        one = replace(laboratory, assumptions=replace(laboratory.assumptions, start=start))
+        found.append(CODES.get(outcome(claim(identity), one).verdict, FAILS))
+    return found
+
+
+def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
+    assert len(JUDGED) == 12
+    for identity in JUDGED:
+        assert "omega0" in claim(identity)["assumptions"]
+        assert claim(identity)["where"].startswith("V.")
+
+
+@pytest.mark.parametrize("identity", JUDGED)
+def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
+    few = STARTS[:13] if identity.startswith("v3") else STARTS
+    solved = _solved(few, original("two-term"))
+    found = getattr(over_starts, identity)(solved)
+    assert found.dtype == np.int8
+    assert found.tolist() == _codes(identity, Laboratory(True), few)
+
+
+@pytest.mark.parametrize("identity", [each for each in JUDGED if each.startswith("v2")])
+def test_verdicts_are_those_of_the_ledger_elsewhere(identity: str) -> None:
+    """Corrected, with another reading, over more steps; a few starts of each."""
+    few = STARTS[:6]
+    for program, reading in (("runge-kutta", "do-variable"), ("two-term", "c1-for-c")):
+        listing = subset(program, "original", readings=[reading])
+        found = over_starts.codes(identity, _solved(few, listing))
+        chosen = Assumptions(readings=frozenset([reading]))
+        assert found.tolist() == _codes(identity, Laboratory(True, chosen), few)
+    found = over_starts.codes(identity, _solved(few, corrected("four-term")))
+    assert found.tolist() == _codes(identity, Laboratory(False), few)
+    steps = 200 if "steps" in claim(identity)["assumptions"] else 100
+    found = over_starts.codes(identity, _solved(few, original("four-term"), 200))
+    assert found.tolist() == _codes(identity, Laboratory(True, Assumptions(steps=steps)), few)
+
+
+def test_silent_of_what_the_thesis_does_not_speak_of() -> None:
+    listing = original("runge-kutta")
+    others = [
+        _solved(STARTS, listing, moments=np.ones((len(STARTS), 3))),
+        _solved(STARTS, listing, scene=replace(case_scene(4), step_size=0.02)),
+        _solved(STARTS, listing, solver=SimpleNamespace(lipschitz=600.0, may_stop=True)),
+        _solved(STARTS, subset("runge-kutta", fix=["stage-base"])),
+        _solved(STARTS, None),
+    ]
+    for other in others:
+        assert (over_starts.codes("v2-case-4-fails", other) == SILENT).all()
+
+
+def test_solutions_are_those_of_the_reference() -> None:
+    one = Laboratory(True)
+    found = over_starts.Starts(one, np.array([one.scene(1).omega]))
+    for case in (1, 7):
+        bench = over_starts.Starts(one, np.array([one.scene(case).omega]))
+        assert np.abs(bench.solution(case)[0] - one.solution(case)).max() < 1e-11
+    assert found.solution(5).shape == (100, 3)
+    assert np.abs(found.solution(5) - one.solution(5)).max() < 1e-11

@@ -220,9 +220,8 @@ contains
       if (.not. (abs(r%w(i, 1)) + abs(r%w(i, 2)) + abs(r%w(i, 3)) <= FAR &
                  .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
       if (.not. (abs(r%rest(i)) <= FAR .and. abs(r%rest(i)) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
-    if (.not. sum(abs(r%a(i, :))) + sum(abs(r%constant(i, :))) + sum(abs(r%rate(i, :))) <= FAR) then
-        r%fits(i) = -1.0_dp
-      end if
+      if (.not. sum(abs(r%a(i, :))) + sum(abs(r%constant(i, :))) <= FAR) r%fits(i) = -1.0_dp
+      if (.not. sum(abs(r%rate(i, :))) <= FAR) r%fits(i) = -1.0_dp
       if (.not. abs(r%a(i, 1)) <= FAR) r%fits(i) = -1.0_dp
     end do
     turned = 0.0_dp

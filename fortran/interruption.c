@@ -23,8 +23,17 @@ static int may_be_main_thread(void)
 #endif
 }
 
+/* What a thread that is not Python's main one looks at instead: the one that waits for it sets it. */
+static _Thread_local const volatile int *given_up;
+
+/* Let this thread look at a number, which is not 0 when its work is not wanted any more; or, given
+   nothing, at none. */
+void watch(const int *number) { given_up = number; }
+
 int interrupt_raised(void)
 {
+  if (given_up != NULL && *given_up != 0)
+    return 1;
   if (!may_be_main_thread() || !Py_IsInitialized())
     return 0;
   PyGILState_STATE held = PyGILState_Ensure();

@@ -1,8 +1,9 @@
 module many_bodies
   !! Many bodies in one call: side by side where that will do, and each by itself what is left.
-  use, intrinsic :: iso_c_binding, only: c_loc
+  use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: bodies_t, has_torque, i1, LEFT, of_body, single_of
+  use interruption, only: watch
   use kinds, only: dp
   use levels, only: many_fixed, many_free, many_taylor
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, QUICK_OR_TAYLOR, RK4, &
@@ -70,6 +71,7 @@ contains
     raised = 0
     if (bodies%n == 0) return
     with_torque = has_torque(bodies)
+    call watch(c_loc(bodies%given_up))
     ! A body alone takes less time by itself.
     if (size(attitude0) > 0 .or. bodies%n == 1) then
       status = LEFT
@@ -82,14 +84,15 @@ contains
     else
       status = LEFT
     end if
-    if (raised /= 0) return
-    if (.not. any(status == LEFT)) return
-    if (size(attitude0) > 0) then
+    if (raised /= 0 .or. .not. any(status == LEFT)) then
+      continue
+    else if (size(attitude0) > 0) then
       call solve_left_with_attitude(bodies, code, with_torque, effort_, attitude0, omega, &
                                     attitude, status, raised)
     else
       call solve_left(bodies, code, with_torque, effort_, packed, omega, status, raised)
     end if
+    call watch(c_null_ptr)
   end subroutine solve_bodies
 
   subroutine solve_left(bodies, code, with_torque, effort_, packed, omega, status, raised)
@@ -126,7 +129,7 @@ contains
                             steps, found)
       end if
       status(i) = int(ended, i1)
-      if (ended == INTERRUPTED .or. bodies%given_up /= 0) raised = 1
+      if (ended == INTERRUPTED) raised = 1
       if (raised /= 0) return
     end do
   end subroutine solve_left
@@ -165,7 +168,7 @@ contains
       omega(:, i) = state(:3)
       attitude(:, i) = state(4:)
       status(i) = int(ended, i1)
-      if (ended == INTERRUPTED .or. bodies%given_up /= 0) raised = 1
+      if (ended == INTERRUPTED) raised = 1
       if (raised /= 0) return
     end do
   end subroutine solve_left_with_attitude

@@ -78,7 +78,7 @@ contains
         call advance(method, m, piece, s)
         left_over = left_over - piece
         if (piece == BETWEEN_LOOKS) then
-          interrupted = merge(1, 0, interrupt_raised() /= 0 .or. bodies%given_up /= 0)
+          interrupted = merge(1, 0, interrupt_raised() /= 0)
         end if
         if (interrupted /= 0) return
       end do

@@ -135,7 +135,7 @@ contains
       unseen = unseen + 1
       if (unseen >= BETWEEN_LOOKS) then
         unseen = 0
-        interrupted = merge(1, 0, interrupt_raised() /= 0 .or. bodies%given_up /= 0)
+        interrupted = merge(1, 0, interrupt_raised() /= 0)
         if (interrupted /= 0) return
       end if
     end do

@@ -66,6 +66,7 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   const double *times = &time;
   int n_times = 1;
 
+  if (self->address == NULL || self->single_address == NULL) goto slowly;
   if (PyVectorcall_NARGS(n_given) != 2 || names != NULL || !is_plain(given[0], 2)) goto slowly;
   PyArrayObject *start = (PyArrayObject *)given[0];
   npy_intp shape[2] = {PyArray_DIM(start, 0), 3};
@@ -102,11 +103,14 @@ slowly:
   return PyObject_Vectorcall(self->slowly, given, n_given, names);
 }
 
-/* The address behind one of f2py's functions; NULL with an error set where there is none. */
+/* The address behind one of f2py's functions; NULL where it is another's. */
 static void *address_of(PyObject *callable)
 {
   PyObject *capsule = PyObject_GetAttrString(callable, "_cpointer");
-  if (capsule == NULL) return NULL;
+  if (capsule == NULL) {
+    if (PyErr_ExceptionMatches(PyExc_AttributeError)) PyErr_Clear();
+    return NULL;
+  }
   void *address = PyCapsule_GetPointer(capsule, PyCapsule_GetName(capsule));
   Py_DECREF(capsule);
   return address;
@@ -133,9 +137,9 @@ static PyObject *new_many(PyTypeObject *type, PyObject *args, PyObject *names)
   self->single = Py_NewRef(single);
   self->slowly = Py_NewRef(slowly);
   self->address = (kernel *)address_of(callable);
-  if (self->address != NULL) self->single_address = (single_kernel *)address_of(single);
-  if (self->single_address != NULL) self->packed = own_packed(packed);
-  if (self->packed != NULL && brief != Py_None) self->brief = own_packed(brief);
+  if (!PyErr_Occurred()) self->single_address = (single_kernel *)address_of(single);
+  if (!PyErr_Occurred()) self->packed = own_packed(packed);
+  if (!PyErr_Occurred() && brief != Py_None) self->brief = own_packed(brief);
   if (PyErr_Occurred()) Py_CLEAR(self);
   return (PyObject *)self;
 }

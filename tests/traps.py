@@ -31,8 +31,8 @@ _TRAPPED = INVALID | DIVIDE | TOO_LARGE
 _TRIES_AGAIN = (_CODES[EITHER], _CODES["quick"])
 _EXTREME = 1e60  # its fifth power overflows, and that of its inverse vanishes
 # Bodies side by side share the flags of a processor, so that no answer can tell of its own. They
-# have the bits of single runs, and those are guarded; or, where a method goes without branches, both
-# sides of a choice are computed, and what is not sure is left to a single solution.
+# have the bits of single runs, and those are guarded; or both sides of a choice are computed, where
+# a method goes without branches, and what is not sure is left to a single solution.
 _UNGUARDED = ("run_programs", "solve_ensemble", "solve_packed_many")
 _NAMES = {INVALID: "invalid", DIVIDE: "divide by zero", TOO_LARGE: "overflow"}
 

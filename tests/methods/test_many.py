@@ -219,6 +219,20 @@ def test_bodies_near_the_ends_of_the_range_and_on_edges() -> None:
             assert np.allclose(found.omega[row], alone, rtol=0, atol=allowed, equal_nan=True)
 
 
+def test_spins_that_turn_over_after_long(level: int) -> None:
+    """So little beside the middle axis that the mean takes more levels than blocks have."""
+    tilts = np.logspace(-3, -15, 97)
+    starts = np.column_stack([tilts, np.ones_like(tilts), -0.5 * tilts])
+    # Somewhere on the turn.
+    times = (np.log(4.0 / tilts) + np.tile([-1.0, 0.0, 1.0], 33)[:97]) * np.sqrt(3.0)
+    scene = replace(TOP, moments=(3.0, 2.0, 1.0))
+    solver = prepare(scene)
+    alone = [solver(start, t) for start, t in zip(starts, times.tolist(), strict=True)]
+    found = solve_many(scene, times, omega0=starts)
+    assert np.abs(found.omega - alone).max() <= 1e-12
+    assert np.ptp(found.omega[:, 1]) > 0.1
+
+
 def test_attitudes_are_those_of_a_prepared_solver() -> None:
     rng = np.random.default_rng(2)
     starts, attitudes = rng.standard_normal((20, 3)), rng.standard_normal((20, 4))

@@ -14,9 +14,9 @@ from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from tests.as_written import compiler_here, many_as_written
+from tests.many_errors import KINDS, bodies, exceeding, scene_of
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
-KINDS = ("free", "constant", "ramp", "waves")
 LEVELS = [0, 1, 2]
 
 
@@ -28,42 +28,6 @@ def level(request: pytest.FixtureRequest) -> Iterator[int]:
         pytest.skip("this processor has it not")
     yield request.param
     extension().choose_instructions(2)
-
-
-def bodies(kind: str, n: int, seed: int) -> dict[str, Any]:
-    """Draw bodies, starts, times and torques that matter."""
-    rng = np.random.default_rng([seed, KINDS.index(kind)])
-    moments = 10.0 ** rng.uniform(-1.5, 1.5, (n, 3))
-    omega0 = rng.standard_normal((n, 3)) * 10.0 ** rng.uniform(-2, 2, (n, 1))
-    rate = np.abs(omega0).max(axis=1, keepdims=True)
-    drawn = {"moments": moments, "omega0": omega0, "t_end": rng.uniform(0.3, 10.0, n) / rate[:, 0]}
-    if kind != "free":
-        drawn["torque_constant"] = moments * rate**2 * rng.standard_normal((n, 3))
-    if kind in ("ramp", "waves"):
-        drawn["torque_rate"] = 0.1 * moments * rate**3 * rng.standard_normal((n, 3))
-    if kind == "waves":
-        for name in ("sines", "cosines"):
-            amplitude = moments * rate**2 * rng.standard_normal((n, 3))
-            frequency = rate * rng.uniform(0.1, 3.0, (n, 1))
-            drawn[name] = np.concatenate([amplitude, frequency], axis=1)[:, None, :]
-    drawn["t_end"][::3] *= -1.0
-    return drawn
-
-
-def scene_of(drawn: dict[str, Any], row: int) -> Scene:
-    """Return one of them."""
-    waves = {
-        name: [(tuple(wave[:3]), wave[3]) for wave in drawn[name][row]] if name in drawn else ()
-        for name in ("sines", "cosines")
-    }
-    zero = np.zeros((row + 1, 3))
-    law = TorqueLaw(
-        drawn.get("torque_constant", zero)[row],
-        drawn.get("torque_rate", zero)[row],
-        waves["sines"],
-        waves["cosines"],
-    )
-    return replace(TOP, omega=drawn["omega0"][row], moments=drawn["moments"][row], torque=law)
 
 
 def only(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
@@ -231,6 +195,20 @@ def test_spins_that_turn_over_after_long(level: int) -> None:
     found = solve_many(scene, times, omega0=starts)
     assert np.abs(found.omega - alone).max() <= 1e-12
     assert np.ptp(found.omega[:, 1]) > 0.1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_campaign_finds_what_exceeds(kind: str) -> None:
+    """One body is spoilt; a body that is too far off by itself as well is no fault of many."""
+    drawn = bodies(kind, 40, 3)
+    found, truth = (solve_many(TOP, tolerance=each, **drawn) for each in (1e-6, 1e-15))
+    assert exceeding(drawn, 1e-6, found, truth)[0] == []
+    found.omega[7] += 1e-4 * np.abs(found.omega[7]).max()
+    beyond, alike, shares = exceeding(drawn, 1e-6, found, truth)
+    assert (beyond, alike) == ([7], [])
+    assert shares[7] > 10.0
+    truth.omega[9] += 1e-4 * np.abs(truth.omega[9]).max()
+    assert exceeding(drawn, 1e-6, found, truth)[:2] == ([7, 9], [9])
 
 
 def test_attitudes_are_those_of_a_prepared_solver() -> None:

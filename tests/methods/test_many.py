@@ -197,6 +197,28 @@ def test_spins_that_turn_over_after_long(level: int) -> None:
     assert np.ptp(found.omega[:, 1]) > 0.1
 
 
+def test_orbits_next_to_the_separatrix(level: int) -> None:
+    """What rounding makes of the distance, it makes of the time of a turn."""
+    apart = 1.0 + np.logspace(-2, -14, 97) * np.tile([1.0, -1.0], 49)[:97]
+    starts = np.column_stack([apart / np.sqrt(3.0), np.full(97, 0.4), np.ones(97)])
+    scene = replace(TOP, moments=(3.0, 2.0, 1.0))
+    solver = prepare(scene)
+    alone = np.array([solver(start, 25.0) for start in starts])
+    assert np.abs(solver.many(starts, 25.0)[0] - alone).max() <= 1e-12 * np.abs(alone).max()
+
+
+def test_coefficients_of_one_sign(level: int) -> None:
+    """No body, yet equations: neither kernel of lanes has them."""
+    starts = np.random.default_rng(4).standard_normal((40, 3))
+    for coefficients in ((0.3, 0.5, 0.2), (-0.3, -0.5, -0.2)):
+        scene = Scene("", starts[0], coefficients=coefficients, step_size=0.05)
+        for method, allowed in (("auto", 1e-11), ("rk4", 1e-14)):
+            solver = prepare(scene, method)
+            found = solver.many(starts, 0.5)[0]
+            alone = np.array([solver(start, 0.5) for start in starts])
+            assert np.allclose(found, alone, rtol=0, atol=allowed * np.abs(alone).max())
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_campaign_finds_what_exceeds(kind: str) -> None:
     """One body is spoilt; a body that is too far off by itself as well is no fault of many."""

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import resource
 import subprocess
 import sys
 import warnings
@@ -101,11 +100,13 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
 def test_files_that_may_not_grow_end_in_a_line(tmp_path: Path) -> None:
     path = written(tmp_path, text(SQUARE, TILT.replace("count = 6", "count = 2000")))
     command = [sys.executable, "-m", "pyharness", "sweep", path, "--out", str(tmp_path / "store")]
-
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
-
-    found = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, check=False)
+    limited = (
+        "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000)); "
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", limited, *command], capture_output=True, text=True, check=False
+    )
     assert found.returncode == 2
     assert "File too large; what is done stays" in found.stderr.splitlines()[-1]
     assert "Traceback" not in found.stderr

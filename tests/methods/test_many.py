@@ -214,9 +214,12 @@ def test_coefficients_of_one_sign(level: int) -> None:
         scene = Scene("", starts[0], coefficients=coefficients, step_size=0.05)
         for method, allowed in (("auto", 1e-11), ("rk4", 1e-14)):
             solver = prepare(scene, method)
-            found = solver.many(starts, 0.5)[0]
             alone = np.array([solver(start, 0.5) for start in starts])
-            assert np.allclose(found, alone, rtol=0, atol=allowed * np.abs(alone).max())
+            bodies_too = solve_many(
+                TOP, 0.5, omega0=starts, coefficients=coefficients, method=method, step=0.05
+            )
+            for found in (solver.many(starts, 0.5)[0], bodies_too.omega):
+                assert np.allclose(found, alone, rtol=0, atol=allowed * np.abs(alone).max())
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -1,9 +1,9 @@
 """The arithmetic of the CDC 6600 and CYBER 70: its rules of rounding.
 
 After the CYBER 170 hardware reference, CDC 60463560: a coefficient of p = 48 bits, a whole number,
-and an exponent; sums in a frame of 2 p bits. `FX` are the instructions 30, 31, 40 and 44, `RX` their
-rounded kind, 34, 35, 41 and 45; NX (24) normalises a sum. No guard bit survives: what lies below
-the unit of the larger operand is cut before NX moves the sum to the left.
+and an exponent; sums in a frame of 2 p bits. `FX` are the instructions 30, 31, 40 and 44, `RX`
+their rounded kind, 34, 35, 41 and 45; NX (24) normalises a sum. No guard bit survives: what lies
+below the unit of the larger operand is cut before NX moves the sum to the left.
 """
 
 from pyharness.original.rounding import Operation, Pair, Rules, rounding

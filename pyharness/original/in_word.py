@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.word import WORDS as WORDS
 from pyharness.original.word import Word
 
 Of = TypeVar("Of", Scene, TorqueLaw)

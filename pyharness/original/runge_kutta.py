@@ -123,4 +123,5 @@ def _norm(x: Vector) -> float:
     total = 0.0
     for each in x:
         total = total + each * each
-    return square_root(total)
+    norm: float = square_root(total)
+    return norm

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 from pyharness.model.errors import InputError, unknown
 from pyharness.original.cdc import cdc
+from pyharness.original.programs import WORD_NAMES
 from pyharness.original.rounding import Pair, Rules, ieee
 
 RULES = ("nearest-even", "chop", "FX", "RX")
@@ -183,7 +184,9 @@ class Number:
     @property
     def _shadow(self) -> float:
         """A float of the same sign, and zero, infinite or nan as the number is."""
-        return float(self.e) if not self.m else 1.0 if self.m > 0 else -1.0
+        if self.m:
+            return 1.0 if self.m > 0 else -1.0
+        return float(self.e)
 
     def _below(self, other: "Number") -> bool:
         return self._order(other) < 0
@@ -193,7 +196,7 @@ class Number:
         if not (self.m and other.m):
             x, y = self._shadow, other._shadow
             return 0.0 if x == y else x - y
-        apart = self.e - other.e
+        apart: int = self.e - other.e
         return (self.m << apart) - other.m if apart >= 0 else self.m - (other.m << -apart)
 
 
@@ -229,7 +232,8 @@ class Word:
             exponent = largest or (1023 if p <= 53 else 16383)
             rules = ieee(p, exponent, cut=rule == "chop")
         self.rules = rules
-        self.number = type("Number", (Number,), {"__slots__": (), "word": self, "rules": rules})
+        fields = {"__slots__": (), "word": self, "rules": rules}
+        self.number: type[Number] = type("Number", (Number,), fields)
         self._literals: dict[float, Number] = {}
 
     def __repr__(self) -> str:
@@ -238,8 +242,8 @@ class Word:
 
     def __call__(self, value: Any) -> Number:
         """Return the number of a value; TypeError for what is none, or of another word."""
-        if value.__class__ is self.number:
-            return value  # type: ignore[no-any-return]
+        if isinstance(value, Number) and value.word is self:
+            return value
         if isinstance(value, float):
             known = self._literals.get(value) if value else None
             if known is None:
@@ -273,10 +277,4 @@ WORDS: dict[str, Word] = {
     "cdc48": Word(48, "FX"),
     "cdc48-rounded": Word(48, "RX"),
 }
-
-
-def named(name: str) -> Word:
-    """Return the word of a name; InputError, with the nearest, for an unknown one."""
-    if name not in WORDS:
-        raise unknown("word", name, WORDS, "--word")
-    return WORDS[name]
+assert tuple(WORDS) == WORD_NAMES

@@ -78,8 +78,8 @@ class Trajectory:
     axes : ndarray, shape (3, 3), or None
         The axes of those moments, in columns; None where they are the body's own.
     exact : ndarray of object, shape (n, 8), or None
-        Where a program ran in another word: `time`, `recorded_time`, `omega` and `velocity` in its
-        own numbers, of which theirs are the nearest floats.
+        Where a program ran in another word, and has rows: `time`, `recorded_time`, `omega` and
+        `velocity` in its own numbers, of which these here are the nearest floats.
     """
 
     time: Array

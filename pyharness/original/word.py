@@ -99,7 +99,8 @@ class Number:
         """Whether the difference is zero; the CDC's can be that of neighbours."""
         x, y = self, self.word(other)
         if x.m and y.m:
-            return not self.rules.difference(x.m, x.e, -y.m, y.e)[0]
+            m, e = self.rules.difference(x.m, x.e, -y.m, y.e)
+            return not m and bool(e == 0.0)
         return x._shadow == y._shadow
 
     __hash__ = None  # type: ignore[assignment]

@@ -56,6 +56,5 @@ def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[in
     if rounds:
         half = 1 << p - 1
         large += half
-        if apart < p:
-            small += half >> apart
+        small += half >> apart
     return (large if xm > 0 else -large) + (small if ym > 0 else -small), xe

@@ -67,6 +67,12 @@ def test_literals_of_the_decks_are_the_words_of_the_vectors() -> None:
         assert to_octal((number.m, number.e)) == word
 
 
+def test_literals_beside_a_tie_go_to_their_own_side() -> None:
+    tie, little = Fraction(17, 16), Fraction(1, 10**9)
+    due = {-little: Fraction(1), Fraction(0): Fraction(1), little: Fraction(9, 8)}
+    assert {each: Word(4)(tie + each).fraction() for each in due} == due
+
+
 def test_pages_do_not_hang_on_how_literals_are_rounded() -> None:
     """How FTN converted them is not known; cut, they print what the nearest ones do."""
     cut = Word(48, "FX", cut_literals=True)

@@ -1,4 +1,4 @@
-! The only file that f2py reads: explicit shapes, known kinds, a status code, no logic.
+! What f2py reads, with api_many.f90: explicit shapes, known kinds, a status code, no logic.
 
 subroutine run_program(program, flags, by_moments, body, omega, masses, forces, torque_constant, &
                        torque_rate, torque_first, torque_varies, n_sines, sines, n_cosines, &
@@ -48,61 +48,6 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
   stop_variable = stop_at%variable
   stop_quotient = stop_at%quotient
 end subroutine run_program
-
-subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forces, &
-                        torque_constant, torque_rate, torque_first, torque_varies, n_sines, sines, &
-                        n_cosines, cosines, step_size, n_steps, lipschitz, may_stop, &
-                        with_velocity, given_up, n_at, at, omega_rows, n_velocities, &
-                        velocity_rows, n_times, times, n_iers, ier_rows, n_rows, status, &
-                        stop_variable, stop_quotient)
-  ! One of the three programs on n bodies. What is not reached of the results stays as it was.
-  !f2py threadsafe
-  use deck, only: deck_t
-  use ensemble, only: ensemble_t
-  use levels, only: run_lanes
-  use listing_flags, only: listing_from_bits
-  implicit none
-  integer(4), intent(in) :: program, flags, by_moments ! as in run_program, and so below
-  integer(4), intent(in) :: n
-  real(8), intent(in), target :: body(3, n)
-  real(8), intent(in), target :: omega(3, n)
-  real(8), intent(in) :: masses(3), forces(3)
-  real(8), intent(in), target :: torque_constant(3, n)
-  real(8), intent(in) :: torque_rate(3)
-  real(8), intent(in), target :: torque_first(3, n)
-  integer(4), intent(in) :: torque_varies
-  integer(4), intent(in) :: n_sines
-  real(8), intent(in), target :: sines(4, n_sines)
-  integer(4), intent(in) :: n_cosines
-  real(8), intent(in), target :: cosines(4, n_cosines)
-  real(8), intent(in), target :: step_size(n)
-  integer(4), intent(in) :: n_steps
-  real(8), intent(in), target :: lipschitz(n)
-  integer(4), intent(in) :: may_stop, with_velocity
-  integer(4), intent(inout), target :: given_up(1) ! not 0: by another thread, while this one runs
-  integer(4), intent(in) :: n_at
-  integer(4), intent(in), target :: at(n_at)               ! steps whose rows are wanted, rising
-  real(8), intent(inout), target :: omega_rows(3, n_at, n)
-  integer(4), intent(in) :: n_velocities                   ! n, or 0
-  real(8), intent(inout), target :: velocity_rows(3, n_at, n_velocities)
-  integer(4), intent(in) :: n_times                        ! n, or 1 where all step alike
-  real(8), intent(inout), target :: times(n_at, n_times)   ! TIME
-  integer(4), intent(in) :: n_iers                         ! n, or 0
-  integer(4), intent(inout), target :: ier_rows(n_at, n_iers)
-  integer(4), intent(inout), target :: n_rows(n), status(n), stop_variable(n)
-  real(8), intent(inout), target :: stop_quotient(n)
-  real(8) :: of_each(3)
-  type(deck_t) :: scene
-
-  of_each = 1.0d0
-  scene = deck_t(by_moments /= 0, of_each, of_each, masses, forces, of_each, torque_rate, of_each, &
-                 torque_varies /= 0, sines, cosines, 1.0d0, n_steps, 1.0d0, may_stop /= 0, &
-                 with_velocity /= 0)
-  call run_lanes(ensemble_t(program, listing_from_bits(flags), scene, n, n_at, body, omega, &
-                            torque_constant, torque_first, step_size, lipschitz, at, given_up(1), &
-                            omega_rows, velocity_rows, times, ier_rows, n_rows, status, &
-                            stop_variable, stop_quotient))
-end subroutine run_programs
 
 subroutine solve_linear(n, m, a, b, factors, x, ier)
   ! The stand-in for LEQT1F by itself: A X = B, so that it can be tested alone.
@@ -380,79 +325,3 @@ subroutine solve_packed_attitude(packed, n_packed, start, t_end, state, status, 
 
   call solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
 end subroutine solve_packed_attitude
-
-subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, body, n_constant, &
-                          constant, n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
-                          n_cosine_sets, cosines, n, omega0, n_times, times, n_attitudes, &
-                          attitude0, given_up, omega, n_results, attitude, status, raised)
-  ! Many bodies in one call: omega, and the attitude where it is given, of each at its time. Arrays
-  ! of one column are shared by all.
-  !f2py threadsafe
-  use bodies, only: bodies_t
-  use many_bodies, only: solve_bodies
-  implicit none
-  integer(4), intent(in) :: code                ! of the module methods
-  real(8), intent(in) :: tolerance              ! relative, of the series
-  real(8), intent(in) :: step                   ! s, of the methods with a fixed step
-  real(8), intent(in) :: effort                 ! factor on the limits, for each body
-  integer(4), intent(in) :: by_moments          ! 1: body is I1, I2, I3; 0: A, B, C
-  integer(4), intent(in) :: n_body
-  real(8), intent(in), target :: body(3, n_body)
-  integer(4), intent(in) :: n_constant
-  real(8), intent(in), target :: constant(3, n_constant) ! N m, or 1/s2
-  integer(4), intent(in) :: n_rate
-  real(8), intent(in), target :: rate(3, n_rate)         ! N m/s, or 1/s3
-  integer(4), intent(in) :: n_sines, n_sine_sets
-  real(8), intent(in), target :: sines(4, n_sines, n_sine_sets)       ! amplitude (3), rad/s
-  integer(4), intent(in) :: n_cosines, n_cosine_sets
-  real(8), intent(in), target :: cosines(4, n_cosines, n_cosine_sets) ! the same
-  integer(4), intent(in) :: n
-  real(8), intent(in), target :: omega0(3, n)   ! rad/s
-  integer(4), intent(in) :: n_times
-  real(8), intent(in), target :: times(n_times) ! s
-  integer(4), intent(in) :: n_attitudes
-  real(8), intent(in) :: attitude0(4, n_attitudes)
-  integer(4), intent(inout), target :: given_up(1) ! not 0: by another thread, while this one runs
-  real(8), intent(inout) :: omega(3, n)         ! rad/s; NaN unless the status is 0 or 6
-  integer(4), intent(in) :: n_results           ! n with attitude, else 0
-  real(8), intent(inout) :: attitude(4, n_results)
-  integer(1), intent(inout) :: status(n)        ! of the module statuses
-  integer(4), intent(out) :: raised             ! 1: interrupted by the user
-  type(bodies_t) :: bodies
-  real(8) :: packed(0)
-
-  bodies%by_moments = by_moments /= 0
-  bodies%tolerance = tolerance
-  bodies%step = step
-  bodies%n = n
-  bodies%body => body
-  bodies%constant => constant
-  bodies%rate => rate
-  bodies%sines => sines
-  bodies%cosines => cosines
-  bodies%omega0 => omega0
-  bodies%times => times
-  bodies%given_up => given_up(1)
-  call solve_bodies(bodies, code, effort, packed, attitude0, omega, attitude, status, raised)
-end subroutine solve_ensemble
-
-subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_up, omega, &
-                             status, raised)
-  ! Many starts of a prepared solver: as solve_packed, and called as that is.
-  !f2py threadsafe
-  use many_bodies, only: solve_packed_bodies
-  implicit none
-  integer(4), intent(in) :: n_packed
-  real(8), intent(in) :: packed(n_packed)
-  integer(4), intent(in) :: n
-  real(8), intent(in) :: omega0(3, n)  ! rad/s
-  integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times) ! 1 or n, s
-  integer(4), intent(inout), target :: given_up(1) ! as above
-  real(8), intent(inout) :: omega(3, n)
-  integer(1), intent(inout) :: status(n)
-  integer(4), intent(out) :: raised
-
-  call solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, given_up, omega, status, &
-                           raised)
-end subroutine solve_packed_many

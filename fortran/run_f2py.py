@@ -1,12 +1,12 @@
-"""Run f2py on api.f90, and fail where it guesses a kind: what it does not know becomes C float."""
+"""Run f2py, and fail where it guesses a kind: what it does not know becomes C float."""
 
 import subprocess
 import sys
 
 
-def main(source: str, module: str, folder: str) -> int:
-    """Write the wrapper of `source` for extension `module` into `folder`."""
-    command = [sys.executable, "-m", "numpy.f2py", source, "-m", module, "--lower"]
+def main(module: str, folder: str, *sources: str) -> int:
+    """Write the wrapper of `sources` for extension `module` into `folder`."""
+    command = [sys.executable, "-m", "numpy.f2py", *sources, "-m", module, "--lower"]
     command += ["--build-dir", folder]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     output = done.stdout + done.stderr

@@ -24,7 +24,10 @@ _TAYLOR = (
     "taylor_error", "taylor_rows", "taylor_march", "taylor",
 )  # fmt: skip
 _MANY = ("two_words", "problem", "torque_terms", "taylor_plan")
-_BODIES = ("bodies", "many_circular", "many_free", "many_fixed", "many_taylor")
+_BODIES = (
+    "bodies", "many_circular", "many_columns", "many_free", "many_fixed", "many_slots",
+    "many_taylor",
+)  # fmt: skip
 
 
 class Found(NamedTuple):

@@ -14,7 +14,6 @@ subroutine many_as_written(method, n, n_waves, tolerance, step, body, constant, 
   integer(c_int8_t), intent(inout) :: status(n)
   real(c_double), target :: none(4, 0, 1)
   type(bodies_t), target :: given
-  integer(c_int), target :: given_up
   integer(c_int) :: interrupted
 
   given%by_moments = .true.
@@ -28,8 +27,6 @@ subroutine many_as_written(method, n, n_waves, tolerance, step, body, constant, 
   given%cosines => none
   given%omega0 => omega0
   given%times => times
-  given_up = 0
-  given%given_up => given_up
   if (method == 0) then
     call many_taylor_solve(c_loc(given), n, omega, status, interrupted)
   else

@@ -20,7 +20,6 @@ module ensemble
     real(dp), pointer :: step_size(:)
     real(dp), pointer :: lipschitz(:)
     integer, pointer :: at(:)                 !! steps whose rows are wanted, rising
-    integer, pointer :: given_up => null()    !! not 0: by the thread that waits for this one
     ! Results; where a row was not reached they stay as they were.
     real(dp), pointer :: omega_rows(:, :, :)  !! component, row, body
     real(dp), pointer :: velocity_rows(:, :, :) !! the same, or no body

@@ -35,7 +35,7 @@ module lanes
     integer :: rest(7)                    !! to the end of a line
   end type block_t
 
-  public :: begin_block, first_torque, look, set_torque, spread_torque
+  public :: begin_block, look, torque_within
 
 contains
 
@@ -75,13 +75,29 @@ contains
     end if
   end subroutine begin_block
 
-  subroutine first_torque(b)
-    !! What the cards have, over the first step.
+  subroutine torque_within(e, step, b, after, points)
+    !! Where the torque varies: as assumed where no card exists.
+    type(ensemble_t), intent(in) :: e
+    integer, intent(in) :: step
     type(block_t), intent(inout) :: b
+    real(dp), intent(in) :: after(:, :)  !! its beginning, of each lane and point, s
+    integer, intent(in) :: points(:)
+    real(dp) :: time(LANE_COUNT)
+    integer :: k
 
-    b%M(:, :, 1) = b%torque_first
-    call spread_torque(b)
-  end subroutine first_torque
+    if (e%listing%initial_torque .and. step == 1) then
+      b%M(:, :, 1) = b%torque_first
+      call spread_torque(b)
+    else if (e%listing%torque_held) then
+      call set_torque(e%scene, b, b%TIME, 1)
+      call spread_torque(b)
+    else
+      do k = 1, size(points)
+        time = real(step - 1, dp)*b%step + after(:, k)
+        call set_torque(e%scene, b, time, points(k))
+      end do
+    end if
+  end subroutine torque_within
 
   subroutine spread_torque(b)
     !! That of the first point at all points.
@@ -102,6 +118,7 @@ contains
     real(dp) :: wave(LANE_COUNT)
     integer :: axis
     integer :: i
+    integer :: last  ! lane that has a time of its own
     integer :: term
 
     associate (N => b%M(:, :, point))
@@ -112,26 +129,19 @@ contains
             N(i, axis) = N(i, axis) + scene%torque_rate(axis)*time(i)
           end do
         end do
+        last = merge(1, LANE_COUNT, b%one_step_size)
         do term = 1, size(scene%sines, 2)
-          wave(1) = sin(scene%sines(4, term)*time(1))
-          if (b%one_step_size) then
-            wave(2:) = wave(1)
-          else
-            do i = 2, LANE_COUNT
-              wave(i) = sin(scene%sines(4, term)*time(i))
-            end do
-          end if
+          do i = 1, last
+            wave(i) = sin(scene%sines(4, term)*time(i))
+          end do
+          wave(last + 1:) = wave(1)
           call add(scene%sines(1:3, term), wave, N)
         end do
         do term = 1, size(scene%cosines, 2)
-          wave(1) = cos(scene%cosines(4, term)*time(1))
-          if (b%one_step_size) then
-            wave(2:) = wave(1)
-          else
-            do i = 2, LANE_COUNT
-              wave(i) = cos(scene%cosines(4, term)*time(i))
-            end do
-          end if
+          do i = 1, last
+            wave(i) = cos(scene%cosines(4, term)*time(i))
+          end do
+          wave(last + 1:) = wave(1)
           call add(scene%cosines(1:3, term), wave, N)
         end do
       end if

@@ -4,7 +4,7 @@ module lanes_four_term
   use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
-  use lanes, only: block_t, first_torque, set_torque, spread_torque
+  use lanes, only: block_t, torque_within
   use linear_solver, only: factor
   implicit none(type, external)
   private
@@ -94,27 +94,16 @@ contains
   end subroutine set_factors
 
   subroutine torque_four_term(e, I, b, s)
-    !! Where the torque varies: as assumed where no card exists.
+    !! At the beginning and at T1 to T4.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: I
     type(block_t), intent(inout) :: b
     type(grid_t), intent(in) :: s
-    real(dp) :: time(LANE_COUNT)
-    integer :: k
+    real(dp) :: after(LANE_COUNT, 5)
 
-    if (e%listing%initial_torque .and. I == 1) then
-      call first_torque(b)
-    else if (e%listing%torque_held) then
-      call set_torque(e%scene, b, b%TIME, 1)
-      call spread_torque(b)
-    else
-      time = real(I - 1, dp)*b%step
-      call set_torque(e%scene, b, time, 1)
-      do k = 1, 4
-        time = real(I - 1, dp)*b%step + s%T(:, k)
-        call set_torque(e%scene, b, time, k + 1)
-      end do
-    end if
+    after(:, 1) = 0.0_dp
+    after(:, 2:) = s%T(:, :4)
+    call torque_within(e, I, b, after, [1, 2, 3, 4, 5])
   end subroutine torque_four_term
 
   pure subroutine step_four_term(e, b, s)

@@ -5,7 +5,7 @@ module lanes_runge_kutta
   use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
-  use lanes, only: block_t, first_torque, set_torque, spread_torque, EXCEEDS, GOES_ON
+  use lanes, only: block_t, EXCEEDS, GOES_ON, torque_within
   implicit none(type, external)
   private
 
@@ -33,25 +33,16 @@ contains
   end subroutine begin_stages
 
   subroutine torque_runge_kutta(e, L, b)
-    !! Where the torque varies: as assumed where no card exists. Points 1, 2 and 4.
+    !! Of the four stages: points 1, 2 and 4.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: L
     type(block_t), intent(inout) :: b
-    real(dp) :: time(LANE_COUNT)
+    real(dp) :: after(LANE_COUNT, 3)
 
-    if (e%listing%initial_torque .and. L == 1) then
-      call first_torque(b)
-    else if (e%listing%torque_held) then
-      call set_torque(e%scene, b, b%TIME, 1)
-      call spread_torque(b)
-    else
-      time = real(L - 1, dp)*b%step
-      call set_torque(e%scene, b, time, 1)
-      time = real(L - 1, dp)*b%step + 0.5_dp*b%DT
-      call set_torque(e%scene, b, time, 2)
-      time = real(L - 1, dp)*b%step + b%DT
-      call set_torque(e%scene, b, time, 4)
-    end if
+    after(:, 1) = 0.0_dp
+    after(:, 2) = 0.5_dp*b%DT
+    after(:, 3) = b%DT
+    call torque_within(e, L, b, after, [1, 2, 4])
   end subroutine torque_runge_kutta
 
   subroutine step_runge_kutta(e, b, s)

@@ -4,7 +4,7 @@ module lanes_two_term
   use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
-  use lanes, only: block_t, first_torque, set_torque, spread_torque
+  use lanes, only: block_t, torque_within
   use linear_solver, only: factor
   implicit none(type, external)
   private
@@ -61,26 +61,17 @@ contains
   end subroutine set_points
 
   subroutine torque_two_term(e, I, b, s)
-    !! Where the torque varies: as assumed where no card exists.
+    !! At the beginning and at the two points.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: I
     type(block_t), intent(inout) :: b
     type(points_t), intent(in) :: s
-    real(dp) :: time(LANE_COUNT)
+    real(dp) :: after(LANE_COUNT, 3)
 
-    if (e%listing%initial_torque .and. I == 1) then
-      call first_torque(b)
-    else if (e%listing%torque_held) then
-      call set_torque(e%scene, b, b%TIME, 1)
-      call spread_torque(b)
-    else
-      time = real(I - 1, dp)*b%step
-      call set_torque(e%scene, b, time, 1)
-      time = real(I - 1, dp)*b%step + s%T1
-      call set_torque(e%scene, b, time, 2)
-      time = real(I - 1, dp)*b%step + s%T2
-      call set_torque(e%scene, b, time, 3)
-    end if
+    after(:, 1) = 0.0_dp
+    after(:, 2) = s%T1
+    after(:, 3) = s%T2
+    call torque_within(e, I, b, after, [1, 2, 3])
   end subroutine torque_two_term
 
   subroutine step_two_term(e, b, s)

@@ -1,9 +1,8 @@
 module many_bodies
   !! Many bodies in one call: side by side where that will do, and each by itself what is left.
-  use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
+  use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: bodies_t, has_torque, i1, LEFT, of_body, single_of
-  use interruption, only: watch
+  use bodies, only: bodies_t, coefficients_of, has_torque, i1, LEFT, of_body
   use kinds, only: dp
   use levels, only: many_fixed, many_free, many_taylor
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, QUICK_OR_TAYLOR, RK4, &
@@ -11,7 +10,6 @@ module many_bodies
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
                     N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use prepared, only: solve_prepared, solve_prepared_attitude
-  use problem, only: problem_t
   use statuses, only: INTERRUPTED, REFUSED
   use two_words, only: two_product, two_sum
   implicit none(type, external)
@@ -21,14 +19,13 @@ module many_bodies
 
 contains
 
-  subroutine solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, given_up, omega, &
-                                 status, raised)
+  subroutine solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, &
+                                 raised)
     !! Many starts of one prepared scene.
     integer, intent(in) :: n_packed, n, n_times
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in), target :: omega0(3, n)
     real(dp), intent(in), target :: times(n_times)
-    integer, intent(inout), target :: given_up(1)
     real(dp), intent(inout) :: omega(3, n)
     integer(i1), intent(inout) :: status(n)
     integer, intent(out) :: raised
@@ -50,7 +47,6 @@ contains
     bodies%cosines(1:4, 1:int(packed(N_COSINES)), 1:1) => packed(middle:n_packed - 1)
     bodies%omega0 => omega0
     bodies%times => times
-    bodies%given_up => given_up(1)
     call solve_bodies(bodies, code, packed(EFFORT), packed, no_attitude, omega, no_attitude, &
                       status, raised)
   end subroutine solve_packed_bodies
@@ -71,7 +67,6 @@ contains
     raised = 0
     if (bodies%n == 0) return
     with_torque = has_torque(bodies)
-    call watch(c_loc(bodies%given_up))
     ! A body alone takes less time by itself.
     if (size(attitude0) > 0 .or. bodies%n == 1) then
       status = LEFT
@@ -92,7 +87,6 @@ contains
     else
       call solve_left(bodies, code, with_torque, effort_, packed, omega, status, raised)
     end if
-    call watch(c_null_ptr)
   end subroutine solve_bodies
 
   subroutine solve_left(bodies, code, with_torque, effort_, packed, omega, status, raised)
@@ -192,34 +186,38 @@ contains
     logical, intent(in) :: with_torque
     real(dp), intent(in) :: effort_
     real(dp), intent(inout) :: packed(0:)
-    type(problem_t) :: problem
-    real(dp) :: own_waves(4, size(bodies%sines, 2) + size(bodies%cosines, 2))
     real(dp) :: of(3)
-    integer :: k
+    integer :: k, of_sines, of_both
 
-    call single_of(bodies, i, problem, own_waves)
+    of_sines = size(bodies%sines, 2)
+    of_both = of_sines + size(bodies%cosines, 2)
+    of = 1.0_dp
+    if (bodies%by_moments) of = bodies%body(:, of_body(size(bodies%body, 2), i))
     packed(METHOD) = real(code, dp)
     ! Whoever asked for auto has the closed form only without torque.
     if (code == CLOSED_FORM_OR_TAYLOR .and. with_torque) packed(METHOD) = real(TAYLOR, dp)
     packed(TOLERANCE) = bodies%tolerance
     packed(STEP) = bodies%step
-    packed(N_SINES) = real(problem%n_sines, dp)
-    packed(N_COSINES) = real(problem%n_cosines, dp)
-    packed(COEFFICIENTS:COEFFICIENTS + 2) = problem%coefficients
-    packed(CONSTANT:CONSTANT + 2) = problem%constant
-    packed(RATE:RATE + 2) = problem%rate
+    packed(N_SINES) = real(of_sines, dp)
+    packed(N_COSINES) = real(of_both - of_sines, dp)
+    packed(COEFFICIENTS:COEFFICIENTS + 2) = coefficients_of(bodies, i)
+    packed(CONSTANT:CONSTANT + 2) = bodies%constant(:, of_body(size(bodies%constant, 2), i))/of
+    packed(RATE:RATE + 2) = bodies%rate(:, of_body(size(bodies%rate, 2), i))/of
     packed(EFFORT) = effort_
     packed(COEFFICIENTS_LOW:COEFFICIENTS_LOW + 2) = 0.0_dp
-    packed(MOMENTS:MOMENTS + 2) = 1.0_dp
+    packed(MOMENTS:MOMENTS + 2) = of
     if (bodies%by_moments) then
-      of = bodies%body(:, of_body(size(bodies%body, 2), i))
-      packed(MOMENTS:MOMENTS + 2) = of
       packed(COEFFICIENTS_LOW) = remainder_of(of(2), of(3), of(1))
       packed(COEFFICIENTS_LOW + 1) = remainder_of(of(3), of(1), of(2))
       packed(COEFFICIENTS_LOW + 2) = remainder_of(of(1), of(2), of(3))
     end if
-    do k = 1, size(own_waves, 2)
-      packed(WAVES + 4*k - 4:WAVES + 4*k - 1) = own_waves(:, k)
+    do k = 1, of_sines
+      packed(WAVES + 4*k - 4:WAVES + 4*k - 1) = &
+        bodies%sines(:, k, of_body(size(bodies%sines, 3), i))/[of, 1.0_dp]
+    end do
+    do k = of_sines + 1, of_both
+      packed(WAVES + 4*k - 4:WAVES + 4*k - 1) = &
+        bodies%cosines(:, k - of_sines, of_body(size(bodies%cosines, 3), i))/[of, 1.0_dp]
     end do
   end subroutine pack
 

@@ -4,10 +4,10 @@ module many_fixed
   !! of 0, or with three of one sign, are left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, columns_of, i1, LANES, LEFT
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use many_free, only: coefficients_from
+  use many_columns, only: columns_of, equations_of, odd_axes, turn_axes, turn_back
   use methods, only: IMPROVED_EULER, TAYLOR_3
   use statuses, only: COMPLETE
   implicit none(type, external)
@@ -26,7 +26,7 @@ module many_fixed
     real(dp), dimension(LANES) :: x, y, z          !! omega, scaled; x' = y z, y' = -x z, z' = x y
     real(dp), dimension(LANES) :: mx, my, mz       !! torque of half a step
     real(dp), dimension(LANES) :: scale1, scale2, scale3
-    real(dp), dimension(LANES) :: second           !! 1, 2 or 3: the body's axis that is y
+    real(dp), dimension(LANES) :: odd              !! the body's axis that is y; 0: none for here
   end type scaled_t
 
 contains
@@ -63,14 +63,14 @@ contains
     do first = 0, n - 1, LANES
       there = min(LANES, n - first)
       m = PAIR*((there + PAIR - 1)/PAIR)
-      call columns_of(bodies%body, first, m, a)
+      call equations_of(bodies, first, m, a, moments)
       call columns_of(bodies%constant, first, m, constant)
-      if (bodies%by_moments) then
-        moments(:m, :) = a(:m, :)
-        call coefficients_from(moments, m, a)
-        constant(:m, :) = constant(:m, :)/moments(:m, :)
-      end if
+      constant(:m, :) = constant(:m, :)/moments(:m, :)
       call columns_of(bodies%omega0, first, m, w)
+      call odd_axes(m, a, s%odd)
+      call turn_axes(m, s%odd, a)
+      call turn_axes(m, s%odd, constant)
+      call turn_axes(m, s%odd, w)
       call scale_to(m, h, a, constant, w, s)
       left_over = int(n_steps, int64) - 1
       do while (left_over > 0)
@@ -99,68 +99,39 @@ contains
     real(dp), intent(in) :: h                  !! s
     real(dp), intent(in) :: a(LANES, 3), constant(LANES, 3), w(LANES, 3)
     type(scaled_t), intent(inout) :: s
-    real(dp) :: odd2, odd3, odd1, place, direction, half
-    real(dp) :: a1, a2, a3, w1, w2, w3, m1, m2, m3, scale1, scale2, scale3
+    real(dp) :: direction, half, odd
+    real(dp) :: a1, a2, a3, w1, w2, w3, scale1, scale2, scale3
     integer :: i
 
     half = 0.5_dp*h
     do i = 1, m
-      odd2 = max(a(i, 1)*a(i, 2), a(i, 2)*a(i, 3))
-      odd3 = max(a(i, 1)*a(i, 3), a(i, 2)*a(i, 3))
-      odd1 = max(a(i, 1)*a(i, 2), a(i, 1)*a(i, 3))
-      place = 1.0_dp
-      a1 = a(i, 3)
-      a2 = a(i, 1)
-      a3 = a(i, 2)
-      w1 = w(i, 3)
-      w2 = w(i, 1)
-      w3 = w(i, 2)
-      m1 = constant(i, 3)
-      m2 = constant(i, 1)
-      m3 = constant(i, 2)
-      if (odd3 < 0.0_dp) then
-        place = 3.0_dp
-        a1 = a(i, 2)
-        a2 = a(i, 3)
-        a3 = a(i, 1)
-        w1 = w(i, 2)
-        w2 = w(i, 3)
-        w3 = w(i, 1)
-        m1 = constant(i, 2)
-        m2 = constant(i, 3)
-        m3 = constant(i, 1)
-      end if
-      if (odd2 < 0.0_dp) then
-        place = 2.0_dp
-        a1 = a(i, 1)
-        a2 = a(i, 2)
-        a3 = a(i, 3)
-        w1 = w(i, 1)
-        w2 = w(i, 2)
-        w3 = w(i, 3)
-        m1 = constant(i, 1)
-        m2 = constant(i, 2)
-        m3 = constant(i, 3)
-      end if
+      a1 = a(i, 1)
+      a2 = a(i, 2)
+      a3 = a(i, 3)
+      w1 = w(i, 1)
+      w2 = w(i, 2)
+      w3 = w(i, 3)
+      odd = s%odd(i)
       ! All three turned round, products change their sign.
       direction = sign(half, a1*half)
       scale1 = direction*(sqrt(abs(a2))*sqrt(abs(a3)))
       scale2 = direction*(sqrt(abs(a1))*sqrt(abs(a3)))
       scale3 = direction*(sqrt(abs(a1))*sqrt(abs(a2)))
-      if (.not. min(odd1, odd2, odd3) < 0.0_dp) place = 0.0_dp
-      if (.not. min(abs(scale1), abs(scale2), abs(scale3)) >= 1.0_dp/FAR) place = 0.0_dp
-      if (.not. max(abs(scale1), abs(scale2), abs(scale3)) <= FAR) place = 0.0_dp
-      if (.not. max(abs(w1), abs(w2), abs(w3)) <= FAR) place = 0.0_dp
-      s%second(i) = place
+      ! Products that are 0 tell no signs.
+      if (.not. min(abs(a1*a2), abs(a2*a3), abs(a3*a1)) > 0.0_dp) odd = 0.0_dp
+      if (.not. min(abs(scale1), abs(scale2), abs(scale3)) >= 1.0_dp/FAR) odd = 0.0_dp
+      if (.not. max(abs(scale1), abs(scale2), abs(scale3)) <= FAR) odd = 0.0_dp
+      if (.not. max(abs(w1), abs(w2), abs(w3)) <= FAR) odd = 0.0_dp
+      s%odd(i) = odd
       s%scale1(i) = scale1
       s%scale2(i) = scale2
       s%scale3(i) = scale3
       s%x(i) = scale1*w1
       s%y(i) = scale2*w2
       s%z(i) = scale3*w3
-      s%mx(i) = half*(scale1*m1)
-      s%my(i) = half*(scale2*m2)
-      s%mz(i) = half*(scale3*m3)
+      s%mx(i) = half*(scale1*constant(i, 1))
+      s%my(i) = half*(scale2*constant(i, 2))
+      s%mz(i) = half*(scale3*constant(i, 3))
     end do
   end subroutine scale_to
 
@@ -187,31 +158,15 @@ contains
     real(dp), intent(in) :: factor  !! of the step
     type(scaled_t), intent(in) :: s
     real(dp), intent(inout) :: w(LANES, 3)
-    real(dp) :: first, second, third, x, y, z
     integer :: i
 
     do i = 1, m
-      first = s%x(i)/(factor*s%scale1(i))
-      second = s%y(i)/(factor*s%scale2(i))
-      third = s%z(i)/(factor*s%scale3(i))
-      if (.not. s%second(i) > 0.0_dp) second = transfer(huge(0_int64), second)
-      x = second
-      y = third
-      z = first
-      if (s%second(i) > 2.5_dp) then
-        x = third
-        y = first
-        z = second
-      end if
-      if (abs(s%second(i) - 2.0_dp) < 0.5_dp) then
-        x = first
-        y = second
-        z = third
-      end if
-      w(i, 1) = x
-      w(i, 2) = y
-      w(i, 3) = z
+      w(i, 1) = s%x(i)/(factor*s%scale1(i))
+      w(i, 2) = s%y(i)/(factor*s%scale2(i))
+      w(i, 3) = s%z(i)/(factor*s%scale3(i))
+      if (.not. s%odd(i) > 0.0_dp) w(i, 2) = transfer(huge(0_int64), factor)
     end do
+    call turn_back(m, s%odd, w)
   end subroutine scale_back
 
   pure subroutine advance(method, m, n_steps, s)

@@ -4,9 +4,10 @@ module many_free
   !! end of a range, are left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, columns_of, i1, LANES, LEFT
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
+  use many_columns, only: columns_of, equations_of, odd_axes, turn_axes, turn_back
   use statuses, only: COMPLETE
   implicit none(type, external)
   private
@@ -23,6 +24,7 @@ module many_free
     real(dp), dimension(LANES) :: omega1, omega2, omega3
     real(dp), dimension(LANES) :: rate1, rate2, rate3
     real(dp), dimension(LANES) :: modulus, amplitude2, amplitude3, half_gap
+    real(dp), dimension(LANES) :: odd       !! the body's axis that is axis 2 here; 0: none
     real(dp), dimension(LANES) :: gap       !! below 0: axes 1 and 3 are swapped
     real(dp), dimension(LANES) :: error     !! estimate, in radians and tolerances of 1
     real(dp), dimension(LANES) :: a, b      !! of the mean
@@ -33,8 +35,6 @@ module many_free
     real(dp), dimension(LANES) :: square    !! of the sine, of the last level but one
     real(dp) :: upper(LANES, LEVELS), lower(LANES, LEVELS)
   end type orbits_t
-
-  public :: coefficients_from
 
 contains
 
@@ -56,14 +56,12 @@ contains
       there = min(LANES, n - first)
       m = A_GROUP*((there + A_GROUP - 1)/A_GROUP)
       if (first == 0 .or. size(bodies%body, 2) > 1) then
-        if (bodies%by_moments) then
-          call columns_of(bodies%body, first, m, moments)
-          call coefficients_from(moments, m, a)
-        else
-          call columns_of(bodies%body, first, m, a)
-        end if
+        call equations_of(bodies, first, m, a, moments)
+        call odd_axes(m, a, o%odd)
+        call turn_axes(m, o%odd, a)
       end if
       call columns_of(bodies%omega0, first, m, w)
+      call turn_axes(m, o%odd, w)
       if (size(bodies%times) > 1) then
         t(:there) = bodies%times(first + 1:first + there)
         t(there + 1:m) = t(there)
@@ -72,7 +70,8 @@ contains
       call climb(m, o)
       call turn(m, t, o)
       call descend(m, o)
-      call finish(m, a, o, w)
+      call finish(m, o, w)
+      call turn_back(m, o%odd, w)
       do i = 1, there
         omega(1, first + i) = w(i, 1)
         omega(2, first + i) = w(i, 2)
@@ -84,61 +83,22 @@ contains
     end do
   end subroutine many_free_solve
 
-  pure subroutine coefficients_from(moments, m, a)
-    !! A, B, C of equations 13-15.
-    real(dp), intent(in) :: moments(LANES, 3)
-    integer, intent(in) :: m
-    real(dp), intent(inout) :: a(LANES, 3)
-    real(dp) :: least
-    integer :: i
-
-    do i = 1, m
-      ! No body: NaN, which every look at a body finds.
-      least = min(moments(i, 1), moments(i, 2), moments(i, 3))
-      if (.not. least > 0.0_dp) least = 0.0_dp
-      least = least/least
-      a(i, 1) = least*((moments(i, 2) - moments(i, 3))/moments(i, 1))
-      a(i, 2) = (moments(i, 3) - moments(i, 1))/moments(i, 2)
-      a(i, 3) = (moments(i, 1) - moments(i, 2))/moments(i, 3)
-    end do
-  end subroutine coefficients_from
-
   pure subroutine begin(m, a, w, o)
     !! All that does not depend on the time. Axis 2 of an orbit has the coefficient of the odd sign,
     !! axis 3 keeps its direction.
     integer, intent(in) :: m
     real(dp), intent(in) :: a(LANES, 3), w(LANES, 3)
     type(orbits_t), intent(inout) :: o
-    real(dp) :: odd2, odd3, odd1 ! at most 0 where that axis of the body is axis 2 of the orbit
     real(dp) :: a1, a2, a3, w1, w2, w3, s1, s2, s3, first, third, y1, y2, y3, left, right, gap
     integer :: i
 
     do i = 1, m
-      odd2 = max(a(i, 1)*a(i, 2), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 3))
-      odd3 = max(a(i, 1)*a(i, 3), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 2))
-      odd1 = max(a(i, 1)*a(i, 2), a(i, 1)*a(i, 3), -a(i, 2)*a(i, 3))
-      a1 = a(i, 3)
-      a2 = a(i, 1)
-      a3 = a(i, 2)
-      w1 = w(i, 3)
-      w2 = w(i, 1)
-      w3 = w(i, 2)
-      if (odd3 <= 0.0_dp) then
-        a1 = a(i, 2)
-        a2 = a(i, 3)
-        a3 = a(i, 1)
-        w1 = w(i, 2)
-        w2 = w(i, 3)
-        w3 = w(i, 1)
-      end if
-      if (odd2 <= 0.0_dp) then
-        a1 = a(i, 1)
-        a2 = a(i, 2)
-        a3 = a(i, 3)
-        w1 = w(i, 1)
-        w2 = w(i, 2)
-        w3 = w(i, 3)
-      end if
+      a1 = a(i, 1)
+      a2 = a(i, 2)
+      a3 = a(i, 3)
+      w1 = w(i, 1)
+      w2 = w(i, 2)
+      w3 = w(i, 3)
       left = abs(a1)*(w3*w3)
       right = abs(a3)*(w1*w1)
       gap = left - right
@@ -174,7 +134,7 @@ contains
       o%b(i) = sqrt(s2*gap)
       ! What rounding makes of a small gap, it makes of the frequency.
       o%error(i) = ERROR*(left + right)/gap
-      if (min(odd1, odd2, odd3) > 0.0_dp) o%error(i) = NEVER
+      if (.not. o%odd(i) > 0.0_dp) o%error(i) = NEVER
       if (.not. s2 > 0.0_dp) o%error(i) = NEVER
       if (.not. (o%modulus(i) <= FAR .and. o%modulus(i) >= 1.0_dp/FAR)) o%error(i) = NEVER
     end do
@@ -249,14 +209,13 @@ contains
     end do
   end subroutine descend
 
-  pure subroutine finish(m, a, o, w)
-    !! The addition theorems, as in torque_free.f90, and the axes of the body.
+  pure subroutine finish(m, o, w)
+    !! The addition theorems, as in torque_free.f90.
     integer, intent(in) :: m
-    real(dp), intent(in) :: a(LANES, 3)
     type(orbits_t), intent(in) :: o
     real(dp), intent(inout) :: w(LANES, 3)
     real(dp) :: s2, c2, both, inverse, dn, fallen, turn
-    real(dp) :: u1, u2, u3, near, odd2, odd3, first, third, x, y, z
+    real(dp) :: u1, u2, u3, near, first, third
     integer :: i
 
     do i = 1, m
@@ -280,24 +239,9 @@ contains
         first = u3
         third = u1
       end if
-      odd2 = max(a(i, 1)*a(i, 2), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 3))
-      odd3 = max(a(i, 1)*a(i, 3), a(i, 2)*a(i, 3), -a(i, 1)*a(i, 2))
-      x = u2
-      y = third
-      z = first
-      if (odd3 <= 0.0_dp) then
-        x = third
-        y = first
-        z = u2
-      end if
-      if (odd2 <= 0.0_dp) then
-        x = first
-        y = u2
-        z = third
-      end if
-      w(i, 1) = x
-      w(i, 2) = y
-      w(i, 3) = z
+      w(i, 1) = first
+      w(i, 2) = u2
+      w(i, 3) = third
     end do
   end subroutine finish
 

@@ -69,7 +69,7 @@ contains
     do step = 1, e%scene%n_steps
       left = left - 1
       if (left < 0) then
-        if (interrupt_raised() /= 0 .or. e%given_up /= 0) return
+        if (interrupt_raised() /= 0) return
         left = steps_between_looks(e%scene)/4
       end if
       b%TIME = b%TIME + b%DT

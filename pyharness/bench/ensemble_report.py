@@ -6,6 +6,7 @@ from typing import Any
 
 from pyharness.bench.ensemble_growth import Memory, Size
 from pyharness.bench.ensemble_measure import STEPS, Rate, Rates
+from pyharness.bench.page import made_page
 from pyharness.model.build import build, machine
 from pyharness.model.report import (
     Column,
@@ -43,15 +44,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
     versions = [*here.items(), ("Fortran compiler", built.compiler), ("NumPy", built.numpy)]
     shown: list[Section] = [[Line(title), table] for title, table in parts]
     tables: list[Section] = [[Line(f"### {title}"), table] for title, table in parts]
-    page: list[Section] = [
-        [Line("## Ensembles")],
-        [Line(f"Made by `{command}`; run that again to have it for another machine.")],
-        [Line(_DRIFT)],
-        [Table((Column(""), Column("version")), versions)],
-        *tables,
-        [Line("### Notes")],
-        [Line(f"- {line}") for line in notes],
-    ]
+    page = made_page("## Ensembles", command, _DRIFT, versions, tables, notes)
     return Report(
         "bench",
         text=[*shown, notes],

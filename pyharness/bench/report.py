@@ -7,6 +7,7 @@ from typing import Any
 
 from pyharness.bench.growth import Growth
 from pyharness.bench.measure import TARGETS, Finding, Refusal, Row
+from pyharness.bench.page import made_page
 from pyharness.bench.pictures import bench_picture, growth_picture
 from pyharness.bench.random_loads import KINDS
 from pyharness.bench.savings import Saving
@@ -52,15 +53,8 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
         ("platform", built.platform),
     ]
     tables: list[Section] = [[Line(f"## {title}"), table] for title, table in parts]
-    page: list[Section] = [
-        [Line("# Run time against error" + (" of omega and attitude" if finding.attitude else ""))],
-        [Line(f"Made by `{command}`; run that again to have it for another machine.")],
-        [Line(_DRIFT)],
-        [Table((Column(""), Column("version")), versions)],
-        *tables,
-        [Line("## Notes")],
-        [Line(f"- {line}") for line in notes],
-    ]
+    title = "# Run time against error" + (" of omega and attitude" if finding.attitude else "")
+    page = made_page(title, command, _DRIFT, versions, tables, notes)
     return Report(
         "bench",
         text=[*parts, notes],

@@ -3,6 +3,7 @@
 import argparse
 import shlex
 from collections.abc import Sequence
+from typing import TypeVar
 
 from pyharness.bench import report as reports
 from pyharness.bench.contenders import Contender, own
@@ -15,6 +16,7 @@ from pyharness.compare.random_scenes import weekly_seed
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene_file import case_numbers
 
+_Named = TypeVar("_Named", Contender, EnsembleContender)
 # Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
@@ -116,15 +118,7 @@ def chosen(
     """
     if text is None:
         return [each for each in contenders if attitude or each.velocity]
-    names = shared.names(text)
-    if names == ["none"]:
-        return []
-    allowed = [each.name for each in contenders]
-    packages = sorted({each.package for each in contenders} - {""})
-    for name in names:
-        if name not in allowed and name not in packages:
-            raise unknown(what, name, [*allowed, *packages, "none"], where)
-    found = [each for each in contenders if each.name in names or each.package in names]
+    found = named(contenders, text, what, where)
     if attitude and (lacking := [each.name for each in found if not each.attitude]):
         able = ", ".join(each.name for each in contenders if each.attitude)
         raise InputError(f"{where}: {lacking[0]} carries no attitude; allowed: {able}")
@@ -197,15 +191,13 @@ def _ensemble(options: argparse.Namespace) -> int:
     return 0
 
 
-def named(
-    contenders: Sequence[EnsembleContender], text: str | None, what: str, where: str
-) -> list[EnsembleContender]:
-    """Return those of an ensemble that are named, by their own name or their package."""
-    names = shared.names(text)
+def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
+    """Return those that are named, by their own name or their package; all where none are."""
+    names: list[str] = shared.names(text)
     if names == ["none"]:
         return []
-    allowed = [each.name for each in contenders]
-    packages = sorted({each.package for each in contenders} - {""})
+    allowed: list[str] = [each.name for each in contenders]
+    packages: list[str] = sorted({each.package for each in contenders} - {""})
     for name in names:
         if name not in allowed and name not in packages:
             raise unknown(what, name, [*allowed, *packages, "none"], where)

@@ -8,16 +8,20 @@ written out as polynomials, one solution for a constant right-hand side, one cor
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import polynomial
 
 from pyharness.model.facts import facts
+from pyharness.model.functions import is_finite
 from pyharness.model.report import Column, Report, Section, Table, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
+from pyharness.original.in_word import WORDS, scene_in
 from pyharness.original.linear_solver import leqt1f
+from pyharness.original.programs import BINARY64
 from pyharness.truth.reference import reference
 
 WEIGHTINGS = ("subdomain", "galerkin", "least-squares")
@@ -59,23 +63,26 @@ class Ranked:
         return sum(bool(each.failed) for each in self.attempts)
 
 
-def ranked() -> list[Ranked]:
-    """Return every conjectured mistake, the best explanation of IV.2 first."""
+def ranked(word: str = BINARY64) -> list[Ranked]:
+    """Return every conjectured mistake, computed in a word, the best explanation of IV.2 first."""
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:
         attempts = []
         for weighting in WEIGHTINGS:
-            shares = {case: _share(case_scene(case), weighting, entry["id"]) for case in CASES}
+            shares = {
+                case: _share(case_scene(case), weighting, entry["id"], word) for case in CASES
+            }
             failed = tuple(case for case, share in shares.items() if not share <= limit)
             attempts.append(Attempt(entry["id"], weighting, shares, failed))
         found.append(Ranked(entry["id"], entry["summary"], tuple(attempts)))
     return sorted(found, key=lambda each: (-each.in_both, -each.in_either))
 
 
-def _share(scene: Scene, weighting: str, mistake: str) -> float:
+def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> float:
     """Return the largest error over the largest omega, with a mistake or with `none`."""
-    omega = march(scene, weighting, mistake)
+    given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
+    omega = march(given, weighting, mistake)
     truth = reference(scene, scene.times()).omega
     with np.errstate(all="ignore"):
         error = np.abs(omega - truth).max()
@@ -83,7 +90,10 @@ def _share(scene: Scene, weighting: str, mistake: str) -> float:
 
 
 def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
-    """Return omega (rad/s), shape (steps, 3), of a weighting with one mistake; torque constant."""
+    """Return omega (rad/s), shape (steps, 3), of a weighting with one mistake; torque constant.
+
+    It is computed in the numbers of the scene, floats or those of another word.
+    """
     h = scene.step_size
     coefficients = scene.euler_coefficients
     torque = np.array(scene.normalized_torque(0.0))
@@ -101,10 +111,9 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
                 if mistake != "torque-omitted":
                     rates[0] += torque
                 c = _solved(weighting, length, rates, mistake, correction)
-                if not np.isfinite(c).all():
+                if not all(map(is_finite, c.ravel().tolist())):
                     return rows
-            powers = h ** np.arange(1, TERMS + 1)
-            state = state + powers @ c
+            state = state + np.array([h, h * h]) @ c
             rows[step] = state
     return rows
 
@@ -112,7 +121,7 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
     """Return A omega2 omega3 and so on as polynomials of t, a column for each component."""
     columns = [
-        a * polynomial.polymul(estimate[:, j], estimate[:, k])
+        polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
     ]
     longest = 2 * len(estimate) - 1
@@ -142,7 +151,7 @@ def _power(exponent: int) -> Array:
     return row
 
 
-def _weighted(weighting: str, length: float, residual: Array) -> list[float]:
+def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
     """Return the integrals of a polynomial over (0, length), one for each weight."""
     found = []
     for k in range(TERMS):
@@ -152,7 +161,7 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[float]:
             low, high = 0.0, length
             weight = _power(k + 1) if weighting == "galerkin" else (k + 1) * _power(k)
         integral = polynomial.polyint(polynomial.polymul(weight, residual))
-        found.append(float(polynomial.polyval(high, integral) - polynomial.polyval(low, integral)))
+        found.append(polynomial.polyval(high, integral) - polynomial.polyval(low, integral))
     return found
 
 
@@ -176,7 +185,7 @@ _TABLE = (
 )  # fmt: skip
 
 
-def lost_report(found: Sequence[Ranked]) -> Report:
+def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
     """Report every mistake, the largest errors it makes, and where it fails as IV.2 says."""
     rows = [
         [
@@ -192,7 +201,8 @@ def lost_report(found: Sequence[Ranked]) -> Report:
         [
             "Conjectures: mistakes that the programs for three weightings may have had, which IV.2 "
             "says gave no meaningful results in Cases 1 and 2, and which are not printed. Largest "
-            "error over the largest omega, by weighting and case; a tenth of it is a failure.",
+            "error over the largest omega, by weighting and case; a tenth of it is a failure."
+            + ("" if word == BINARY64 else f" Computed in {word}."),
         ],
         [Table(_TABLE, rows)],
         [

@@ -43,8 +43,11 @@ def trajectory_report(
     title: str,
     trajectory: Trajectory,
     form: str = "quaternion",
+    word: str | None = None,
 ) -> Report:
     """Report one trajectory; `listing` is None for a method that is no program.
+
+    `word` is the arithmetic of a program, where it is not binary64.
 
     An attitude is shown in a form of `model.attitude.FORMS`.
     """
@@ -75,6 +78,7 @@ def trajectory_report(
             "scene": records.scene_record(scene),
             "method": method,
             "listing": None if listing is None else records.listing_record(listing),
+            **({} if word is None else {"word": word}),
             "trajectory": {
                 "time": trajectory.time.tolist(),
                 "recorded_time": trajectory.recorded_time.tolist(),

@@ -20,7 +20,8 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.original.cards import deck, numbers
 
-DIALECTS = ("1982", "gfortran")
+DIALECTS = ("1982", "gfortran", "ftn")
+SYSTEMS = ("nos", "nosbe")
 MODELS = (3, 5)  # terms of the models that V.2 used in Case 6 and did not print
 COMPILER = "gfortran"
 # Numbers are binary64 and 0 until they are set; no operation is joined with another.
@@ -62,8 +63,9 @@ def deck_text(
     scene : Scene, optional
         A case of Table 1, in the deck's own assignment cards and DO limit; by default the case that
         was printed: 2 in the collocation decks, 5 in the other, 300 and 100 steps.
-    dialect : {"1982", "gfortran"}
-        The text, or the text with what a compiler of today needs, marked in column 73.
+    dialect : {"1982", "gfortran", "ftn"}
+        The text; with what a compiler of today needs, marked in column 73; or with the torque of
+        Case 7 alone, for the compiler that it was written for.
     terms : int, optional
         Of a model that is not printed, made of the four-term deck: a conjecture.
 
@@ -97,6 +99,34 @@ def deck_text(
     return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
 
 
+def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
+    """Return a batch job that compiles and runs a deck with FTN, and our LEQT1F where it is called.
+
+    Parameters
+    ----------
+    deck : str
+        In the dialect `ftn`.
+    system : {"nos", "nosbe"}
+        The operating system whose control statements stand around it.
+    rounds : bool
+        Whether sums, products and quotients are rounded: FTN's option ROUND.
+
+    Raises
+    ------
+    InputError
+        For an unknown system.
+    """
+    if system not in SYSTEMS:
+        raise unknown("system", system, SYSTEMS, "--system")
+    jobs = facts("cards/jobs")
+    job = jobs[system]
+    compiles = job["compile"].format(rounds=jobs["rounds"] if rounds else "")
+    control = [*job["before"], compiles, *job["after"], jobs["record"]]
+    statements = "".join(f"{each}\n" for each in control)
+    named = statements.format(user="USERNAME", password="PASSWORD")  # the site's
+    return named + deck + (_SOLVER.read_text() if "LEQT1F" in deck else "")
+
+
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
@@ -104,7 +134,7 @@ def _is_made(
     named = alteration.get
     return (
         named("program") == listing.program
-        and named("dialect", dialect) == dialect
+        and dialect in named("dialect", [dialect])
         and named("case", case) == case
         and not ("corrects" in alteration and listing.has(named("corrects", "")))
         and not ("unless" in alteration and listing.has(named("unless", "")))

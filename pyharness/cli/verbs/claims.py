@@ -6,10 +6,12 @@ from pyharness.cli import options as shared
 from pyharness.history.claims.ledger import assignments, claim, claims, judge
 from pyharness.history.claims.report import assignments_report, claims_report, explanation
 from pyharness.model.errors import InputError
+from pyharness.original.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
     "--explain ID": "one claim, with its numbers",
     "--assignments": "which initial conditions let all claims hold",
+    "--word W": "with the programs in another word (`words`), as cdc48",
     "--evidence": "score every combination of starts, readings, conjectures and steps",
     "--atlas STORE": "what a sweep of claims over starts found; with --sweep",
     "--sweep FILE.toml": "the sweep file of the store",
@@ -20,7 +22,7 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Judge and show."""
     if options.assignments:
-        shared.refuse(options, "--assignments", ("explain", "evidence"))
+        shared.refuse(options, "--assignments", ("explain", "evidence", "word"))
         shared.check_known("format", options.format, ("table", "json"))
     if options.atlas is not None:
         return _atlas(options)
@@ -28,6 +30,7 @@ def run(options: argparse.Namespace) -> int:
     if options.evidence:
         return _evidence(options)
     shared.refuse(options, "the ledger; give --evidence", ("plot",))
+    shared.check_known("word", options.word, WORD_NAMES)
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)
     if options.assignments:
@@ -37,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     judgements = []
     for number, entry in enumerate(chosen, 1):
         shared.progress(f"{number} of {len(chosen)}: {entry['id']}")
-        judgements.append(judge(entry))
+        judgements.append(judge(entry, options.word or BINARY64))
     one = options.explain is not None
     shared.show(explanation(judgements[0]) if one else claims_report(judgements), options)
     return 0
@@ -47,7 +50,7 @@ def _evidence(options: argparse.Namespace) -> int:
     from pyharness.history.claims.evidence import combinations, evidence
     from pyharness.history.claims.evidence_report import evidence_report
 
-    shared.refuse(options, "--evidence", ("explain",))
+    shared.refuse(options, "--evidence", ("explain", "word"))
     shared.check_outputs(options)
     found, every = [], len(combinations())
     for combination in evidence():
@@ -64,7 +67,7 @@ def _atlas(options: argparse.Namespace) -> int:
     from pyharness.history.claims.atlas import atlas_of
     from pyharness.history.claims.atlas_report import atlas_report
 
-    shared.refuse(options, "--atlas", ("explain", "assignments", "evidence"))
+    shared.refuse(options, "--atlas", ("explain", "assignments", "evidence", "word"))
     if options.sweep is None:
         raise InputError("--atlas: give --sweep FILE.toml, the sweep file of the store")
     shared.check_outputs(options)

@@ -7,14 +7,16 @@ from pyharness.model.errors import InputError
 from pyharness.model.records import listing_record
 from pyharness.model.report import Line, Report
 from pyharness.model.scene_file import case_numbers, case_scene
-from pyharness.original.decks import DIALECTS, deck_text
+from pyharness.original.decks import DIALECTS, SYSTEMS, deck_text, job_text
 
 FORMATS = ("table", "json")
 OPTIONS = {
     "--program P": "two-term, four-term or runge-kutta",
     "--case N": "a case of Table 1, 1 to 7 (default: the case that was printed)",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
-    "--dialect D": f"{' or '.join(DIALECTS)} (default {DIALECTS[0]})",
+    "--dialect D": f"{', '.join(DIALECTS)} (default {DIALECTS[0]}); ftn: a batch job for it",
+    "--system S": f"with --dialect ftn: its operating system, {' or '.join(SYSTEMS)} (default nos)",
+    "--round": "with --dialect ftn: rounded instructions",
     "--terms N": "3 or 5: a model that is not printed, made of the four-term deck, a conjecture",
     **shared.outputs(FORMATS, plot=""),
 }
@@ -33,10 +35,15 @@ def run(options: argparse.Namespace) -> int:
     if dialect == "1982" and (options.case == "7" or listing.has("do-variable")):
         shared.warn(
             "the torque of Case 7 and what becomes of a DO variable are on no card; --dialect "
-            "gfortran has both"
+            "gfortran has both, ftn the torque"
         )
     terms = None if options.terms is None else shared.whole(options.terms, "--terms")
-    lines = deck_text(listing, scene, dialect, terms).splitlines()
+    text = deck_text(listing, scene, dialect, terms)
+    if dialect == "ftn":
+        text = job_text(text, options.system or SYSTEMS[0], options.round)
+    else:
+        shared.refuse(options, f"--dialect {dialect}; allowed: with ftn", ("system", "round"))
+    lines = text.splitlines()
     shared.check_outputs(options)
     record = {
         "program": listing.program, "case": scene and scene.case, "dialect": dialect,

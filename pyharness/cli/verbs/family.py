@@ -6,6 +6,7 @@ from pyharness.cli import options as shared
 from pyharness.history.family.members import POINTS, WEIGHTINGS, Member
 from pyharness.history.family.orders import order_table
 from pyharness.history.family.report import family_report
+from pyharness.original.programs import BINARY64, WORD_NAMES
 
 _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
@@ -16,6 +17,7 @@ OPTIONS = {
     "--points P": "one member: thesis, gauss or a,b,... in parts of the step",
     "--corrections K": "one member: corrections (default 1)",
     "--lost": "the mistakes that IV.2's three failed programs may have had, ranked",
+    "--word W": "with --lost: their arithmetic (`words`), as cdc48",
     **shared.outputs(plot=""),
 }
 
@@ -24,6 +26,7 @@ def run(options: argparse.Namespace) -> int:
     """Measure and show; 1 where an order is below the one derived."""
     if options.lost:
         return _lost(options)
+    shared.refuse(options, "the family; give --lost", ("word",))
     if options.case is None and options.scene is None:
         options.case = _DEFAULT_CASE
     scene = shared.chosen_scene(options)
@@ -56,6 +59,8 @@ def _lost(options: argparse.Namespace) -> int:
 
     others = ("case", "scene", "omega0", "step_size", "steps", *_OF_A_MEMBER)
     shared.refuse(options, "--lost", others)
+    shared.check_known("word", options.word, WORD_NAMES)
     shared.check_outputs(options)
-    shared.show(lost_report(ranked()), options)
+    word = options.word or BINARY64
+    shared.show(lost_report(ranked(word), word), options)
     return 0

@@ -15,7 +15,8 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.collocation import interval
 from pyharness.original.equations import Vector, omega_rate
-from pyharness.original.programs import run_program
+from pyharness.original.in_word import WORDS, scene_in
+from pyharness.original.programs import BINARY64, run_program
 from pyharness.truth.reference import Reference, reference
 
 
@@ -25,13 +26,15 @@ class Assumptions:
 
     `start` is omega(0) of the cases whose start is not given (rad/s), None for those of
     `cases.toml`; `readings` are those selected that are not the adopted ones; `conjectures` what is
-    assumed where no card exists, None for what the original assumes.
+    assumed where no card exists, None for what the original assumes; `word` the arithmetic of the
+    programs.
     """
 
     start: Triple | None = None
     readings: frozenset[str] = frozenset()
     steps: int = 100
     conjectures: frozenset[str] | None = None
+    word: str = BINARY64
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,13 @@ class Laboratory:
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
         """Run a program on a case."""
-        return _run(self.listing(program), self.scene(case, parts), may_stop)
+        return self.run_on(self.scene(case, parts), self.listing(program), may_stop)
+
+    def run_on(
+        self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
+    ) -> Trajectory:
+        """Run a listing on any scene, in the word that is assumed."""
+        return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
         """Return the true solution of a case at its steps."""
@@ -88,14 +97,14 @@ class Laboratory:
         In the original they leave the interval, and the torque must be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
-        return _model(self.scene(case), terms, accumulates)
+        return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
         """Return the Lipschitz constant (1/s) that lets the Runge-Kutta program run all steps."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
-            stop = run_program(scene, listing, lipschitz=constant or 1e-300).stop
+            stop = self.run_on(scene, listing, lipschitz=constant or 1e-300).stop
             if stop is None:
                 break
             constant = stop.quotient * (1.0 + 1e-12)
@@ -137,8 +146,9 @@ def _scene(case: int, start: Triple | None, steps: int) -> Scene:
 
 
 @cache
-def _run(listing: Listing, scene: Scene, may_stop: bool) -> Trajectory:
-    return run_program(scene, listing, may_stop=may_stop)
+def _run(listing: Listing, scene: Scene, may_stop: bool, lipschitz: float, word: str) -> Trajectory:
+    implementation = "fortran" if word == BINARY64 else "python"
+    return run_program(scene, listing, implementation, lipschitz, may_stop, word=word)
 
 
 @cache
@@ -147,7 +157,9 @@ def _truth(scene: Scene) -> Reference:
 
 
 @cache
-def _model(scene: Scene, terms: int, accumulates: bool) -> Array:
+def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
+    if word != BINARY64:
+        scene = scene_in(scene, WORDS[word])
     h = scene.step_size
     state = list(scene.omega)
     rows = []
@@ -162,7 +174,7 @@ def _model(scene: Scene, terms: int, accumulates: bool) -> Array:
 
         state, _ = interval(state, points, h, rates)
         rows.append(state)
-    return np.array(rows)
+    return np.array(rows, dtype=float)
 
 
 LITERALS = ("DT=", "T=", "DT+")

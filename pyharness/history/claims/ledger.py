@@ -1,7 +1,7 @@
 """The claims of the thesis, each with verdicts computed for the programs and for the methods."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pyharness.history.claims import methods, theory, verdicts
@@ -11,6 +11,7 @@ from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, original
 from pyharness.model.scene import Triple
+from pyharness.original.programs import BINARY64
 
 _ROOMS = (verdicts, methods, theory)
 
@@ -62,17 +63,18 @@ def claim(identity: str) -> dict[str, Any]:
     return by_name[identity]
 
 
-def judge(entry: dict[str, Any]) -> Judgement:
-    """Test one claim, also without each of its assumptions."""
+def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
+    """Test one claim, also without each of its assumptions, with the programs in a word."""
 
     def verdicts(assumptions: Assumptions) -> tuple[Judged, Judged]:
         programs = outcome(entry, Laboratory(True, assumptions))
         return programs, outcome(entry, Laboratory(False, assumptions))
 
-    programs, methods = verdicts(Assumptions())
+    programs, methods = verdicts(Assumptions(word=word))
     survivals = []
     for name, assumptions in _alternatives(entry):
-        original, corrected = (each.verdict for each in verdicts(assumptions))
+        here = replace(assumptions, word=word)
+        original, corrected = (each.verdict for each in verdicts(here))
         same = (original, corrected) == (programs.verdict, methods.verdict)
         survivals.append(Survival(name, original, corrected, same))
     return Judgement(entry, programs, methods, tuple(survivals))

@@ -23,13 +23,14 @@ from pyharness.history.claims.verdicts import (
     judged,
 )
 from pyharness.history.family.members import WEIGHTINGS, Member, run
+from pyharness.history.lost import march
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
 from pyharness.original.cells import subsets
 from pyharness.original.decks import deck_text, solver_cards
+from pyharness.original.in_word import WORDS, scene_in
 from pyharness.original.operations import operations_per_step
-from pyharness.original.programs import run_program
 
 _OTHERS = WEIGHTINGS[1:]
 
@@ -105,7 +106,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
         "unbounded runs, without the test": float(unbounded),
         "unbounded runs stopped": float(caught),
         "a scene of ours, unbounded at 1 s: stopped": float(
-            run_program(ours, lab.listing("runge-kutta")).stop is not None
+            lab.run_on(ours, lab.listing("runge-kutta")).stop is not None
         ),
     }
     if not (unbounded or alarms):
@@ -223,8 +224,13 @@ def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
     return graded(numbers, useless, worst > 10.0)
 
 
-def computer_error(lab: Laboratory, limit: float) -> Judged:
-    """Measure rounding alone: Case 1, which every member solves exactly, at ever smaller steps."""
+def computer_error(
+    lab: Laboratory, limit: float, words: Sequence[str], cases: Sequence[int]
+) -> Judged:
+    """Measure rounding alone: Case 1, which every member solves exactly, at ever smaller steps.
+
+    And the methods as IV.2 describes them, in words of the machine.
+    """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
@@ -234,6 +240,16 @@ def computer_error(lab: Laboratory, limit: float) -> Judged:
             found = run(scene, Member(weighting, 4)).omega[parts - 1 :: parts]
             error = distance(found, lab.truth(1).omega)
             numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
+    # The machine's own words, the products written out: what they differ by is rounding.
+    for word in words:
+        for weighting in _OTHERS:
+            numbers[f"{weighting} in {word}: apart from binary64 (rad/s)"] = max(
+                distance(
+                    march(scene_in(lab.scene(case), WORDS[word]), weighting),
+                    march(lab.scene(case), weighting),
+                )
+                for case in cases
+            )
     return graded(numbers, max(numbers.values()) >= limit, otherwise=FALSE)
 
 

@@ -17,7 +17,6 @@ from pyharness.history.claims.rules import COLLOCATION
 from pyharness.model.listing import Listing, names_of, original
 from pyharness.model.scene import Triple
 from pyharness.original.cells import subsets
-from pyharness.original.programs import run_program
 
 REPRODUCED = "reproduced"
 IN_PART = "reproduced in part"
@@ -126,7 +125,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     ]
     there = []
     for each in every:
-        other = run_program(lab.scene(case), each).stop
+        other = lab.run_on(lab.scene(case), each).stop
         if other is not None and other.step == step:
             mended = sorted(original(each.program).defects - each.defects)
             there.append(f"original but for {', '.join(mended)}" if mended else "original")

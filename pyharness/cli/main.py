@@ -21,6 +21,7 @@ VERBS = {
     "family": "the weighted residual methods: orders derived, and orders measured",
     "plan": "what a scene needs, what is therefore not computed, and why",
     "rotations": "the steady rotations of a scene, their stability, and the time between flips",
+    "words": "the programs in words of any length and rounding, those of the CDC among them",
     "bench": "run time against error: ours, the programs, and other people's integrators",
     "sweep": "a grid of scenes, solved here or by a cluster, in a store that resumes",
     "verify": "bits between languages, error against the truth, and what changed since recorded",

@@ -17,7 +17,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES, WITH_ALL_ROWS, Array, Trajectory
 from pyharness.original.compiled import program_arguments
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.original.programs import BINARY64, PROGRAM_REGISTRY
 
 _SAME = 1e-9  # of a time, but for the rounding of its steps
 
@@ -123,6 +123,7 @@ def listed(
     may_stop: bool = True,
     velocity: bool = True,
     effort: float = 1.0,
+    word: str = BINARY64,
 ) -> Candidate:
     """Return a program with its listing; what it takes is told at `Program.run`."""
     options = lipschitz, may_stop, velocity
@@ -138,7 +139,7 @@ def listed(
 
     def rows(scene: Scene) -> Trajectory:
         run = PROGRAM_REGISTRY[listing.program].run
-        return run(scene, listing, implementation, *options, effort)
+        return run(scene, listing, implementation, *options, effort, word)
 
     return Candidate(f"{listing.program}-{listing.label}", ready, rows)
 

@@ -24,7 +24,7 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
-from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY
+from pyharness.original.programs import BINARY64, IMPLEMENTATIONS, PROGRAM_REGISTRY, checked_word
 from pyharness.truth.reference import Reference, reference
 
 _TIMING_BATCHES = 3
@@ -38,7 +38,7 @@ class ProgramFinding:
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
-    ulps: float
+    ulps: float | None  # between the languages; None where there is one alone, of another word
     differences: tuple[str, ...]
     order: Order | None
     seconds_per_step: float
@@ -72,6 +72,7 @@ class Comparison:
     methods: tuple[MethodFinding, ...]
     tolerance: float  # of the methods
     growth: float | None  # of a small difference on the way, where it is known
+    word: str = BINARY64  # of the programs
 
     @property
     def digits(self) -> float | None:
@@ -114,6 +115,7 @@ def compare_programs(
     tolerance: float = 1e-8,
     effort: float = 1.0,
     attitude: bool = False,
+    word: str = BINARY64,
 ) -> Comparison:
     """Compare programs and methods on one scene.
 
@@ -135,6 +137,9 @@ def compare_programs(
     attitude : bool
         Whether attitudes are compared too, from that of the scene, or from the axes of space where
         it has none; beside the rows of a program by a step of order 4 from row to row.
+    word : str
+        The arithmetic of the programs. In any but binary64 the twins run alone: there are no bits
+        to agree, and no orders, which are those of the compiled programs.
 
     Returns
     -------
@@ -149,32 +154,39 @@ def compare_programs(
         Where the reference or a program would need too many steps.
     """
     listings = listings_for() if listings is None else listings
-    for listing, implementation in itertools.product(listings, IMPLEMENTATIONS):
-        check_steps(scene, listing.program, implementation, effort)
+    in_floats = checked_word(word, "python") == BINARY64
+    languages = IMPLEMENTATIONS if in_floats else ("python",)
+    for listing, language in itertools.product(listings, languages):
+        check_steps(scene, listing.program, language if in_floats else "another word", effort)
     checked_scene(scene)
     scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:
-        compiled, twin = (
-            listed(listing, each, lipschitz, may_stop, effort=effort) for each in IMPLEMENTATIONS
-        )
-        run, other = compiled.rows(scene), twin.rows(scene)
-        judged = not (listing.defects or listing.readings or listing.conjectures)
+        candidates = [
+            listed(listing, each, lipschitz, may_stop, effort=effort, word=word)
+            for each in languages
+        ]
+        run, *other = (each.rows(scene) for each in candidates)
+        judged = in_floats and not (listing.defects or listing.readings or listing.conjectures)
         program = PROGRAM_REGISTRY[listing.program]
         order = measured_order(scene, program, listing, truth) if judged else None
         if attitude:
             run = replace(run, attitude=attitude_from_rows(scene, run.time, run.omega))
-        (seconds,) = timed([partial(compiled.rows, scene)], _TIMING_SECONDS, _TIMING_BATCHES)
-        good, found = accuracy(scene, run, truth), tuple(differences(run, other))
-        per_step = seconds / max(run.steps, 1)
-        ulp = distance(run, other)
+        timing = [partial(candidates[0].rows, scene)]
+        (seconds,) = timed(timing, _TIMING_SECONDS, _TIMING_BATCHES)
+        ulp = distance(run, *other) if other else None
+        found = tuple(differences(run, *other)) if other else ()
+        good, per_step = accuracy(scene, run, truth), seconds / max(run.steps, 1)
         programs.append(ProgramFinding(listing, run, good, ulp, found, order, per_step))
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
     methods = [_method(scene, name, tolerance, effort, truth) for name in SCIPY_METHODS]
     growth = motion_growth(scene, scene.times()[-1])
-    return Comparison(scene, lipschitz, truth, tuple(programs), tuple(methods), tolerance, growth)
+    judged_programs, judged_methods = tuple(programs), tuple(methods)
+    return Comparison(
+        scene, lipschitz, truth, judged_programs, judged_methods, tolerance, growth, word
+    )
 
 
 def listings_for(

@@ -23,6 +23,7 @@ from pyharness.model.report import (
 )
 from pyharness.model.scene_report import heading, sensitive
 from pyharness.model.trajectory import Trajectory
+from pyharness.original.programs import BINARY64
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
 _OF_THE_TRUTH = ("source", "estimate", "error")
@@ -31,6 +32,7 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 def comparison_report(comparison: Comparison) -> Report:
     """Report what `compare` found: programs, then methods of `solve_ivp`, then the verdict."""
+    in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
     reference = (
         f"reference: {truth.source}, error of any w below {short(truth.error)} rad/s "
@@ -39,8 +41,8 @@ def comparison_report(comparison: Comparison) -> Report:
     legend = (
         "w1-w3, V: largest error against the reference (rad/s, m/s). energy, mom.sq: largest "
         "relative drift. ulp: distance between Fortran and Python in units in the last place. "
-        "stop: variable and its Lipschitz quotient against the limit. us/step: Fortran, the call "
-        "included."
+        "stop: variable and its Lipschitz quotient against the limit. us/step: "
+        f"{'Fortran, the call included' if in_floats else 'the twin in ' + comparison.word}."
     )
     motion = []
     if comparison.growth is not None and comparison.digits is not None:
@@ -88,6 +90,11 @@ def verdict(comparison: Comparison) -> list[str]:
 
 def _as_expected(comparison: Comparison) -> str:
     same = sum(not each.differences for each in comparison.programs)
+    if comparison.word != BINARY64:
+        return (
+            f"programs in {comparison.word}: their twins alone, so that there are no bits of two "
+            "languages to agree, nor orders"
+        )
     text = f"as expected: Fortran = Python bit for bit in {same} of {len(comparison.programs)}"
     orders = [each.order for each in comparison.programs if each.order is not None]
     if not orders:
@@ -189,7 +196,9 @@ def _end(run: Trajectory, limit: float) -> str:
     return f"{run.stop.variable} {quotient}>{limit:g}"
 
 
-def _count(ulps: float) -> str:
+def _count(ulps: float | None) -> str:
+    if ulps is None:
+        return "-"
     return f"{ulps:.0f}" if ulps < 1000 else short(ulps)
 
 
@@ -198,6 +207,7 @@ def _record(comparison: Comparison) -> dict[str, Any]:
     return {
         "scene": scene_record(comparison.scene),
         "lipschitz": comparison.lipschitz,
+        "word": comparison.word,
         "reference": {name: getattr(truth, name) for name in _OF_THE_TRUTH}
         | ({} if truth.attitude is None else {"angle_error": truth.angle_error}),
         "programs": list(map(_program, comparison.programs)),

@@ -43,8 +43,9 @@ def trajectory_report(
     title: str,
     trajectory: Trajectory,
     form: str = "quaternion",
+    word: str | None = None,
 ) -> Report:
-    """Report one trajectory; `listing` is None for a method that is no program.
+    """Report one trajectory; `listing` and `word` are None for a method that is no program.
 
     An attitude is shown in a form of `model.attitude.FORMS`.
     """
@@ -75,6 +76,7 @@ def trajectory_report(
             "scene": records.scene_record(scene),
             "method": method,
             "listing": None if listing is None else records.listing_record(listing),
+            "word": word,
             "trajectory": {
                 "time": trajectory.time.tolist(),
                 "recorded_time": trajectory.recorded_time.tolist(),

@@ -17,8 +17,8 @@ _SLACK = 2.0  # of a forecast: the pace so far is not that of the rest
 _ROUNDING = 1.0 + 1e-9  # of an effort that was advised
 _UNFORESEEN = 10.0  # where there is no forecast
 # Steps of a program without waves, some 30 s of the slowest; and what a wave costs of such a step.
-_MOST_STEPS = {"fortran": 1e8, "python": 5e5}
-_A_WAVE = {"fortran": 1.0, "python": 0.05}
+_MOST_STEPS = {"fortran": 1e8, "python": 5e5, "another word": 5e4}
+_A_WAVE = {"fortran": 1.0, "python": 0.05, "another word": 0.3}
 # The same of the compiled programs on many bodies, a step of each counted.
 _MOST_STEPS_OF_ALL = 1e9
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, SupportsIndex
 from pyharness.model.attitude import Quaternion, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.facts import facts
+from pyharness.model.functions import cosine, sine
 from pyharness.model.inertia import Matrix, checked_inertia, principal_axes
 from pyharness.model.values import (
     Number,
@@ -106,15 +107,10 @@ class TorqueLaw:
             for axis in range(3):
                 torque[axis] += self.rate[axis] * time
                 for amplitude, frequency in self.sines:
-                    torque[axis] += amplitude[axis] * _wave(math.sin, frequency * time)
+                    torque[axis] += amplitude[axis] * sine(frequency * time)
                 for amplitude, frequency in self.cosines:
-                    torque[axis] += amplitude[axis] * _wave(math.cos, frequency * time)
+                    torque[axis] += amplitude[axis] * cosine(frequency * time)
         return torque[0], torque[1], torque[2]
-
-
-def _wave(function: Callable[[float], float], angle: float) -> float:
-    # Python raises for an infinite angle where Fortran, like IEEE 754, answers NaN.
-    return function(angle) if math.isfinite(angle) else math.nan
 
 
 @dataclass(frozen=True)

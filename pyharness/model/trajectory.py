@@ -77,6 +77,9 @@ class Trajectory:
         Of the body, kg m2; None where it has only coefficients.
     axes : ndarray, shape (3, 3), or None
         The axes of those moments, in columns; None where they are the body's own.
+    exact : ndarray of object, shape (n, 8), or None
+        Where a program ran in another word, and has rows: `time`, `recorded_time`, `omega` and
+        `velocity` in its own numbers, of which these here are the nearest floats.
     """
 
     time: Array
@@ -93,6 +96,7 @@ class Trajectory:
     attitude: Array | None = None
     moments: tuple[float, float, float] | None = None
     axes: Array | None = None
+    exact: NDArray[np.object_] | None = None
 
     def rotation(self) -> "Rotation":
         """Return the attitudes as rotations of SciPy, which turn vectors from body to space.

@@ -1,11 +1,11 @@
 """What the three twins share: right-hand sides, and the record of a run."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from pyharness.model.facts import facts
+from pyharness.model.functions import is_finite
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Stop, Trajectory
 
@@ -51,7 +51,7 @@ def card_torque(scene: Scene) -> Vector | None:
 
 def all_finite(values: Vector) -> bool:
     """Whether no value is NaN or infinite."""
-    return all(map(math.isfinite, values))
+    return all(map(is_finite, values))
 
 
 class Record:
@@ -74,7 +74,8 @@ class Record:
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
         """Return what was run; an overflow's own step is evaluated but leaves no row."""
-        rows = np.array(self._rows).reshape(-1, 8)
+        given = np.array(self._rows).reshape(-1, 8)
+        rows = given.astype(np.float64)
         steps = len(self._rows)
         return Trajectory(
             time=rows[:, 0],
@@ -86,4 +87,5 @@ class Record:
             ended=ended,
             stop=stop,
             ier=np.array(self._ier, dtype=np.int32) if prints_ier else None,
+            exact=given if given.dtype == object else None,
         )

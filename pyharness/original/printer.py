@@ -8,10 +8,14 @@ FORMATs are written by a library; FORTRAN 77 and the paper of 1982 have two word
 import math
 import re
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from pyharness.model.facts import facts
+from pyharness.model.functions import is_finite
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
@@ -19,6 +23,7 @@ from pyharness.model.trajectory import Trajectory
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
 # What is not finite does not fit: the machine printed R or I there, and asterisks say no less.
 _TOO_WIDE = 1e300
+_PLACES = re.compile(r"F\d+\.(\d+)")
 
 
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
@@ -32,14 +37,33 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     pairs = zip(scene.moments, _torque_cards(scene), strict=True)
     records = write(formats["header"], [value for pair in pairs for value in pair])
     records += write(formats["heads"], [])
-    assert trajectory.velocity is not None
-    rows = zip(trajectory.omega.tolist(), trajectory.velocity.tolist(), strict=True)
-    for index, (omega, velocity) in enumerate(rows):
+    for index, row in enumerate(_printed_rows(trajectory, formats["rows"])):
         numbers = [index + 1]
         if trajectory.ier is not None:
             numbers.append(int(trajectory.ier[index]))
-        records += write(formats["rows"], [*omega, *numbers, *velocity])
+        records += write(formats["rows"], [*row[:3], *numbers, *row[3:]])
     return "".join(record[1:].rstrip() + "\n" for record in records)
+
+
+def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
+    """Return omega and velocity; of another word the floats that are printed as its numbers are."""
+    if trajectory.exact is None:
+        assert trajectory.velocity is not None
+        return np.hstack([trajectory.omega, trajectory.velocity]).tolist()  # type: ignore[no-any-return]
+    (places,) = {int(each) for each in _PLACES.findall(form)}
+    return [[_to_places(x, places) for x in row[2:]] for row in trajectory.exact.tolist()]
+
+
+def _to_places(x: Any, places: int) -> float:
+    """Return a number, of any word, to so many decimals; halves away from zero, as floats go."""
+    if not is_finite(x):
+        return math.nan
+    value = Fraction(x) if isinstance(x, float) else x.fraction()
+    scaled = math.floor(abs(value) * 10**places + Fraction(1, 2))
+    try:
+        return math.copysign(scaled / 10**places, value)
+    except OverflowError:
+        return math.inf
 
 
 def formats_of(program: str) -> dict[str, Any]:

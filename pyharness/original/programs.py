@@ -13,6 +13,8 @@ from pyharness.model.values import number, truth
 from pyharness.original import compiled
 
 IMPLEMENTATIONS = ("fortran", "python")
+BINARY64 = "binary64"
+WORD_NAMES = (BINARY64, "binary32", "binary128", "cdc48", "cdc48-rounded")
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class Program:
         may_stop: bool = True,
         velocity: bool = True,
         effort: float = 1.0,
+        word: str = BINARY64,
     ) -> Trajectory:
         """Run the program: what `run_program` takes and raises, for its own listings alone."""
         checked_scene(scene)
@@ -44,6 +47,11 @@ class Program:
             raise InputError(f"program {self.name}: the listing is that of {listing.program}")
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
             raise unknown("implementation", implementation, IMPLEMENTATIONS)
+        if checked_word(word, implementation) != BINARY64:
+            from pyharness.original import in_word
+
+            check_steps(scene, self.name, "another word", effort)
+            return in_word.run(scene, listing, in_word.WORDS[word], lipschitz, may_stop)
         check_steps(scene, self.name, implementation, effort)
         return self._computed(scene, listing, implementation, lipschitz, may_stop, velocity)
 
@@ -57,6 +65,18 @@ class Program:
         twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")
         trajectory: Trajectory = twin.run(scene, listing, lipschitz, may_stop)
         return trajectory
+
+
+def checked_word(word: object, implementation: str) -> str:
+    """Return the name of a word; InputError for an unknown one, or one that Fortran has not."""
+    if not isinstance(word, str) or word not in WORD_NAMES:
+        raise unknown("word", word, WORD_NAMES, "--word")
+    if word != BINARY64 and implementation == "fortran":
+        raise InputError(
+            f"--word {word}: the compiled programs run in {BINARY64} alone; "
+            "allowed: implementation python"
+        )
+    return word
 
 
 PROGRAM_REGISTRY = {
@@ -75,6 +95,7 @@ def run_program(
     may_stop: bool = True,
     velocity: bool = True,
     effort: float = 1.0,
+    word: str = BINARY64,
 ) -> Trajectory:
     """Run the program of a listing.
 
@@ -95,14 +116,17 @@ def run_program(
         stop test needs it. No other bit depends on this.
     effort : float
         Factor on the steps, times waves, that are run without being asked for.
+    word : str
+        The arithmetic, one of `WORD_NAMES`; any but binary64 with `implementation="python"` alone.
 
     Raises
     ------
     InputError
-        For what is no scene or listing, an unknown implementation, or more steps than `effort`
-        allows.
+        For what is no scene or listing, an unknown implementation or word, a word that the
+        compiled programs have not, or more steps than `effort` allows.
     NotBuiltError
         Where the compiled program is asked for and not built.
     """
     program = PROGRAM_REGISTRY[checked_listing(listing).program]
-    return program.run(scene, listing, implementation, lipschitz, may_stop, velocity, effort)
+    options = lipschitz, may_stop, velocity, effort, word
+    return program.run(scene, listing, implementation, *options)

@@ -7,6 +7,7 @@ right-hand sides change by more than the constant times the change of the unknow
 import math
 from collections.abc import Mapping
 
+from pyharness.model.functions import square_root
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
@@ -122,4 +123,5 @@ def _norm(x: Vector) -> float:
     total = 0.0
     for each in x:
         total = total + each * each
-    return math.sqrt(total)
+    norm: float = square_root(total)
+    return norm

@@ -19,6 +19,7 @@ from pyharness.verify.random_methods import random_methods
 from pyharness.verify.schemes import schemes
 from pyharness.verify.selection import Selection, replay
 from pyharness.verify.stops import stops
+from pyharness.verify.words import words
 
 
 def _external(chosen: Selection) -> Iterator[Check]:
@@ -36,6 +37,8 @@ KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
     # Program x case x listing x reading: Fortran against twin, bit for bit over the whole
     # trajectory, counters and stop.
     "cells": cells,
+    # Binary64 by our own arithmetic against the processor's, and the CDC's vectors.
+    "words": words,
     # The decks, compiled from the author's own cards, against the port: TAPE5 and the page.
     "decks": decks,
     # Every step of the corrected programs against its scheme, to rounding.

@@ -10,11 +10,13 @@ from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import names_of
 from pyharness.model.scene import Scene
+from pyharness.original.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
     "--program P": "this program only",
+    "--word W": f"arithmetic of the programs: {', '.join(WORD_NAMES)}",
     "--tolerance E": "asked of solve_ivp (default 1e-8)",
     "--attitude": "the attitude too: its error as an angle",
     "--ablate": "every subset of the defects, sorted by effect",
@@ -28,6 +30,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare and show; 1 where something is not as it should be."""
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
+    shared.check_known("word", options.word, WORD_NAMES)
     shared.check_known("listing", options.listing, ("original", "corrected"))
     tolerance = shared.positive(options.tolerance, "--tolerance", 1e-8)
     finest = max(METHODS[name].finest for name in SCIPY_METHODS)
@@ -47,7 +50,14 @@ def run(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     found = compare_programs(
-        scene, listings, lipschitz, not options.no_stop, tolerance, effort, options.attitude
+        scene,
+        listings,
+        lipschitz,
+        not options.no_stop,
+        tolerance,
+        effort,
+        options.attitude,
+        options.word or BINARY64,
     )
     shared.show(comparison_report(found), options)
     return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
@@ -62,6 +72,7 @@ def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) 
         "lipschitz",
         "no_stop",
         "tolerance",
+        "word",
         "attitude",
         "plot",
         "strict",

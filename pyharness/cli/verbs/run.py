@@ -11,7 +11,13 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import IMPLEMENTATIONS, run_program
+from pyharness.original.programs import (
+    BINARY64,
+    IMPLEMENTATIONS,
+    WORD_NAMES,
+    checked_word,
+    run_program,
+)
 
 # What only a program wrote: its printer page, and its tape.
 PROGRAM_FORMATS = ("printer", "tape5")
@@ -20,6 +26,7 @@ OPTIONS = {
     **shared.SCENE,
     "--program P": ", ".join(PROGRAMS),
     "--implementation I": "fortran (default) or python",
+    "--word W": f"arithmetic of the program, as {', '.join(WORD_NAMES)}; python but in the first",
     "--method M": "a method in place of a program",
     **shared.LISTING,
     "--times T1,T2,...": "where results are wanted, s (methods)",
@@ -43,6 +50,7 @@ def run(options: argparse.Namespace) -> int:
             f"run: give either --program ({', '.join(PROGRAMS)}) or --method ({', '.join(METHODS)})"
         )
     shared.check_known("attitude", options.attitude, FORMS)
+    shared.check_known("word", options.word, WORD_NAMES)
     if options.format in PROGRAM_FORMATS:
         _check_program_format(options, scene, options.format)
     listing: Listing | None = None
@@ -62,7 +70,8 @@ def run(options: argparse.Namespace) -> int:
         return records(trajectory)
 
     form = options.attitude or FORMS[0]
-    report = trajectory_report(scene, name, listing, title, trajectory, form)
+    word = None if listing is None else options.word or BINARY64
+    report = trajectory_report(scene, name, listing, title, trajectory, form, word)
     shared.show(report, options, {"printer": page, "tape5": tape})
     return 1 if options.strict and trajectory.ended == "sensitive" else 0
 
@@ -79,6 +88,10 @@ def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) 
             "--format printer: the page begins with the moments, and this scene has only "
             f"coefficients; give moments, or one of {', '.join(shared.FORMATS)}"
         )
+    if form == "tape5" and options.word not in (None, BINARY64):
+        raise InputError(
+            f"--format tape5 has records of {BINARY64} alone, not of --word {options.word}"
+        )
     if form == "tape5" and options.out is None and sys.stdout.isatty():
         raise InputError("--format tape5 is binary; give --out FILE, or a pipe")
 
@@ -88,8 +101,10 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     listing = shared.chosen_listing(options)
     name = listing.program
     lipschitz = shared.chosen_lipschitz(options)
-    implementation = options.implementation or "fortran"
+    word = options.word or BINARY64
+    implementation = options.implementation or ("fortran" if word == BINARY64 else "python")
     shared.check_known("implementation", implementation, IMPLEMENTATIONS)
+    checked_word(word, implementation)
     shared.check_outputs(options)
     trajectory = run_program(
         scene,
@@ -98,13 +113,15 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
         lipschitz,
         not options.no_stop,
         effort=shared.chosen_effort(options),
+        word=word,
     )
     if options.attitude is not None:
         from pyharness.methods.from_rows import attitude_from_rows
 
         rows = attitude_from_rows(scene, trajectory.time, trajectory.omega)
         trajectory = replace(trajectory, attitude=rows)
-    title = f"program {name} ({implementation}), {shared.listing_text(listing)}"
+    how = implementation if word == BINARY64 else f"{implementation}, {word}"
+    title = f"program {name} ({how}), {shared.listing_text(listing)}"
     return name, listing, title, trajectory
 
 
@@ -115,6 +132,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
 
     listing_options = (
         "implementation",
+        "word",
         "listing",
         "fix",
         "keep",

@@ -1,0 +1,83 @@
+"""`words`: the programs in words of any length and rounding, and vectors of the CDC."""
+
+import argparse
+import time
+
+from pyharness.cli import options as shared
+from pyharness.history.words import LENGTHS, cells
+from pyharness.history.words_report import words_report
+from pyharness.model.errors import InputError
+from pyharness.model.report import Column, Report, Table
+from pyharness.model.report import words as columns
+from pyharness.model.scene_file import case_numbers
+from pyharness.original.vectors import Answer, answers
+
+FORMATS = ("table", "json", "csv", "markdown")
+OPTIONS = {
+    "--case N": "this case only, 1 to 7",
+    "--program P": "this program only",
+    "--all": f"every p from {LENGTHS[0]} to {LENGTHS[-1]}; some ten minutes",
+    "--vectors FILE": "hold the CDC's arithmetic against the operations of a file (JSON)",
+    **shared.outputs(FORMATS, plot="draw the error against p (with --case)"),
+}
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run in every word and show; 1 where a vector differs."""
+    if options.vectors is not None:
+        shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))
+        return _vectors(options)
+    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
+    if options.plot is not None and options.case is None:
+        raise InputError("words: --plot draws one case; give --case N (1 to 7)")
+    cases = case_numbers() if options.case is None else [int(options.case)]
+    programs = shared.chosen_programs(options)
+    shared.check_outputs(options)
+    lengths = range(LENGTHS[0], LENGTHS[-1] + 1) if options.all else LENGTHS
+    found = list(cells(cases, programs, lengths, _Forecast()))
+    shared.show(words_report(found), options)
+    return 0
+
+
+class _Forecast:
+    """Says how far it is, and how long the rest takes at the pace so far."""
+
+    def __init__(self) -> None:
+        self._begin = self._said = time.monotonic()
+
+    def __call__(self, done: int, every: int) -> None:
+        now = time.monotonic()
+        if now - self._said >= 0.5:
+            self._said = now
+            left = (now - self._begin) / done * (every - done)
+            shared.progress(f"words: {done} of {every} runs, some {left:.0f} s left")
+
+
+def _vectors(options: argparse.Namespace) -> int:
+    shared.check_outputs(options)
+    found = answers(options.vectors)
+    first = next((each for each in found if not each.agrees), None)
+    shared.show(_vectors_report(found, first), options)
+    return 0 if first is None else 1
+
+
+def _vectors_report(found: list[Answer], first: Answer | None) -> Report:
+    told = [f"{sum(each.agrees for each in found)} of {len(found)} vectors agree"]
+    if first is not None:
+        vector = first.vector
+        told += [
+            f"the first that differs: {vector.name} ({vector.op})",
+            f"x      {vector.x}",
+            f"y      {vector.y}",
+            f"result {vector.result}",
+            f"ours   {first.found}",
+        ]
+    rows = [[*each.vector, each.found, each.agrees] for each in found]
+    heads = [*columns("name op x y result found"), Column("agrees")]
+    record = [{**each.vector._asdict(), "found": each.found} for each in found]
+    return Report(
+        "words",
+        text=[told],
+        record=lambda: {"vectors": record, "passed": first is None},
+        data=Table(heads, rows),
+    )

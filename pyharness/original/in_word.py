@@ -1,0 +1,57 @@
+"""A program in a word: its twin, on a scene whose numbers are those of the word."""
+
+import copy
+import importlib
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.trajectory import Trajectory
+from pyharness.original.word import WORDS as WORDS
+from pyharness.original.word import Word
+
+Of = TypeVar("Of", Scene, TorqueLaw)
+
+
+def run(
+    scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
+) -> Trajectory:
+    """Run a program in a word: what `run_program` takes, but for the checks.
+
+    The trajectory has the nearest floats, and in `exact` the numbers of the word themselves.
+    """
+    twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
+    found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
+    if found.stop is None:
+        return found
+    return replace(found, stop=replace(found.stop, quotient=float(found.stop.quotient)))
+
+
+def scene_in(scene: Scene, word: Word) -> Scene:
+    """Return a scene that was checked with its numbers, all but counts, in a word."""
+    law = scene.torque
+
+    def those(values: Any) -> Any:
+        return None if values is None else tuple(word(each) for each in values)
+
+    def waves(values: tuple[Wave, ...]) -> Any:
+        return tuple((those(amplitude), word(frequency)) for amplitude, frequency in values)
+
+    torque = _with(
+        law,
+        constant=those(law.constant),
+        rate=those(law.rate),
+        sines=waves(law.sines),
+        cosines=waves(law.cosines),
+    )
+    names = ("omega", "moments", "coefficients", "masses", "forces")
+    triples = {name: those(getattr(scene, name)) for name in names}
+    return _with(scene, torque=torque, step_size=word(scene.step_size), **triples)
+
+
+def _with(frozen: Of, **fields: Any) -> Of:
+    """Return a copy with other fields, which its own checks would turn into floats."""
+    changed = copy.copy(frozen)
+    vars(changed).update(fields)
+    return changed

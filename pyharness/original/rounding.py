@@ -1,0 +1,112 @@
+"""Rules of rounding: what a sum, a product and a quotient of two numbers become in a word.
+
+A number is a pair (m, e) of whole numbers, m 2**e; m has p bits, but below the least exponent of a
+word with gradual underflow. Where m is 0, e is the float that the pair stands for: 0.0, -0.0, inf,
+-inf or nan; `Operation` gets none of these, and may give them.
+
+No library of soft floats has these rules together: mpmath and gmpy2 round correctly and have no
+exponent range of their own, SoftFloat and numpy have the formats of IEEE 754 alone, and none has
+the CDC's (`cdc.py`).
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+Pair = tuple[int, Any]
+Rounding = Callable[[int, int], Pair]
+Operation = Callable[[int, int, int, int], Pair]
+
+
+class Rules(NamedTuple):
+    """The arithmetic of a word.
+
+    Attributes
+    ----------
+    nearest : Rounding
+        The nearest number of the word, of two the even one: literals and functions.
+    add, multiply, divide : Operation
+        Of two numbers; a difference is the sum with the negative.
+    difference : Operation
+        The sum whose zero says that two numbers are equal.
+    signed_zero : bool
+        Whether there is -0.0.
+    """
+
+    nearest: Rounding
+    add: Operation
+    multiply: Operation
+    divide: Operation
+    difference: Operation
+    signed_zero: bool
+
+
+def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
+    """Return what fits m 2**e of any length into p bits and the exponents `least` to `most`.
+
+    `cut` towards zero, else to nearest even; what is too large is infinite. Too small: `gradual`
+    as IEEE 754 has it, else zero.
+    """
+    shortened = _cut if cut else _to_even
+
+    def rounded(m: int, e: int) -> Pair:
+        if not m:
+            return 0, 0.0
+        shift = m.bit_length() - p
+        if e + shift < least:
+            return small(m, e)
+        if shift > 0:
+            m = shortened(m, shift)
+            if m.bit_length() > p:
+                m >>= 1
+                e += 1
+        elif shift:
+            m <<= -shift
+        e += shift
+        return (m, e) if e <= most else (0, math.copysign(math.inf, m))
+
+    def small(m: int, e: int) -> Pair:
+        if not gradual:
+            return 0, 0.0
+        short = shortened(m, least - e) if e < least else m << (e - least)
+        return (short, least) if short else (0, math.copysign(0.0, m))
+
+    return rounded
+
+
+def _cut(m: int, shift: int) -> int:
+    return m >> shift if m > 0 else -(-m >> shift)
+
+
+def _to_even(m: int, shift: int) -> int:
+    return (m + (1 << shift - 1) - 1 + (m >> shift & 1)) >> shift
+
+
+def ieee(p: int, largest: int, cut: bool) -> Rules:
+    """Return the rules of IEEE 754, p bits and numbers below 2**(largest + 1), or with `cut` sums.
+
+    A cut result too large is infinite, as on the machines that cut, where IEEE 754 has the largest.
+    """
+    least, most = 2 - largest - p, largest - p + 1
+    fit = rounding(p, least, most, cut, gradual=True)
+
+    def add(xm: int, xe: int, ym: int, ye: int) -> Pair:
+        if xe < ye:
+            xm, xe, ym, ye = ym, ye, xm, xe
+        apart = xe - ye
+        if apart > p + 2:
+            # All of y is below an eighth of x's unit: any such number rounds the same.
+            return fit((xm << 3) + (1 if ym > 0 else -1), xe - 3)
+        return fit((xm << apart) + ym, ye)
+
+    def multiply(xm: int, xe: int, ym: int, ye: int) -> Pair:
+        return fit(xm * ym, xe + ye)
+
+    def divide(xm: int, xe: int, ym: int, ye: int) -> Pair:
+        shift = p + 2 + ym.bit_length() - xm.bit_length()
+        quotient, rest = divmod(abs(xm) << shift, abs(ym))
+        quotient = quotient << 1 | (rest > 0)
+        return fit(quotient if (xm < 0) == (ym < 0) else -quotient, xe - ye - shift - 1)
+
+    nearest = rounding(p, least, most, cut=False, gradual=True)
+    return Rules(nearest, add, multiply, divide, add, signed_zero=True)

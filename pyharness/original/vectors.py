@@ -1,0 +1,69 @@
+"""Vectors: operations of the CDC with their results, word for word, and who computes them.
+
+Those in `data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC
+60463560); a public emulator of its float unit gives the same. A file of that form is a list of
+tables: `name`, `op` (an instruction of `octal.operated`), `x`, `y` and `result`, in octal.
+"""
+
+import json
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pyharness.model.errors import InputError, kind_of
+from pyharness.original.octal import operated
+
+OURS = Path(__file__).parent.parent / "data" / "words" / "cdc.json"
+_FIELDS = ("name", "op", "x", "y", "result")
+
+
+class Vector(NamedTuple):
+    """An operation: its name, instruction, operands and result, words in octal."""
+
+    name: str
+    op: str
+    x: str
+    y: str
+    result: str
+
+
+class Answer(NamedTuple):
+    """A vector, and what we compute."""
+
+    vector: Vector
+    found: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the words are the same."""
+        return "".join(self.vector.result.split()) == "".join(self.found.split())
+
+
+def answers(path: str | Path = OURS) -> list[Answer]:
+    """Return our answers to the vectors of a file.
+
+    InputError where it can't be read, is not of that form, or has no vector.
+    """
+    try:
+        entries = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or f"no JSON: {error}"
+        raise InputError(f"vectors '{path}': {reason}") from None
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"vectors '{path}': {kind_of(entries)}; allowed: a list of vectors")
+    return [_answer(f"vectors '{path}', entry {n}", each) for n, each in enumerate(entries, 1)]
+
+
+def _answer(where: str, entry: Any) -> Answer:
+    if not isinstance(entry, dict):
+        raise InputError(f"{where}: {kind_of(entry)}; allowed: a table of {', '.join(_FIELDS)}")
+    for field in _FIELDS:
+        if not isinstance(entry.get(field), str):
+            raise InputError(f"{where}: {field} is {kind_of(entry.get(field))}; it must be text")
+    vector = Vector(*(entry[field] for field in _FIELDS))
+    if not re.fullmatch("[0-7]{20}", "".join(vector.result.split())):
+        raise InputError(f"{where}: result {vector.result!r}: not 20 octal digits")
+    try:
+        return Answer(vector, operated(vector.op, vector.x, vector.y))
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None

@@ -1,0 +1,281 @@
+"""Words: numbers of p bits with a rule of rounding, in which the twins run as in floats.
+
+A number of a word behaves as a float does: operators, comparison, `abs`, `float`. Beside another
+number of its word it takes whole numbers and floats, which stand for the literals of a source: the
+shortest decimal that is that float, rounded to the nearest number of the word.
+"""
+
+import math
+import operator
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, ClassVar
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.original.cdc import cdc
+from pyharness.original.programs import WORD_NAMES
+from pyharness.original.rounding import Pair, Rules, ieee
+
+RULES = ("nearest-even", "chop", "FX", "RX")
+# More than a word's own bits, of a sine before it is rounded to these.
+_GUARD_BITS = 40
+
+
+class Number:
+    """A number m 2**e of a word, never changed; where m is 0, e is 0.0, -0.0, inf, -inf or nan.
+
+    Every word has a class of its own, made by `Word`.
+    """
+
+    __slots__ = ("e", "m")
+    word: ClassVar["Word"]
+    rules: ClassVar[Rules]
+
+    def __init__(self, m: int, e: Any) -> None:
+        """Take what is a number of the word already."""
+        self.m, self.e = m, e
+
+    def __add__(self, other: Any) -> "Number":
+        """Return the sum by the rule of the word."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.add(self.m, self.e, other.m, other.e))
+        return self._special(operator.add, other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> "Number":
+        """Return the difference: the sum with the negative."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.add(self.m, self.e, -other.m, other.e))
+        return self._special(operator.add, -other)
+
+    def __rsub__(self, other: Any) -> "Number":
+        """Return the difference from what is no number of the word yet."""
+        return self.word(other) - self
+
+    def __mul__(self, other: Any) -> "Number":
+        """Return the product by the rule of the word."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.multiply(self.m, self.e, other.m, other.e))
+        return self._special(operator.mul, other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> "Number":
+        """Return the quotient by the rule of the word; by zero: infinite, or of zero nan."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.divide(self.m, self.e, other.m, other.e))
+        return self._special(_quotient, other)
+
+    def __rtruediv__(self, other: Any) -> "Number":
+        """Return the quotient of what is no number of the word yet."""
+        return self.word(other) / self
+
+    def __neg__(self) -> "Number":
+        """Return the negative."""
+        return self.__class__(-self.m, self.e) if self.m else self._plain(-self.e)
+
+    def __abs__(self) -> "Number":
+        """Return the magnitude."""
+        return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
+
+    def __bool__(self) -> bool:
+        """Whether it is not zero."""
+        return bool(self.m or self.e)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the difference is zero; the CDC's can be that of neighbours."""
+        x, y = self, self.word(other)
+        if x.m and y.m:
+            m, e = self.rules.difference(x.m, x.e, -y.m, y.e)
+            return not m and bool(e == 0.0)
+        return x._shadow == y._shadow
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __lt__(self, other: Any) -> bool:
+        """Whether the difference is below zero; its sign is exact, that of the CDC's too."""
+        return self._below(self.word(other))
+
+    def __gt__(self, other: Any) -> bool:
+        """Whether the difference is above zero."""
+        return self.word(other)._below(self)
+
+    def __le__(self, other: Any) -> bool:
+        """Whether the difference is not above zero, nor nan."""
+        return self < other or self._order(self.word(other)) == 0
+
+    def __ge__(self, other: Any) -> bool:
+        """Whether the difference is not below zero, nor nan."""
+        return self > other or self._order(self.word(other)) == 0
+
+    def __float__(self) -> float:
+        """Return the nearest float; infinite beyond their range."""
+        if not self.m:
+            return float(self.e)
+        try:
+            return float(self.fraction())
+        except OverflowError:
+            return math.copysign(math.inf, self.m)
+
+    def __repr__(self) -> str:
+        """Return the word and the value."""
+        value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
+        return f"{self.word}({value})"
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether it is neither nan nor infinite."""
+        return bool(self.m) or self.e == 0.0
+
+    def fraction(self) -> Fraction:
+        """Return the exact value; of a finite number alone."""
+        return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
+
+    def sqrt(self) -> "Number":
+        """Return the square root, correctly rounded to the nearest number of any word."""
+        if self.m <= 0:
+            return self._plain(self.e if not self.m and not self.e < 0.0 else math.nan)
+        shift = 2 * self.word.p + 4 + (self.e & 1)
+        root = math.isqrt(self.m << shift)
+        rest = root * root != self.m << shift
+        return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
+
+    def sin(self) -> "Number":
+        """Return the sine of an angle (rad), rounded to the nearest number of any word."""
+        return self._wave("mpf_sin")
+
+    def cos(self) -> "Number":
+        """Return the cosine of an angle (rad), rounded to the nearest number of any word."""
+        return self._wave("mpf_cos")
+
+    def _wave(self, name: str) -> "Number":
+        if not self.m:
+            at_zero = self.e if name == "mpf_sin" else 1.0
+            return self.word(at_zero if self.e == 0.0 else math.nan)
+        from mpmath import libmp
+
+        function = getattr(libmp, name)
+        angle = libmp.from_man_exp(self.m, self.e)
+        sign, m, e, _ = function(angle, self.word.p + _GUARD_BITS)
+        return self.__class__(*self.rules.nearest(-int(m) if sign else int(m), e))
+
+    def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
+        """Return what comes of zeros, infinities and nan, which floats have the same."""
+        found = operation(self._shadow, other._shadow)
+        if found and math.isfinite(found):
+            return self if self.m else other  # a zero was added
+        return self._plain(found)
+
+    def _plain(self, value: float) -> "Number":
+        return self.__class__(0, value if value or self.rules.signed_zero else 0.0)
+
+    @property
+    def _shadow(self) -> float:
+        """A float of the same sign, and zero, infinite or nan as the number is."""
+        if self.m:
+            return 1.0 if self.m > 0 else -1.0
+        return float(self.e)
+
+    def _below(self, other: "Number") -> bool:
+        return self._order(other) < 0
+
+    def _order(self, other: "Number") -> float:
+        """Return a number below, at or above zero as the exact difference is; or nan."""
+        if not (self.m and other.m):
+            x, y = self._shadow, other._shadow
+            return 0.0 if x == y else x - y
+        apart: int = self.e - other.e
+        return (self.m << apart) - other.m if apart >= 0 else self.m - (other.m << -apart)
+
+
+def _quotient(x: float, y: float) -> float:
+    if y:
+        return x / y
+    return math.nan if math.isnan(x) or not x else math.copysign(math.inf, x) * math.copysign(1, y)
+
+
+class Word:
+    """An arithmetic: p bits, and one of `RULES`; the exponents of IEEE 754 up to `largest`.
+
+    `nearest-even` and `chop` (towards zero) have the exponents of binary64 up to 53 bits, of
+    binary128 beyond, or those given; `FX` and `RX`, the CDC's, those of its words. Called with a
+    float, a whole number, a fraction or the text of a decimal it returns the nearest `Number`.
+
+    Raises
+    ------
+    InputError
+        For an unknown rule, or less than two bits.
+    """
+
+    def __init__(self, p: int, rule: str = "nearest-even", largest: int | None = None) -> None:
+        """Make the class of its numbers."""
+        if rule not in RULES:
+            raise unknown("rounding", rule, RULES)
+        if p < 4:
+            raise InputError(f"word: {p} bits; allowed: 4 or more")
+        self.p, self.rule = p, rule
+        if rule in ("FX", "RX"):
+            rules = cdc(p, rounds=rule == "RX")
+        else:
+            exponent = largest or (1023 if p <= 53 else 16383)
+            rules = ieee(p, exponent, cut=rule == "chop")
+        self.rules = rules
+        fields = {"__slots__": (), "word": self, "rules": rules}
+        self.number: type[Number] = type("Number", (Number,), fields)
+        self._literals: dict[float, Number] = {}
+
+    def __repr__(self) -> str:
+        """Return the bits and the rule."""
+        return f"Word({self.p}, {self.rule!r})"
+
+    def __call__(self, value: Any) -> Number:
+        """Return the number of a value; TypeError for what is none, or of another word."""
+        if isinstance(value, Number) and value.word is self:
+            return value
+        if isinstance(value, float):
+            known = self._literals.get(value) if value else None
+            if known is None:
+                known = self.number(*self._nearest(value))
+                if value and math.isfinite(value):
+                    self._literals[value] = known
+            return known
+        if isinstance(value, int):
+            return self.number(*self.rules.nearest(value, 0))
+        if isinstance(value, Fraction | str):
+            return self.number(*self._of_fraction(Fraction(value)))
+        raise TypeError(f"{value!r} is no number of {self}")
+
+    def _nearest(self, value: float) -> Pair:
+        if not value or not math.isfinite(value):
+            return 0, value if value or self.rules.signed_zero else 0.0
+        return self._of_fraction(Fraction(float.__repr__(value)))
+
+    def _of_fraction(self, value: Fraction) -> Pair:
+        above, below = abs(value.numerator), value.denominator
+        shift = max(0, self.p + 2 + below.bit_length() - above.bit_length())
+        quotient, rest = divmod(above << shift, below)
+        quotient = quotient << 1 | (rest > 0)
+        return self.rules.nearest(quotient if value > 0 else -quotient, -shift - 1)
+
+
+WORDS: dict[str, Word] = {
+    "binary64": Word(53),
+    "binary32": Word(24, largest=127),
+    "binary128": Word(113),
+    "cdc48": Word(48, "FX"),
+    "cdc48-rounded": Word(48, "RX"),
+}
+assert tuple(WORDS) == WORD_NAMES

@@ -1,0 +1,119 @@
+"""What word length does: pages, stops, errors and IER, by the bits of a word and its rule."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.history.words import WordCell, cells
+from pyharness.history.words_report import words_report
+from pyharness.original.vectors import OURS
+from pyharness.original.word import RULES
+from pyharness.views.csv import csv_text
+from tests.conftest import Printed
+
+LENGTHS = (16, 20, 24, 28, 48, 53)
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[tuple[int, str, str], WordCell]:
+    each = [
+        *cells([2], ["runge-kutta"], LENGTHS),
+        *cells([2], ["four-term"], (24, 28, 48)),
+        *cells([6], ["two-term"], (24, 48, 113)),
+    ]
+    return {(c.double.case, c.double.program, c.double.listing): c for c in each}
+
+
+Found = dict[tuple[int, str, str], WordCell]
+
+
+def test_double_is_the_run_in_53_bits(found: Found) -> None:
+    for cell in found.values():
+        if (run := cell.of(53, "nearest-even")) is not None:
+            assert run == cell.double
+            assert run.different == 0
+    cell = found[2, "runge-kutta", "corrected"]
+    assert cell.of(54, "chop") is None
+    assert [(run.p, run.rule) for run in cell.runs] == [
+        (p, rule) for rule in RULES for p in LENGTHS
+    ]
+
+
+def test_rounding_takes_over_where_words_are_short(found: Found) -> None:
+    """The corrected Runge-Kutta program leaves out 2.5e-7; 16 bits cost a thousand times that."""
+    cell = found[2, "runge-kutta", "corrected"]
+    floor = cell.widest.error
+    assert floor == pytest.approx(2.5e-7, rel=0.05)
+    for rule in RULES:
+        run = cell.of(16, rule)
+        assert run is not None
+        assert run.error > 100.0 * floor
+        least = 24 if rule == "nearest-even" else 28
+        assert cell.settled(rule, lambda run: run.error <= 2.0 * floor) == least
+        assert cell.settled(rule, lambda run: run.p != 28) == 48
+        assert cell.settled(rule, lambda run: run.p != 53) is None
+
+
+def test_stops_and_singular_matrices(found: Found) -> None:
+    for p in LENGTHS:
+        for rule in RULES:
+            run = found[2, "runge-kutta", "original"].of(p, rule)
+            assert run is not None
+            assert run.stop == "V2 at 25"
+            assert run.fields == 25 * 7
+    for p, singular in ((24, 100), (28, 0)):
+        for rule in RULES:
+            run = found[2, "four-term", "corrected"].of(p, rule)
+            assert run is not None
+            assert (run.singular, run.stop, run.fields) == (singular, "", 800)
+            assert (run.different > 100) == (singular > 0)
+
+
+def test_pages_of_another_length_differ_in_every_number_that_is_missing(found: Found) -> None:
+    """Two-term Case 6 leaves every bound: where, the exponents of a word decide."""
+    cell = found[6, "two-term", "original"]
+    assert cell.double.stop.startswith("overflow at ")
+    rows = {int(run.stop.split()[-1]) - 1 for run in (*cell.runs, cell.double) if run.stop}
+    assert len(rows) > 1
+    for run in cell.runs:
+        mine = int(run.stop.split()[-1]) - 1 if run.stop else 100
+        double = int(cell.double.stop.split()[-1]) - 1
+        assert run.fields == 8 * max(mine, double)
+        assert run.different >= 8 * abs(mine - double) * (mine != double) - abs(mine - double)
+
+
+def test_report_has_every_run(found: Found) -> None:
+    cell = found[2, "runge-kutta", "original"]
+    report = words_report([cell])
+    assert report.record()["runs"] == [asdict(run) for run in cell.runs]
+    assert report.data is not None
+    assert len(csv_text(report.data).splitlines()) == 1 + len(cell.runs)
+    # Without 48 bits there is nothing to say of the machine's own words.
+    assert len(report.text) == 4
+    short = [*cells([2], ["runge-kutta"], (24,))]
+    assert len(words_report(short).text) == 3
+
+
+def test_verb(printed: Printed, tmp_path: Path) -> None:
+    picture = tmp_path / "words.png"
+    text = printed(f"words --case 1 --program runge-kutta --format json --plot {picture}")
+    runs = json.loads(text)["runs"]
+    assert len(runs) == 2 * 16 * 4
+    assert {run["p"] for run in runs} >= {16, 48, 113}
+    assert picture.stat().st_size > 1000
+    assert len(picture.with_suffix(".csv").read_text().splitlines()) == 1 + len(runs)
+
+
+def test_vectors_that_differ_end_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["words", "--vectors", str(OURS)]) == 0
+    assert "24 of 24 vectors agree" in capsys.readouterr().out
+    bad = tmp_path / "bad.json"
+    bad.write_text(OURS.read_text().replace("1716 5252 5252 5252 5253", "1716 5252 5252 5252 5252"))
+    assert main(["words", "--vectors", str(bad)]) == 1
+    out = capsys.readouterr().out
+    assert "23 of 24 vectors agree" in out
+    assert "1/3 (RX/)" in out
+    assert "ours   1716 5252 5252 5252 5253" in out

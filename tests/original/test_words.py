@@ -1,0 +1,240 @@
+"""Words: bits of the processor, of exact rationals, of the CDC's vectors; the twins in them."""
+
+import json
+import math
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from pyharness import run_program
+from pyharness.compare.agreement import differences
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.original import in_word
+from pyharness.original.octal import from_octal, operated, to_octal
+from pyharness.original.printer import page
+from pyharness.original.programs import WORD_NAMES
+from pyharness.original.vectors import answers
+from pyharness.original.word import RULES, WORDS, Word
+from tests.original.exact_words import disagreements
+from tests.original.words_campaign import FLOATS, differing
+
+CDC, ROUNDED = WORDS["cdc48"], WORDS["cdc48-rounded"]
+
+
+@pytest.mark.bitwise
+@pytest.mark.parametrize("name", FLOATS)
+def test_bits_are_those_of_numpy(name: str) -> None:
+    """`python -m tests.original.words_campaign` draws a million."""
+    assert differing(name, 20_000, "test") == []
+
+
+@pytest.mark.bitwise
+@pytest.mark.parametrize("p", [11, 24, 48])
+@pytest.mark.parametrize("rule", RULES)
+def test_every_rule_agrees_with_exact_rationals(rule: str, p: int) -> None:
+    assert disagreements(p, rule, 3000, "test") == []
+
+
+def test_vectors_agree() -> None:
+    found = answers()
+    assert len(found) == 24
+    assert [each.vector.name for each in found if not each.agrees] == []
+
+
+def test_octal_words_are_numbers_and_back() -> None:
+    words = ["1720 4000 0000 0000 0000", "6060 3146 3146 3146 3145", "0000 0000 0000 0000 0000"]
+    words += ["3777 0000 0000 0000 0000", "4000 7777 7777 7777 7777", "1777 0000 0000 0000 0000"]
+    words += ["0000 4000 0000 0000 0000", "1776 4000 0000 0000 0000", "2000 4000 0000 0000 0000"]
+    words += ["3776 7777 7777 7777 7777"]
+    for each in words:
+        assert to_octal(from_octal(each)) == each
+    assert from_octal(words[0]) == (2**47, -47)
+    assert from_octal(words[3]) == (0, math.inf)
+    assert from_octal(words[7])[1] == -1
+    assert from_octal(words[8])[1] == 0
+
+
+def test_literals_of_the_decks_are_the_words_of_the_vectors() -> None:
+    for text, word in ((0.01, "1711 5075 3412 1727 0244"), (0.2, "1715 6314 6314 6314 6315")):
+        number = CDC(text)
+        assert to_octal((number.m, number.e)) == word
+
+
+def test_no_guard_bit_survives() -> None:
+    for word, due in ((CDC, 1 - Fraction(2) ** -47), (ROUNDED, Fraction(1))):
+        assert (word(1.0) - word(2.0**-48)).fraction() == due
+    below = CDC(1 - Fraction(2) ** -48)
+    assert (CDC(1.0) - below).fraction() == 0
+    # One unit apart, and equal by the zero of their difference, but not by its sign.
+    assert below == CDC(1.0)
+    assert below < CDC(1.0)
+    assert not below > CDC(1.0)
+    plain = Word(48)
+    assert plain(1 - Fraction(2) ** -48) != plain(1.0)
+
+
+def test_infinite_indefinite_and_underflow() -> None:
+    largest = CDC.number((1 << 48) - 1, 1022)
+    assert float((largest * largest).e) == math.inf
+    assert (largest + largest).e == math.inf
+    assert not (largest + largest).is_finite
+    infinite = largest + largest
+    assert math.isnan((infinite - infinite).e)
+    assert math.isnan((CDC(0.0) / CDC(0.0)).e)
+    assert (CDC(-1.0) / CDC(0.0)).e == -math.inf
+    least = CDC.number(1 << 47, -1023)
+    assert not least * CDC(0.5)
+    assert CDC.number(1 << 47, -1022) * 0.5 == least
+    # IEEE 754 goes on below its least normal number, and has a minus zero.
+    assert (WORDS["binary32"](2.0**-149) * 1.0).fraction() == Fraction(2) ** -149
+    assert math.copysign(1.0, float(-WORDS["binary32"](0.0))) == -1.0
+    assert math.copysign(1.0, float(-CDC(0.0))) == 1.0
+    assert float(Word(113)(2.0**1000) * 2.0**1000) == math.inf
+    assert (Word(113)(2.0**1000) * 2.0**1000).is_finite
+
+
+def test_unordered_compares_with_nothing() -> None:
+    for word in WORDS.values():
+        nan, one = word(math.nan), word(1.0)
+        for x, y in ((nan, one), (one, nan), (nan, nan)):
+            assert not any([x < y, x > y, x == y, x <= y, x >= y])
+        assert word(math.inf) > one >= one > word(-math.inf)
+        assert word(0.0) == -word(0.0)
+        assert one <= 1 < word(2) < 3.5
+        assert bool(nan)
+        assert not word(0)
+
+
+def test_roots_and_waves_are_rounded_to_nearest() -> None:
+    for word in (*WORDS.values(), Word(20, "chop")):
+        for x in (2.0, 3.0, 1e-3, 0.25, 7e10):
+            value, root = word(x).fraction(), word(x).sqrt()
+            half = Fraction(2) ** root.e / 2
+            assert (root.fraction() - half) ** 2 <= value <= (root.fraction() + half) ** 2
+    random, single = Random("waves"), WORDS["binary32"]
+    for _ in range(300):
+        x = float(np.float32(random.uniform(-1e3, 1e3)))
+        assert float(WORDS["binary64"](abs(x)).sqrt()) == math.sqrt(abs(x))
+        assert float(single(Fraction(x)).sin()) == np.float32(math.sin(x))
+        assert float(single(Fraction(x)).cos()) == np.float32(math.cos(x))
+        assert float(Word(113)(x).sin()) == pytest.approx(math.sin(x), rel=1e-15, abs=0.0)
+    assert Word(53)(-0.0).sin().e == 0.0
+    assert Word(53)(0.0).cos() == 1
+    assert math.isnan(Word(53)(math.inf).cos().e)
+    assert math.isnan(Word(53)(-1.0).sqrt().e)
+    assert Word(53)(math.inf).sqrt().e == math.inf
+
+
+SCENES = {
+    "case 3": case_scene(3),
+    "case 7": case_scene(7),
+    "huge": Scene("", (1e150, 1e160, 1.0), (3.0, 2.0, 1.0)),
+    "tiny": Scene("", (1e-300, 1e-310, 5e-324), (3.0, 2.0, 1.0)),
+    "at rest": Scene("", (0.0, -0.0, 0.0), (3.0, 2.0, 1.0)),
+    "explodes": Scene("", (1.0, 1.0, 1.0), coefficients=(50.0, 60.0, 70.0)),
+    "singular matrix": Scene("", (0.0, 1.0, 10.0), (40.0, 30.0, 20.0), step_size=1e-8, steps=5),
+}
+
+
+@pytest.mark.bitwise
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_binary64_has_the_bits_and_the_page_of_floats(program: str, name: str) -> None:
+    """`verify --only words` does so in every cell."""
+    scene = SCENES[name]
+    for listing in (original(program), corrected(program)):
+        floats = run_program(scene, listing, "python")
+        ours = in_word.run(scene, listing, WORDS["binary64"])
+        assert differences(floats, ours) == []
+        assert floats.exact is None
+        assert (ours.exact is None) == (ours.steps == 0)
+        if scene.moments is not None:
+            assert page(scene, program, ours) == page(scene, program, floats)
+
+
+def test_trajectory_has_the_numbers_themselves() -> None:
+    run = run_program(case_scene(5), corrected("two-term"), "python", word="binary128")
+    assert run.exact is not None
+    assert run.exact.shape == (100, 8)
+    np.testing.assert_array_equal(run.exact[:, 2:5].astype(float), run.omega)
+    step = case_scene(5).step_size
+    assert run.exact[0, 0].fraction() == WORDS["binary128"](step).fraction() != Fraction(step)
+    assert run.exact[-1, 2].m.bit_length() == 113
+
+
+def test_page_is_printed_from_the_exact_value() -> None:
+    """A number nearer to a tie than any float is printed to the side on which it is."""
+    wide = Word(113)
+    tie = Fraction(5, 100_000)
+    scene, listing = case_scene(1), corrected("runge-kutta")
+    run = replace(run_program(scene, listing, "python"), ier=None)
+    for offset, due in ((Fraction(1, 10**30), "0.0001"), (-Fraction(1, 10**30), "0.0000")):
+        number = wide(tie + offset)
+        assert float(number) == 5e-5
+        rows = np.array([[number] * 8], dtype=object)
+        line = page(scene, "runge-kutta", replace(run, exact=rows)).splitlines()[-1]
+        assert line.split().count(due) == 6
+
+
+def test_words_change_what_they_should() -> None:
+    """Case 2 has its stop in every word, IER = 129 in 24 bits, a last digit in the machine's."""
+    scene = case_scene(2)
+    for name in WORD_NAMES:
+        run = run_program(scene, original("runge-kutta"), "python", word=name)
+        assert run.stop is not None
+        assert (run.stop.step, run.stop.variable) == (25, "V2")
+        assert isinstance(run.stop.quotient, float)
+    single = run_program(scene, corrected("four-term"), "python", word="binary32")
+    assert single.ier is not None
+    assert (single.ier == 129).all()
+    pages = {
+        name: page(scene, "two-term", run_program(scene, original("two-term"), "python", word=name))
+        for name in ("binary64", "cdc48", "cdc48-rounded")
+    }
+    assert pages["binary64"] == pages["cdc48-rounded"]
+    pairs = zip(pages["binary64"].split(), pages["cdc48"].split(), strict=True)
+    assert sum(x != y for x, y in pairs) == 1
+
+
+def test_mistakes_are_one_line(tmp_path: Path) -> None:
+    scene, listing = case_scene(2), original("two-term")
+    with pytest.raises(InputError, match="did you mean 'cdc48'"):
+        run_program(scene, listing, "python", word="cdc47")
+    with pytest.raises(InputError, match="compiled programs run in binary64 alone"):
+        run_program(scene, listing, word="cdc48")
+    with pytest.raises(InputError, match="allowed: binary64"):
+        run_program(scene, listing, "python", word=48)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="would take too long"):
+        run_program(replace(scene, steps=100_000), listing, "python", word="cdc48")
+    with pytest.raises(InputError, match="did you mean 'nearest-even'"):
+        Word(24, "nearest")
+    with pytest.raises(InputError, match="4 or more"):
+        Word(2)
+    with pytest.raises(TypeError):
+        CDC(1.0) + Word(48, "RX")(1.0)
+    for text in ("1720 4000", "not octal", "1720 0000 0000 0000 0001"):
+        with pytest.raises(InputError, match="word"):
+            from_octal(text)
+    with pytest.raises(InputError, match="unknown instruction"):
+        operated("DX+", "0" * 20, "0" * 20)
+    path = tmp_path / "vectors.json"
+    for content in ("{", "[]", "3", "[3]", '[{"name": 1}]'):
+        path.write_text(content)
+        with pytest.raises(InputError, match="vectors"):
+            answers(path)
+    vector = {"name": "", "op": "FX+", "x": "0" * 20, "y": "0" * 20, "result": "0" * 19}
+    path.write_text(json.dumps([vector]))
+    with pytest.raises(InputError, match="entry 1: result"):
+        answers(path)
+    path.write_text(json.dumps([{**vector, "result": "0" * 20, "op": "XX"}]))
+    with pytest.raises(InputError, match="entry 1: unknown instruction"):
+        answers(path)
+    with pytest.raises(InputError, match="No such file"):
+        answers(tmp_path / "missing.json")

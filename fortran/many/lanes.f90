@@ -4,7 +4,7 @@ module lanes
   use, intrinsic :: iso_fortran_env, only: int64
   use blocks, only: LANE_COUNT
   use kinds, only: dp
-  use deck, only: accelerations, deck_t, euler_coefficients
+  use deck_binary64, only: accelerations, deck_t, euler_coefficients
   use ensemble, only: ensemble_t
   implicit none(type, external)
   private

@@ -5,7 +5,7 @@ module lanes_two_term
   use kinds, only: dp
   use ensemble, only: ensemble_t
   use lanes, only: block_t, torque_within
-  use linear_solver, only: factor
+  use linear_solver_binary64, only: factor
   implicit none(type, external)
   private
 

@@ -217,7 +217,7 @@ class Word:
     Raises
     ------
     InputError
-        For an unknown rule, or less than two bits.
+        For an unknown rule, or less than four bits.
     """
 
     def __init__(self, p: int, rule: str = "nearest-even", largest: int | None = None) -> None:

@@ -29,9 +29,9 @@ def extension() -> ModuleType:
     return module
 
 
-def columns(waves: tuple[Wave, ...]) -> Array:
+def columns(waves: tuple[Wave, ...], kind: type = float) -> Array:
     """Return amplitudes and frequencies as the kernels take them, shape (4, n)."""
-    columns = np.empty((4, len(waves)), order="F")
+    columns = np.empty((4, len(waves)), dtype=kind, order="F")
     for index, (amplitude, frequency) in enumerate(waves):
         columns[:3, index] = amplitude
         columns[3, index] = frequency

@@ -1,4 +1,5 @@
-! What f2py reads, with api_many.f90 and api_words.f90: explicit shapes, known kinds, a status code, no logic.
+! What f2py reads, with api_many.f90 and api_words.f90: explicit shapes, known kinds, a status code,
+! no logic.
 
 subroutine run_program(program, flags, by_moments, body, omega, masses, forces, torque_constant, &
                        torque_rate, torque_first, torque_varies, n_sines, sines, n_cosines, &

@@ -70,6 +70,15 @@ def run(
     )
 
 
+def compiled_words() -> tuple[str, ...]:
+    """Return the names of the words that the extension has; none where there is no extension."""
+    try:
+        from pyharness import _build
+    except ImportError:
+        return ()
+    return tuple(_build.WORDS)
+
+
 def _check_angles(scene: Scene) -> None:
     # TIME of the collocation programs grows with the square of the steps.
     latest = scene.step_size * scene.steps**2

@@ -9,7 +9,7 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled_in_word, in_word
 from pyharness.original.cells import all_cells, cell_name
-from pyharness.original.programs import BINARY64, COMPILED_WORDS, run_program
+from pyharness.original.programs import BINARY64, run_program
 from pyharness.original.vectors import answers
 from pyharness.original.word import WORDS
 from pyharness.verify.selection import Selection, replay
@@ -40,9 +40,11 @@ def _against_floats(chosen: Selection, listing: Listing, case: int) -> Iterator[
 
 
 def _against_fortran(chosen: Selection, listing: Listing, case: int) -> Iterator[Check]:
-    for word in COMPILED_WORDS:
+    if not chosen.only and (listing.label == "custom" or listing.readings):
+        return
+    for word in compiled_in_word.compiled_words():
         id = f"words/{word}/{cell_name(listing, case)}"
-        if chosen.asks(id) and (chosen.only or listing.label != "custom" and not listing.readings):
+        if chosen.asks(id):
             scene = case_scene(case)
             fortran = compiled_in_word.run(scene, listing, WORDS[word])
             yield _check(id, in_word.run(scene, listing, WORDS[word]), fortran)

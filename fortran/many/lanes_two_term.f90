@@ -1,5 +1,5 @@
 module lanes_two_term
-  !! A step of two_term.f90 in every lane; the margin names its cards.
+  !! A step of two_term.fypp in every lane; the margin names its cards.
   !! The matrix knows DT alone: it is factored where DT is another, and not for every body.
   use blocks, only: LANE_COUNT
   use kinds, only: dp

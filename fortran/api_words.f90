@@ -35,3 +35,17 @@ subroutine run_program_in_word(program, flags, by_moments, n_bytes, triples, lim
                             c_loc(cosines), c_loc(rows), c_loc(stop_quotient)), &
                    ier_rows, n_rows, status, evaluations, stop_variable)
 end subroutine run_program_in_word
+
+subroutine functions_of_word(n_bytes, n, given, values, status)
+  ! Square root, sine and cosine by themselves, so that they can be tested alone.
+  !f2py threadsafe
+  use, intrinsic :: iso_c_binding, only: c_loc
+  use words, only: functions_in_word
+  implicit none
+  integer(4), intent(in) :: n_bytes, n
+  integer(1), intent(in), target :: given(n_bytes, n)
+  integer(1), intent(out), target :: values(n_bytes, 3, n)
+  integer(4), intent(out) :: status  ! 0, or 3: no such word
+
+  call functions_in_word(n_bytes, n, c_loc(given), c_loc(values), status)
+end subroutine functions_of_word

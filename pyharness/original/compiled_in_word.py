@@ -50,7 +50,7 @@ def run(
     )
     if status == REFUSED:
         raise InputError(
-            f"word of {8 * n_bytes(word)} bits: the compiler of this build has none; "
+            f"--word binary{8 * n_bytes(word)}: the compiler of this build has none; "
             "allowed: implementation python"
         )
     exact = from_bytes(rows[:, :, :n_rows], word).T

@@ -45,7 +45,9 @@ def trajectory_report(
     form: str = "quaternion",
     word: str | None = None,
 ) -> Report:
-    """Report one trajectory; `listing` and `word` are None for a method that is no program.
+    """Report one trajectory; `listing` is None for a method that is no program.
+
+    `word` is the arithmetic of a program, where it is not binary64.
 
     An attitude is shown in a form of `model.attitude.FORMS`.
     """
@@ -76,7 +78,7 @@ def trajectory_report(
             "scene": records.scene_record(scene),
             "method": method,
             "listing": None if listing is None else records.listing_record(listing),
-            "word": word,
+            **({} if word is None else {"word": word}),
             "trajectory": {
                 "time": trajectory.time.tolist(),
                 "recorded_time": trajectory.recorded_time.tolist(),

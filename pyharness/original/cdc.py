@@ -31,7 +31,7 @@ def cdc(p: int, rounds: bool) -> Rules:
 
     nearest = rounding(p, LEAST, MOST, cut=False, gradual=False)
     plain, add = (_sum(p, each) for each in (False, rounds))
-    return Rules(nearest, add, multiply, divide, plain, signed_zero=False)
+    return Rules(nearest, settled, add, multiply, divide, plain, signed_zero=False)
 
 
 def _sum(p: int, rounds: bool) -> Operation:

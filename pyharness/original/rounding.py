@@ -24,7 +24,9 @@ class Rules(NamedTuple):
     Attributes
     ----------
     nearest : Rounding
-        The nearest number of the word, of two the even one: literals and functions.
+        The nearest number of the word, of two the even one: functions, and literals.
+    cut : Rounding
+        The next number towards zero: literals where those are cut.
     add, multiply, divide : Operation
         Of two numbers; a difference is the sum with the negative.
     difference : Operation
@@ -34,6 +36,7 @@ class Rules(NamedTuple):
     """
 
     nearest: Rounding
+    cut: Rounding
     add: Operation
     multiply: Operation
     divide: Operation
@@ -108,5 +111,5 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
         quotient = quotient << 1 | (rest > 0)
         return fit(quotient if (xm < 0) == (ym < 0) else -quotient, xe - ye - shift - 1)
 
-    nearest = rounding(p, least, most, cut=False, gradual=True)
-    return Rules(nearest, add, multiply, divide, add, signed_zero=True)
+    nearest, towards_zero = (rounding(p, least, most, each, gradual=True) for each in (False, True))
+    return Rules(nearest, towards_zero, add, multiply, divide, add, signed_zero=True)

@@ -212,7 +212,8 @@ class Word:
 
     `nearest-even` and `chop` (towards zero) have the exponents of binary64 up to 53 bits, of
     binary128 beyond, or those given; `FX` and `RX`, the CDC's, those of its words. Called with a
-    float, a whole number, a fraction or the text of a decimal it returns the nearest `Number`.
+    float, a whole number, a fraction or the text of a decimal it returns the nearest `Number`, or
+    with `cut_literals` the next one towards zero.
 
     Raises
     ------
@@ -220,7 +221,13 @@ class Word:
         For an unknown rule, or less than four bits.
     """
 
-    def __init__(self, p: int, rule: str = "nearest-even", largest: int | None = None) -> None:
+    def __init__(
+        self,
+        p: int,
+        rule: str = "nearest-even",
+        largest: int | None = None,
+        cut_literals: bool = False,
+    ) -> None:
         """Make the class of its numbers."""
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)
@@ -233,6 +240,7 @@ class Word:
             exponent = largest or (1023 if p <= 53 else 16383)
             rules = ieee(p, exponent, cut=rule == "chop")
         self.rules = rules
+        self._literal = rules.cut if cut_literals else rules.nearest
         fields = {"__slots__": (), "word": self, "rules": rules}
         self.number: type[Number] = type("Number", (Number,), fields)
         self._literals: dict[float, Number] = {}
@@ -253,7 +261,7 @@ class Word:
                     self._literals[value] = known
             return known
         if isinstance(value, int):
-            return self.number(*self.rules.nearest(value, 0))
+            return self.number(*self._literal(value, 0))
         if isinstance(value, Fraction | str):
             return self.number(*self._of_fraction(Fraction(value)))
         raise TypeError(f"{value!r} is no number of {self}")
@@ -268,7 +276,7 @@ class Word:
         shift = max(0, self.p + 2 + below.bit_length() - above.bit_length())
         quotient, rest = divmod(above << shift, below)
         quotient = quotient << 1 | (rest > 0)
-        return self.rules.nearest(quotient if value > 0 else -quotient, -shift - 1)
+        return self._literal(quotient if value > 0 else -quotient, -shift - 1)
 
 
 WORDS: dict[str, Word] = {

@@ -67,6 +67,25 @@ def test_literals_of_the_decks_are_the_words_of_the_vectors() -> None:
         assert to_octal((number.m, number.e)) == word
 
 
+def test_literals_beside_a_tie_go_to_their_own_side() -> None:
+    tie, little = Fraction(17, 16), Fraction(1, 10**9)
+    due = {-little: Fraction(1), Fraction(0): Fraction(1), little: Fraction(9, 8)}
+    assert {each: Word(4)(tie + each).fraction() for each in due} == due
+
+
+def test_pages_do_not_hang_on_how_literals_are_rounded() -> None:
+    """How FTN converted them is not known; cut, they print what the nearest ones do."""
+    cut = Word(48, "FX", cut_literals=True)
+    assert cut(0.2).fraction() < Fraction(1, 5) < CDC(0.2).fraction()
+    assert cut(0.25).fraction() == Fraction(1, 4)
+    for program in PROGRAMS:
+        for case in (2, 4, 7):
+            scene = case_scene(case)
+            for listing in (original(program), corrected(program)):
+                nearest, other = (in_word.run(scene, listing, each) for each in (CDC, cut))
+                assert page(scene, program, nearest) == page(scene, program, other)
+
+
 def test_no_guard_bit_survives() -> None:
     for word, due in ((CDC, 1 - Fraction(2) ** -47), (ROUNDED, Fraction(1))):
         assert (word(1.0) - word(2.0**-48)).fraction() == due
@@ -124,7 +143,7 @@ def test_roots_and_waves_are_rounded_to_nearest() -> None:
         assert float(WORDS["binary64"](abs(x)).sqrt()) == math.sqrt(abs(x))
         assert float(single(Fraction(x)).sin()) == np.float32(math.sin(x))
         assert float(single(Fraction(x)).cos()) == np.float32(math.cos(x))
-        assert float(Word(113)(x).sin()) == pytest.approx(math.sin(x), rel=1e-15, abs=0.0)
+        assert float(Word(113)(Fraction(x)).sin()) == pytest.approx(math.sin(x), rel=1e-15, abs=0.0)
     assert Word(53)(-0.0).sin().e == 0.0
     assert Word(53)(0.0).cos() == 1
     assert math.isnan(Word(53)(math.inf).cos().e)

@@ -25,6 +25,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.linear_solver import SINGULAR
+from pyharness.original.vectors import Answer
 from pyharness.stress.run import TRIALS, trial
 from pyharness.stress.trials import length, step_size
 from pyharness.theory import brouwer
@@ -37,6 +38,7 @@ ULP = 2.0 * U
 
 _RUN = "pyharness.original.programs.Program.run"
 _COMPILED = "pyharness.original.compiled.run"
+_IN_WORD = "pyharness.original.in_word.run"
 _DECK = "pyharness.verify.decks.run_deck"
 _DRAWN = "pyharness.verify.random_methods"
 _SOLVE = "pyharness.compare.candidates.solve"
@@ -147,6 +149,11 @@ def bit_off(found: Any, size: float, name: str = "omega") -> Any:
     changed = found.copy()
     changed[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
     return changed
+
+
+def without_answer(found: list[Answer], size: float) -> list[Answer]:
+    """Let the first vector have no answer, where the size is not 0."""
+    return [found[0]._replace(found=""), *found[1:]] if size else found
 
 
 def degrees_off(found: Array, size: float) -> Array:
@@ -393,6 +400,8 @@ VERIFY = (
     # Every bit, counter and label, in one language and in both alike.
     exact("cells/two-term/case-3/corrected", on(_COMPILED, bit_off), ULP),
     exact("random/0/program", on(_COMPILED, bit_off), ULP),
+    exact("words/two-term/case-3/corrected", on(_IN_WORD, bit_off), ULP),
+    exact("words/vectors", on("pyharness.verify.words.answers", without_answer)),
     exact("decks/two-term/case-3/original", on(_COMPILED, bit_off), ULP),
     exact("decks/runge-kutta/case-2/original", refuses(_DECK, RuntimeError)),
     exact(_BITS, on(_COMPILED, partial(bit_off, name="velocity")), ULP),

@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         return records(trajectory)
 
     form = options.attitude or FORMS[0]
-    word = None if listing is None else options.word or BINARY64
+    word = None if options.word == BINARY64 else options.word
     report = trajectory_report(scene, name, listing, title, trajectory, form, word)
     shared.show(report, options, {"printer": page, "tape5": tape})
     return 1 if options.strict and trajectory.ended == "sensitive" else 0

@@ -44,11 +44,11 @@ DRIVER = """program driver
   use methods, only: RK4
   implicit none (type, external)
   interface
-    subroutine solve(bodies_at, method, omega, status, interrupted) &
+    subroutine solve(bodies_at, method, n, omega, status, interrupted) &
       bind(c, name="solve_many_fixed_LEVEL")
       import :: c_int, c_ptr, dp, i1
       type(c_ptr), intent(in), value :: bodies_at
-      integer(c_int), intent(in), value :: method
+      integer(c_int), intent(in), value :: method, n
       real(dp), intent(inout) :: omega(3, *)
       integer(i1), intent(inout) :: status(*)
       integer(c_int), intent(out) :: interrupted
@@ -79,7 +79,7 @@ DRIVER = """program driver
     given%omega0(:, i) = [0.3_dp, 1.0_dp, -0.5_dp] + 0.01_dp*i
   end do
   start = processor_time()
-  call solve(c_loc(given), int(RK4, c_int), omega, status, interrupted)
+  call solve(c_loc(given), int(RK4, c_int), int(n, c_int), omega, status, interrupted)
   finish = processor_time()
   print *, real(finish - start, dp)*1e-6_dp, sum(omega)
 end program driver

@@ -14,57 +14,61 @@ from pyharness import Ensemble, Scene, TorqueLaw, solve, solve_many
 from pyharness.model.trajectory import Array
 
 _BATCH = 20_000
-_KINDS = ("no torque", "constant", "ramp", "wave")
+KINDS = ("free", "constant", "ramp", "waves")
 _ROUNDING = 8e-15  # for each factor of growth
 _BODY = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0))
 
 
-def drawn(generator: np.random.Generator, n: int, kind: int) -> tuple[Array, dict[str, Any]]:
-    """Return times and arrays for `solve_many`."""
-    narrow = generator.random() < 0.5
-    moments = (
-        generator.uniform(1, 3, (n, 3)) if narrow else 10.0 ** generator.uniform(-2, 2, (n, 3))
+def bodies(kind: str, n: int, seed: int, decades: float = 3.0) -> dict[str, Any]:
+    """Draw bodies, starts, times and torques that matter."""
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    moments = 10.0 ** (decades * rng.uniform(-0.5, 0.5, (n, 3)))
+    omega0 = rng.standard_normal((n, 3)) * 10.0 ** rng.uniform(-2, 2, (n, 1))
+    rate = np.abs(omega0).max(axis=1, keepdims=True)
+    drawn = {"moments": moments, "omega0": omega0, "t_end": rng.uniform(0.3, 10.0, n) / rate[:, 0]}
+    if kind != "free":
+        drawn["torque_constant"] = moments * rate**2 * rng.standard_normal((n, 3))
+    if kind in ("ramp", "waves"):
+        drawn["torque_rate"] = 0.1 * moments * rate**3 * rng.standard_normal((n, 3))
+    if kind == "waves":
+        for name in ("sines", "cosines"):
+            amplitude = moments * rate**2 * rng.standard_normal((n, 3))
+            frequency = rate * rng.uniform(0.1, 3.0, (n, 1))
+            drawn[name] = np.concatenate([amplitude, frequency], axis=1)[:, None, :]
+    drawn["t_end"][::3] *= -1.0
+    return drawn
+
+
+def scene_of(drawn: dict[str, Any], row: int) -> Scene:
+    """Return one of them."""
+    waves = {
+        name: [(tuple(wave[:3]), wave[3]) for wave in drawn[name][row]] if name in drawn else ()
+        for name in ("sines", "cosines")
+    }
+    zero = np.zeros((row + 1, 3))
+    law = TorqueLaw(
+        drawn.get("torque_constant", zero)[row],
+        drawn.get("torque_rate", zero)[row],
+        waves["sines"],
+        waves["cosines"],
     )
-    omega0 = generator.standard_normal((n, 3)) * 10.0 ** generator.uniform(-2, 2, (n, 1))
-    fastest = np.abs(omega0).max(axis=1, keepdims=True)
-    times = 3.0 * generator.uniform(0.1, 1) * 10.0 ** generator.uniform(-0.5, 1, n) / fastest[:, 0]
-    arrays: dict[str, Any] = {"moments": moments, "omega0": omega0}
-
-    def torque(scale: Array) -> Array:
-        return np.asarray(generator.standard_normal((n, 3)) * moments * scale)
-
-    if kind > 0:
-        arrays["torque_constant"] = torque(fastest**2 * 10.0 ** generator.uniform(-2, 0.5, (n, 1)))
-    if kind > 1:
-        arrays["torque_rate"] = torque(0.1 * fastest**3)
-    if kind > 2:
-        frequency = generator.uniform(0.1, 3, (n, 1)) * fastest
-        arrays["sines"] = np.concatenate([torque(fastest**2), frequency], axis=1)[:, None, :]
-    return times, arrays
-
-
-def scene_of(arrays: dict[str, Any], body: int) -> Scene:
-    """Return one body as a scene."""
-    rows: dict[str, Any] = {name: array[body].tolist() for name, array in arrays.items()}
-    waves = [(wave[:3], wave[3]) for wave in rows.get("sines", [])]
-    law = TorqueLaw(rows.get("torque_constant", ()), rows.get("torque_rate", ()), waves)
-    return Scene("", rows["omega0"], moments=rows["moments"], torque=law)
+    return Scene("", drawn["omega0"][row], moments=drawn["moments"][row], torque=law)
 
 
 def exceeding(
-    times: Array, arrays: dict[str, Any], tolerance: float, found: Ensemble, truth: Ensemble
+    drawn: dict[str, Any], tolerance: float, found: Ensemble, truth: Ensemble
 ) -> tuple[list[int], list[int], Array]:
     """Return bodies beyond their tolerance, those whose single solution is too, and all errors.
 
     Errors are over the tolerance; NaN where a body has none.
     """
     done = (found.status == 0) & np.isin(truth.status, (0, 6))
-    ends = np.maximum(np.abs(truth.omega), np.abs(arrays["omega0"])).max(axis=1)
+    ends = np.maximum(np.abs(truth.omega), np.abs(drawn["omega0"])).max(axis=1)
     error = np.where(done, np.abs(found.omega - truth.omega).max(axis=1) / ends, np.nan)
     beyond, alike = [], []
     for body in np.flatnonzero(error > tolerance).tolist():
         # The promise is of the largest omega on the way, and of what rounding may grow to.
-        scene, end = scene_of(arrays, body), float(times[body])
+        scene, end = scene_of(drawn, body), float(drawn["t_end"][body])
         way = solve(scene, np.linspace(0.0, end, 401)[1:], "taylor", 1e-15)
         largest = max(float(np.abs(way.omega).max()), float(ends[body]))
         allowed = tolerance + _ROUNDING * (way.growth or 1.0)
@@ -83,19 +87,19 @@ def main(count: int, seed: int) -> int:
     most: dict[str, float] = {}
     solved = n_beyond = n_alike = 0
     for number in range(-(-count // _BATCH)):
-        kind, tolerance = number % len(_KINDS), 10.0 ** -float(generator.integers(3, 13))
-        times, arrays = drawn(generator, min(_BATCH, count), kind)
-        found, truth = (
-            solve_many(_BODY, times, tolerance=each, **arrays) for each in (tolerance, 1e-15)
-        )
-        beyond, alike, shares = exceeding(times, arrays, tolerance, found, truth)
+        kind, tolerance = KINDS[number % len(KINDS)], 10.0 ** -float(generator.integers(3, 13))
+        n, decades = min(_BATCH, count), float(generator.choice([0.5, 2.0, 4.0]))
+        drawn = bodies(kind, n, int(generator.integers(2**31)), decades)
+        if kind != "free":
+            drawn["torque_constant"] *= 10.0 ** generator.uniform(-2.0, 0.5, (n, 1))
+        found, truth = (solve_many(_BODY, tolerance=each, **drawn) for each in (tolerance, 1e-15))
+        beyond, alike, shares = exceeding(drawn, tolerance, found, truth)
         for body in sorted({*beyond} - {*alike}):
-            scene = scene_of(arrays, body)
-            print(f"{_KINDS[kind]} at {tolerance:g}: {shares[body]:.2g} of it, {scene}")
+            print(f"{kind} at {tolerance:g}: {shares[body]:.2g} of it, {scene_of(drawn, body)}")
         solved += int(np.isfinite(shares).sum())
         n_beyond += len(beyond)
         n_alike += len(alike)
-        name = f"{_KINDS[kind]} at {tolerance:g}"
+        name = f"{kind} at {tolerance:g}"
         most[name] = max(most.get(name, 0.0), float(np.nanmax(shares)))
     for name, share in sorted(most.items()):
         print(f"{name}: most {share:.2g} of the tolerance")

@@ -14,9 +14,9 @@ from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from tests.as_written import compiler_here, many_as_written
+from tests.many_errors import KINDS, bodies, exceeding, scene_of
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
-KINDS = ("free", "constant", "ramp", "waves")
 LEVELS = [0, 1, 2]
 
 
@@ -28,42 +28,6 @@ def level(request: pytest.FixtureRequest) -> Iterator[int]:
         pytest.skip("this processor has it not")
     yield request.param
     extension().choose_instructions(2)
-
-
-def bodies(kind: str, n: int, seed: int) -> dict[str, Any]:
-    """Draw bodies, starts, times and torques that matter."""
-    rng = np.random.default_rng([seed, KINDS.index(kind)])
-    moments = 10.0 ** rng.uniform(-1.5, 1.5, (n, 3))
-    omega0 = rng.standard_normal((n, 3)) * 10.0 ** rng.uniform(-2, 2, (n, 1))
-    rate = np.abs(omega0).max(axis=1, keepdims=True)
-    drawn = {"moments": moments, "omega0": omega0, "t_end": rng.uniform(0.3, 10.0, n) / rate[:, 0]}
-    if kind != "free":
-        drawn["torque_constant"] = moments * rate**2 * rng.standard_normal((n, 3))
-    if kind in ("ramp", "waves"):
-        drawn["torque_rate"] = 0.1 * moments * rate**3 * rng.standard_normal((n, 3))
-    if kind == "waves":
-        for name in ("sines", "cosines"):
-            amplitude = moments * rate**2 * rng.standard_normal((n, 3))
-            frequency = rate * rng.uniform(0.1, 3.0, (n, 1))
-            drawn[name] = np.concatenate([amplitude, frequency], axis=1)[:, None, :]
-    drawn["t_end"][::3] *= -1.0
-    return drawn
-
-
-def scene_of(drawn: dict[str, Any], row: int) -> Scene:
-    """Return one of them."""
-    waves = {
-        name: [(tuple(wave[:3]), wave[3]) for wave in drawn[name][row]] if name in drawn else ()
-        for name in ("sines", "cosines")
-    }
-    zero = np.zeros((row + 1, 3))
-    law = TorqueLaw(
-        drawn.get("torque_constant", zero)[row],
-        drawn.get("torque_rate", zero)[row],
-        waves["sines"],
-        waves["cosines"],
-    )
-    return replace(TOP, omega=drawn["omega0"][row], moments=drawn["moments"][row], torque=law)
 
 
 def only(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
@@ -217,6 +181,56 @@ def test_bodies_near_the_ends_of_the_range_and_on_edges() -> None:
             alone = solver(start, t_end)
             allowed = 1e-12 * np.nan_to_num(np.abs(alone).max())
             assert np.allclose(found.omega[row], alone, rtol=0, atol=allowed, equal_nan=True)
+
+
+def test_spins_that_turn_over_after_long(level: int) -> None:
+    """So little beside the middle axis that the mean takes more levels than blocks have."""
+    tilts = np.logspace(-3, -15, 97)
+    starts = np.column_stack([tilts, np.ones_like(tilts), -0.5 * tilts])
+    # Somewhere on the turn.
+    times = (np.log(4.0 / tilts) + np.tile([-1.0, 0.0, 1.0], 33)[:97]) * np.sqrt(3.0)
+    scene = replace(TOP, moments=(3.0, 2.0, 1.0))
+    solver = prepare(scene)
+    alone = [solver(start, t) for start, t in zip(starts, times.tolist(), strict=True)]
+    found = solve_many(scene, times, omega0=starts)
+    assert np.abs(found.omega - alone).max() <= 1e-12
+    assert np.ptp(found.omega[:, 1]) > 0.1
+
+
+def test_orbits_next_to_the_separatrix(level: int) -> None:
+    """What rounding makes of the distance, it makes of the time of a turn."""
+    apart = 1.0 + np.logspace(-2, -14, 97) * np.tile([1.0, -1.0], 49)[:97]
+    starts = np.column_stack([apart / np.sqrt(3.0), np.full(97, 0.4), np.ones(97)])
+    scene = replace(TOP, moments=(3.0, 2.0, 1.0))
+    solver = prepare(scene)
+    alone = np.array([solver(start, 25.0) for start in starts])
+    assert np.abs(solver.many(starts, 25.0)[0] - alone).max() <= 1e-12 * np.abs(alone).max()
+
+
+def test_coefficients_of_one_sign(level: int) -> None:
+    """No body, yet equations: neither kernel of lanes has them."""
+    starts = np.random.default_rng(4).standard_normal((40, 3))
+    for coefficients in ((0.3, 0.5, 0.2), (-0.3, -0.5, -0.2)):
+        scene = Scene("", starts[0], coefficients=coefficients, step_size=0.05)
+        for method, allowed in (("auto", 1e-11), ("rk4", 1e-14)):
+            solver = prepare(scene, method)
+            found = solver.many(starts, 0.5)[0]
+            alone = np.array([solver(start, 0.5) for start in starts])
+            assert np.allclose(found, alone, rtol=0, atol=allowed * np.abs(alone).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_campaign_finds_what_exceeds(kind: str) -> None:
+    """One body is spoilt; a body that is too far off by itself as well is no fault of many."""
+    drawn = bodies(kind, 40, 3)
+    found, truth = (solve_many(TOP, tolerance=each, **drawn) for each in (1e-6, 1e-15))
+    assert exceeding(drawn, 1e-6, found, truth)[0] == []
+    found.omega[7] += 1e-4 * np.abs(found.omega[7]).max()
+    beyond, alike, shares = exceeding(drawn, 1e-6, found, truth)
+    assert (beyond, alike) == ([7], [])
+    assert shares[7] > 10.0
+    truth.omega[9] += 1e-4 * np.abs(truth.omega[9]).max()
+    assert exceeding(drawn, 1e-6, found, truth)[:2] == ([7, 9], [9])
 
 
 def test_attitudes_are_those_of_a_prepared_solver() -> None:

@@ -181,12 +181,12 @@ def test_sine_and_cosine_of_binary128_are_the_nearest() -> None:
             for found, due in ((sine, mpmath.sin(angle)), (cosine, mpmath.cos(angle))):
                 assert (found.m, found.e) == (_nearest(due).m, _nearest(due).e), x
     plain = [WIDE(x) for x in (0.0, -0.0, 1e-300, math.inf, math.nan)]
-    found = functions("binary128", plain)
-    assert [(sine.m, str(sine.e)) for _, sine, _ in found[:3]] == [
+    rows = functions("binary128", plain)
+    assert [(sine.m, str(sine.e)) for _, sine, _ in rows[:3]] == [
         (each.m, str(each.e)) for each in plain[:3]
     ]
-    assert [float(cosine) for _, _, cosine in found[:3]] == [1.0, 1.0, 1.0]
-    assert [str(each.e) for row in found[3:] for each in row[1:]] == ["nan"] * 4
+    assert [float(cosine) for _, _, cosine in rows[:3]] == [1.0, 1.0, 1.0]
+    assert [str(each.e) for row in rows[3:] for each in row[1:]] == ["nan"] * 4
 
 
 def _nearest(value: Any) -> Number:

@@ -1,4 +1,5 @@
-! What f2py reads, with api_many.f90: explicit shapes, known kinds, a status code, no logic.
+! What f2py reads, with api_many.f90 and api_words.f90: explicit shapes, known kinds, a status code,
+! no logic.
 
 subroutine run_program(program, flags, by_moments, body, omega, masses, forces, torque_constant, &
                        torque_rate, torque_first, torque_varies, n_sines, sines, n_cosines, &
@@ -6,9 +7,9 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
                        ier_rows, n_rows, status, evaluations, stop_variable, stop_quotient)
   ! One of the three programs of the appendix on one scene.
   !f2py threadsafe
-  use deck, only: deck_t, stop_t
+  use deck_binary64, only: deck_t, stop_t
   use listing_flags, only: listing_from_bits
-  use programs, only: run
+  use programs_binary64, only: run
   implicit none
   integer(4), intent(in) :: program        ! 1 two-term, 2 four-term, 3 runge-kutta
   integer(4), intent(in) :: flags          ! active defects and readings, bits of listing_flags
@@ -52,7 +53,7 @@ end subroutine run_program
 subroutine solve_linear(n, m, a, b, factors, x, ier)
   ! The stand-in for LEQT1F by itself: A X = B, so that it can be tested alone.
   !f2py threadsafe
-  use linear_solver, only: leqt1f
+  use linear_solver_binary64, only: leqt1f
   implicit none
   integer(4), intent(in) :: n, m
   real(8), intent(in) :: a(n, n)

@@ -10,7 +10,7 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
   ! One of the three programs on n bodies. What is not reached of the results stays as it was.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
-  use deck, only: deck_t
+  use deck_binary64, only: deck_t
   use ensemble, only: ensemble_t
   use interruption, only: watch
   use levels, only: run_lanes

@@ -33,7 +33,11 @@ _EXTREME = 1e60  # its fifth power overflows, and that of its inverse vanishes
 # Bodies side by side share the flags of a processor, so that no answer can tell of its own. They
 # have the bits of single runs, and those are guarded; or both sides of a choice are computed, where
 # a method goes without branches, and what is not sure is left to a single solution.
-_UNGUARDED = ("run_programs", "solve_ensemble", "solve_packed_many")
+# What another word's answer tells stands in bytes; of binary64 it is that of the guarded entry.
+_UNGUARDED = (
+    "run_programs", "solve_ensemble", "solve_packed_many", "run_program_in_word",
+    "functions_of_word",
+)  # fmt: skip
 _NAMES = {INVALID: "invalid", DIVIDE: "divide by zero", TOO_LARGE: "overflow"}
 
 

@@ -1,7 +1,7 @@
 module ensemble
   !! Many bodies for one program of the appendix. Compiled once: C passes it on by its address.
   use kinds, only: dp
-  use deck, only: deck_t
+  use deck_binary64, only: deck_t
   use listing_flags, only: listing_t
   implicit none(type, external)
   private

@@ -1,10 +1,10 @@
 module lanes
   !! Bodies side by side, each in a lane of its own: what the three programs have in common.
-  !! Every lane has the operations of deck.f90 in their order, and so the same bits.
+  !! Every lane has the operations of deck.fypp in their order, and so the same bits.
   use, intrinsic :: iso_fortran_env, only: int64
   use blocks, only: LANE_COUNT
   use kinds, only: dp
-  use deck, only: accelerations, deck_t, euler_coefficients
+  use deck_binary64, only: accelerations, deck_t, euler_coefficients
   use ensemble, only: ensemble_t
   implicit none(type, external)
   private
@@ -110,7 +110,7 @@ contains
   end subroutine spread_torque
 
   subroutine set_torque(scene, b, time, point)
-    !! N(time) over the moments at one point: normalized_torque of deck.f90.
+    !! N(time) over the moments at one point: normalized_torque of deck.fypp.
     type(deck_t), intent(in) :: scene
     type(block_t), intent(inout) :: b
     real(dp), intent(in) :: time(LANE_COUNT)
@@ -170,7 +170,7 @@ contains
   end subroutine add
 
   pure subroutine look(b, verdict, found)
-    !! Whether any lane overflows: is_finite of deck.f90.
+    !! Whether any lane overflows: is_finite of deck.fypp.
     type(block_t), intent(in) :: b
     integer(int64), intent(out) :: verdict(LANE_COUNT) !! of lanes that are alive
     integer(int64), intent(out) :: found               !! of any of them

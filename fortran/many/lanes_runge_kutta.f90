@@ -1,5 +1,5 @@
 module lanes_runge_kutta
-  !! A step of runge_kutta.f90 in every lane; the margin names its cards.
+  !! A step of runge_kutta.fypp in every lane; the margin names its cards.
   !! What a listing changes is which array a stage reads: no question is asked lane by lane.
   use, intrinsic :: iso_fortran_env, only: int64
   use blocks, only: LANE_COUNT

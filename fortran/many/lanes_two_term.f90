@@ -1,11 +1,11 @@
 module lanes_two_term
-  !! A step of two_term.f90 in every lane; the margin names its cards.
+  !! A step of two_term.fypp in every lane; the margin names its cards.
   !! The matrix knows DT alone: it is factored where DT is another, and not for every body.
   use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
   use lanes, only: block_t, torque_within
-  use linear_solver, only: factor
+  use linear_solver_binary64, only: factor
   implicit none(type, external)
   private
 

@@ -5,14 +5,14 @@ module many_programs
   use interruption, only: interrupt_raised
   use blocks, only: LANE_COUNT
   use kinds, only: dp
-  use deck, only: steps_between_looks, stop_t
+  use deck_binary64, only: steps_between_looks, stop_t
   use ensemble, only: ensemble_t
   use lanes, only: begin_block, block_t, EXCEEDS, GOES_ON, look, OVERFLOWS
   use lanes_four_term, only: grid_t, set_grid, step_four_term, torque_four_term
   use lanes_runge_kutta, only: begin_stages, stages_t, step_runge_kutta, test, &
                                torque_runge_kutta
   use lanes_two_term, only: points_t, set_points, step_two_term, torque_two_term
-  use runge_kutta_program, only: lipschitz_test
+  use runge_kutta_program_binary64, only: lipschitz_test
   use statuses, only: COMPLETE, OVERFLOW, STOPPED
   implicit none(type, external)
   private

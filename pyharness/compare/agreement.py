@@ -109,6 +109,11 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
     found = [name for name, x, y in arrays if ulps(x, y)]
     if not np.array_equal(first.ier, second.ier):  # type: ignore[arg-type]
         found.append("IER")
+    if first.exact is not None and second.exact is not None:
+        pairs = zip(first.exact.ravel().tolist(), second.exact.ravel().tolist(), strict=True)
+        # Of nan and of zeros too, which are no equal floats, or equal ones.
+        if any(x.m != y.m or str(x.e) != str(y.e) for x, y in pairs):
+            found.append("numbers of the word")
     return found
 
 

@@ -17,8 +17,12 @@ _SLACK = 2.0  # of a forecast: the pace so far is not that of the rest
 _ROUNDING = 1.0 + 1e-9  # of an effort that was advised
 _UNFORESEEN = 10.0  # where there is no forecast
 # Steps of a program without waves, some 30 s of the slowest; and what a wave costs of such a step.
+# Another word is that of a twin; those by name are of the compiled programs, of which binary128 has
+# no waves but by its own sine.
 _MOST_STEPS = {"fortran": 1e8, "python": 5e5, "another word": 5e4}
 _A_WAVE = {"fortran": 1.0, "python": 0.05, "another word": 0.3}
+_MOST_STEPS |= {"binary32": 2e5, "binary128": 2e5}
+_A_WAVE |= {"binary32": 0.1, "binary128": 10.0}
 # The same of the compiled programs on many bodies, a step of each counted.
 _MOST_STEPS_OF_ALL = 1e9
 

@@ -1,13 +1,14 @@
 """The compiled extension, and the words that it and Python share."""
 
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.scene import Wave
-from pyharness.model.trajectory import Array
 
 COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
 REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
@@ -29,9 +30,9 @@ def extension() -> ModuleType:
     return module
 
 
-def columns(waves: tuple[Wave, ...]) -> Array:
+def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
     """Return amplitudes and frequencies as the kernels take them, shape (4, n)."""
-    columns = np.empty((4, len(waves)), order="F")
+    columns: NDArray[Any] = np.empty((4, len(waves)), dtype=kind, order="F")
     for index, (amplitude, frequency) in enumerate(waves):
         columns[:3, index] = amplitude
         columns[3, index] = frequency

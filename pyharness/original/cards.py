@@ -261,7 +261,7 @@ def _cards_of(asked: str) -> list[Card]:
 
 def margin(program: str) -> Iterator[tuple[Place, str]]:
     """Give the lines of the port that name cards, and the cards that they name."""
-    file = f"{program.replace('-', '_')}.f90"
+    file = f"{program.replace('-', '_')}.fypp"
     for number, text in enumerate(_lines(next(f for f in _PORTS if f.exists()) / file), 1):
         if match := _MARGIN.match(text):
             yield Place(file, number, match[1].strip()), match[2]

@@ -1,7 +1,7 @@
 """The compiled programs of the appendix: scenes in, trajectories out."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from pyharness.model.extension import ENDS, columns, extension
 from pyharness.model.listing import PROGRAMS, Listing
@@ -38,16 +38,39 @@ def run(
     )
 
 
+class Arguments(NamedTuple):
+    """What the compiled `run_program` takes, in its order."""
+
+    program: int
+    flags: int
+    by_moments: bool
+    body: Any
+    omega: Any
+    masses: Any
+    forces: Any
+    torque_constant: Any
+    torque_rate: Any
+    torque_first: Any
+    torque_varies: bool
+    sines: Any
+    cosines: Any
+    step_size: float
+    n_steps: int
+    lipschitz: float
+    may_stop: bool
+    with_velocity: bool
+
+
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
-) -> tuple[Any, ...]:
+) -> Arguments:
     """Return what the compiled `run_program` takes."""
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
         conjectures = listing.conjectures - {"initial-torque"}
         listing = replace(listing, conjectures=conjectures)
     law = scene.body_torque
-    return (
+    return Arguments(
         PROGRAMS.index(listing.program) + 1,
         listing.flags,
         scene.moments is not None,

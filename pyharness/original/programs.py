@@ -14,7 +14,8 @@ from pyharness.original import compiled
 
 IMPLEMENTATIONS = ("fortran", "python")
 BINARY64 = "binary64"
-WORD_NAMES = (BINARY64, "binary32", "binary128", "cdc48", "cdc48-rounded")
+COMPILED_WORDS = (BINARY64, "binary32", "binary128")
+WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 
 @dataclass(frozen=True)
@@ -48,10 +49,12 @@ class Program:
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
             raise unknown("implementation", implementation, IMPLEMENTATIONS)
         if checked_word(word, implementation) != BINARY64:
-            from pyharness.original import in_word
+            from pyharness.original import compiled_in_word, in_word
 
-            check_steps(scene, self.name, "another word", effort)
-            return in_word.run(scene, listing, in_word.WORDS[word], lipschitz, may_stop)
+            is_twin = implementation == "python"
+            check_steps(scene, self.name, "another word" if is_twin else word, effort)
+            run = in_word.run if is_twin else compiled_in_word.run
+            return run(scene, listing, in_word.WORDS[word], lipschitz, may_stop)
         check_steps(scene, self.name, implementation, effort)
         return self._computed(scene, listing, implementation, lipschitz, may_stop, velocity)
 
@@ -71,9 +74,9 @@ def checked_word(word: object, implementation: str) -> str:
     """Return the name of a word; InputError for an unknown one, or one that Fortran has not."""
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
-    if word != BINARY64 and implementation == "fortran":
+    if word not in COMPILED_WORDS and implementation == "fortran":
         raise InputError(
-            f"--word {word}: the compiled programs run in {BINARY64} alone; "
+            f"--word {word}: the compiled programs run in {', '.join(COMPILED_WORDS)} alone; "
             "allowed: implementation python"
         )
     return word
@@ -117,7 +120,8 @@ def run_program(
     effort : float
         Factor on the steps, times waves, that are run without being asked for.
     word : str
-        The arithmetic, one of `WORD_NAMES`; any but binary64 with `implementation="python"` alone.
+        The arithmetic, one of `WORD_NAMES`; those not in `COMPILED_WORDS` with
+        `implementation="python"` alone.
 
     Raises
     ------

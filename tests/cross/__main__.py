@@ -49,11 +49,11 @@ CHECKED = (
 ORIGINAL = "fortran/original/"
 # Faults that bits need not show: program, file, what stands there, the fault, what must be said.
 FAULTS = {
-    "index": ("two-term", ("two_term.f90", "M1(3) + A1*U2(3)*U3(3)",
-                           "M1(3) + A1*U2(3)*U3(3) + 0.0_dp*U3(2 + I)"), "above upper bound"),
-    "uninitialised": ("four-term", ("four_term.f90", "V1(1) = 0.0_dp", "continue"), "invalid"),
-    "zero": ("runge-kutta", ("runge_kutta.f90", "begin = real(L - 1, dp)*scene%step_size",
-                             "begin = scene%step_size/real(L - 1, dp)"), "divide by zero"),
+    "index": ("two-term", ("two_term.fypp", "M1(3) + A1*U2(3)*U3(3)",
+                           "M1(3) + A1*U2(3)*U3(3) + 0.0_wp*U3(2 + I)"), "above upper bound"),
+    "uninitialised": ("four-term", ("four_term.fypp", "V1(1) = 0.0_wp", "continue"), "invalid"),
+    "zero": ("runge-kutta", ("runge_kutta.fypp", "begin = real(L - 1, wp)*scene%step_size",
+                             "begin = scene%step_size/real(L - 1, wp)"), "divide by zero"),
 }  # fmt: skip
 
 

@@ -45,7 +45,7 @@ def test_kind_that_f2py_would_guess_fails_the_build(tmp_path: Path) -> None:
     for text, code in ((good, 0), (bad, 1)):
         source = tmp_path / "x.f90"
         source.write_text(text)
-        command = [sys.executable, str(script), str(source), "m", str(tmp_path)]
+        command = [sys.executable, str(script), "m", str(tmp_path), str(source)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == code, done.stderr
         assert ("is mapped to C" in done.stderr) == bool(code)

@@ -17,7 +17,7 @@ from pyharness.original.collation import HEADING, expected_lines, undeclared, un
 SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
 # What the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
 FORMS = (
-    (r"_dp|\s|&$", ""), (r"(?<=\d)\.0(?!\d)", "."), (r"(?<![\d.])0\.(?=\d)", "."),
+    (r"_wp|\s|&$", ""), (r"(?<=\d)\.0(?!\d)", "."), (r"(?<![\d.])0\.(?=\d)", "."),
     (r"\b([MR][123])\(\w\)", r"\1"), (r"\bT([123])2\b", r"T\1**2"), (r"\bTL([234])\b", r"T(L)**\1"),
     (r"\((T\d)\*\1\*\1\)", r"\1**3"), (r"\((T\d)\*\1\)", r"\1**2"),
 )  # fmt: skip

@@ -226,7 +226,9 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     scene, listing = case_scene(2), original("two-term")
     with pytest.raises(InputError, match="did you mean 'cdc48'"):
         run_program(scene, listing, "python", word="cdc47")
-    with pytest.raises(InputError, match="compiled programs run in binary64 alone"):
+    with pytest.raises(
+        InputError, match="compiled programs run in binary64, binary32, binary128 alone"
+    ):
         run_program(scene, listing, word="cdc48")
     with pytest.raises(InputError, match="allowed: binary64"):
         run_program(scene, listing, "python", word=48)  # type: ignore[arg-type]

@@ -13,6 +13,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import (
     BINARY64,
+    COMPILED_WORDS,
     IMPLEMENTATIONS,
     WORD_NAMES,
     checked_word,
@@ -26,7 +27,8 @@ OPTIONS = {
     **shared.SCENE,
     "--program P": ", ".join(PROGRAMS),
     "--implementation I": "fortran (default) or python",
-    "--word W": f"arithmetic of the program, as {', '.join(WORD_NAMES)}; python but in the first",
+    "--word W": f"arithmetic of the program, as {', '.join(WORD_NAMES)}; python but in the first, "
+    f"where fortran is not asked for, in which {', '.join(COMPILED_WORDS[1:])} run too",
     "--method M": "a method in place of a program",
     **shared.LISTING,
     "--times T1,T2,...": "where results are wanted, s (methods)",

@@ -1,0 +1,217 @@
+module wide_functions
+  !! Square root, sine and cosine in binary128, of + - * / alone: a compiler's own need its library
+  !! at run time. The root is correctly rounded. Sine and cosine carry twice the bits before they
+  !! are rounded, so that they are the nearest number wherever the next 80 bits do not decide; the
+  !! twin has them from mpmath, by the same definition.
+  use, intrinsic :: iso_fortran_env, only: int64
+  use kinds, only: binary64, wp => binary128
+  implicit none(type, external)
+  private
+
+  type :: pair_t
+    real(wp) :: high
+    real(wp) :: low  !! at most half a unit of the last place of high
+  end type pair_t
+
+  integer :: i_power
+  real(wp), parameter :: POWERS(0:13) = [(2.0_wp**(2**i_power), i_power=0, 13)]
+  real(wp), parameter :: UNIT = epsilon(1.0_wp)              ! of a root from 1 to 2
+  real(wp), parameter :: SPLITTER = 2.0_wp**57 + 1.0_wp
+  real(wp), parameter :: QUARTERS = 0.6366197723675813430755350534900574739022_wp  ! 2 over pi
+  real(wp), parameter :: HALF_PI(3) = [1.57079632679489661923132169163975139873953405_wp, &
+                                       4.33590506506189051239852201302167612705270725e-35_wp, &
+                                       -1.42671545571947929048415935735977663232251099e-69_wp]
+  integer, parameter :: N_TERMS = 25  ! up to a quarter of pi, the next is below 2**-240
+  real(wp), parameter :: LEAST = 2.0_wp**(-60) ! an angle below is its own sine
+  real(wp), parameter :: MOST = 2.0_wp**60     ! its quarters are counted
+
+  interface sqrt
+    module procedure square_root
+  end interface sqrt
+
+  interface sin
+    module procedure sine
+  end interface sin
+
+  interface cos
+    module procedure cosine
+  end interface cos
+
+  public :: sqrt, sin, cos
+
+contains
+
+  elemental function square_root(x) result(root)
+    real(wp), intent(in) :: x
+    real(wp) :: root
+    real(wp) :: y         ! x over a power of 4, from 1 to 4
+    real(wp) :: scale     ! the root of that power
+    real(wp) :: rest      ! y less the square of the root, exact
+    type(pair_t) :: square
+    integer :: i
+    intrinsic :: sqrt
+
+    if (.not. x > 0.0_wp .or. x > huge(x)) then
+      root = x
+      if (x < 0.0_wp) root = (x - x)/(x - x)
+      return
+    end if
+
+    y = x
+    scale = 1.0_wp
+    do while (y < 1.0_wp)
+      y = y*POWERS(13)
+      scale = scale/POWERS(12)
+    end do
+    do i = 13, 1, -1
+      if (y >= POWERS(i)) then
+        y = y/POWERS(i)
+        scale = scale*POWERS(i - 1)
+      end if
+    end do
+
+    root = real(sqrt(real(y, binary64)), wp)
+    do i = 1, 2
+      square = product_of(root, root)
+      root = root + ((y - square%high) - square%low)/(2.0_wp*root)
+    end do
+    ! Less than a unit away now. In squares of the unit, rest and root are whole numbers, and the
+    ! root lies beyond half a unit where rest is more than root.
+    square = product_of(root, root)
+    rest = (y - square%high) - square%low
+    if (rest > root*UNIT) then
+      root = root + UNIT
+    else if (rest <= -root*UNIT) then
+      root = root - UNIT
+    end if
+    root = root*scale
+  end function square_root
+
+  elemental function sine(angle)
+    real(wp), intent(in) :: angle !! rad; NaN comes of one beyond MOST
+    real(wp) :: sine
+
+    if (abs(angle) < LEAST) then
+      sine = angle
+    else
+      sine = sine_later(angle, 0)
+    end if
+  end function sine
+
+  elemental function cosine(angle)
+    real(wp), intent(in) :: angle !! rad; NaN comes of one beyond MOST
+    real(wp) :: cosine
+
+    cosine = sine_later(angle, 1)
+  end function cosine
+
+  elemental function sine_later(angle, quarters_later) result(wave)
+    !! The sine of an angle and so many right angles, from its series about the nearest of them.
+    real(wp), intent(in) :: angle
+    integer, intent(in) :: quarters_later
+    real(wp) :: wave
+    type(pair_t) :: rest    ! of the angle, to the nearest right angle
+    type(pair_t) :: square
+    type(pair_t) :: series
+    integer(int64) :: quarter
+    integer :: odd          ! 1: the sine, 0: the cosine of the rest
+    integer :: k
+
+    if (.not. abs(angle) < MOST) then
+      wave = (angle - angle)/(angle - angle)
+      return
+    end if
+    quarter = int(angle*QUARTERS + merge(0.5_wp, -0.5_wp, angle > 0.0_wp), int64)
+    rest = less_quarters(angle, real(quarter, wp))
+    quarter = modulo(quarter + quarters_later, 4_int64)
+
+    odd = merge(1, 0, mod(quarter, 2_int64) == 0)
+    square = product_of_pairs(rest, rest)
+    series = pair_t(1.0_wp, 0.0_wp)
+    do k = N_TERMS, 1, -1
+      series = quotient_of(product_of_pairs(square, series), real((2*k - 1 + odd)*(2*k + odd), wp))
+      series = sum_of_pairs(pair_t(1.0_wp, 0.0_wp), pair_t(-series%high, -series%low))
+    end do
+    if (odd == 1) series = product_of_pairs(rest, series)
+    wave = series%high
+    if (quarter > 1) wave = -wave
+  end function sine_later
+
+  elemental function less_quarters(angle, quarters) result(rest)
+    !! An angle less so many right angles, whose digits are in three numbers.
+    real(wp), intent(in) :: angle
+    real(wp), intent(in) :: quarters
+    type(pair_t) :: rest
+    type(pair_t) :: part
+    integer :: i
+
+    rest = pair_t(angle, 0.0_wp)
+    do i = 1, 3
+      part = product_of(quarters, HALF_PI(i))
+      rest = sum_of_pairs(rest, pair_t(-part%high, -part%low))
+    end do
+  end function less_quarters
+
+  elemental function sum_of(a, b) result(pair)
+    !! The sum with what its rounding took off.
+    real(wp), intent(in) :: a
+    real(wp), intent(in) :: b
+    type(pair_t) :: pair
+    real(wp) :: share
+
+    pair%high = a + b
+    share = pair%high - a
+    pair%low = (a - (pair%high - share)) + (b - share)
+  end function sum_of
+
+  elemental function product_of(a, b) result(pair)
+    !! The product with what its rounding took off: factors are split, as there is no FMA.
+    real(wp), intent(in) :: a
+    real(wp), intent(in) :: b
+    type(pair_t) :: pair
+    real(wp) :: a_high
+    real(wp) :: a_low
+    real(wp) :: b_high
+    real(wp) :: b_low
+
+    a_high = SPLITTER*a - (SPLITTER*a - a)
+    a_low = a - a_high
+    b_high = SPLITTER*b - (SPLITTER*b - b)
+    b_low = b - b_high
+    pair%high = a*b
+    pair%low = ((a_high*b_high - pair%high) + a_high*b_low + a_low*b_high) + a_low*b_low
+  end function product_of
+
+  elemental function sum_of_pairs(a, b) result(pair)
+    type(pair_t), intent(in) :: a
+    type(pair_t), intent(in) :: b
+    type(pair_t) :: pair
+    type(pair_t) :: lows
+
+    pair = sum_of(a%high, b%high)
+    lows = sum_of(a%low, b%low)
+    pair = sum_of(pair%high, pair%low + lows%high)
+    pair = sum_of(pair%high, pair%low + lows%low)
+  end function sum_of_pairs
+
+  elemental function product_of_pairs(a, b) result(pair)
+    type(pair_t), intent(in) :: a
+    type(pair_t), intent(in) :: b
+    type(pair_t) :: pair
+
+    pair = product_of(a%high, b%high)
+    pair = sum_of(pair%high, pair%low + (a%high*b%low + a%low*b%high))
+  end function product_of_pairs
+
+  elemental function quotient_of(a, divisor) result(pair)
+    type(pair_t), intent(in) :: a
+    real(wp), intent(in) :: divisor
+    type(pair_t) :: pair
+    type(pair_t) :: back
+
+    pair%high = a%high/divisor
+    back = product_of(pair%high, divisor)
+    pair = sum_of(pair%high, (((a%high - back%high) - back%low) + a%low)/divisor)
+  end function quotient_of
+
+end module wide_functions

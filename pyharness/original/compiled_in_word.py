@@ -1,0 +1,91 @@
+"""The compiled programs in the words of IEEE 754, whose numbers go in and come out as bytes."""
+
+import itertools
+
+import numpy as np
+
+from pyharness.model.errors import InputError
+from pyharness.model.extension import ENDS, REFUSED, columns, extension
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
+from pyharness.original.compiled import program_arguments
+from pyharness.original.in_word import scene_in
+from pyharness.original.interchange import from_bytes, n_bytes, to_bytes
+from pyharness.original.word import Word
+
+# Of fortran/original/wide_functions.f90: of angles beyond, rad, quarters are not counted.
+_MOST_ANGLE = 2.0**60
+
+
+def run(
+    scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
+) -> Trajectory:
+    """Run a program in Fortran, in a word: what `in_word.run` takes and returns.
+
+    InputError where the compiler of the extension has no such word, or angles are too large for
+    its sine; NotBuiltError where there is no extension.
+    """
+    if word.p > 53:
+        _check_angles(scene)
+    inside = scene_in(scene, word)
+    given = program_arguments(inside, listing, lipschitz, may_stop, True)
+    law = inside.body_torque
+    waves = [columns(each, object) for each in (law.sines, law.cosines)]
+    triples = itertools.chain(
+        given.body, given.omega, given.masses, given.forces,
+        given.torque_constant, given.torque_rate, given.torque_first,
+    )  # fmt: skip
+    rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program_in_word(
+        given.program,
+        given.flags,
+        given.by_moments,
+        to_bytes(map(word, triples), word, 3, 7),
+        to_bytes([given.step_size, word(lipschitz)], word, 2),
+        given.torque_varies,
+        *(to_bytes(map(word, each.T.flat), word, *each.shape) for each in waves),
+        given.n_steps,
+        may_stop,
+        True,
+    )
+    if status == REFUSED:
+        raise InputError(
+            f"--word binary{8 * n_bytes(word)}: the compiler of this build has none; "
+            "allowed: implementation python"
+        )
+    exact = from_bytes(rows[:, :, :n_rows], word).T
+    results = exact.astype(np.float64)
+    found = from_bytes(quotient, word)[()]
+    return Trajectory(
+        time=results[:, 0],
+        recorded_time=results[:, 1],
+        omega=results[:, 2:5],
+        velocity=results[:, 5:8],
+        steps=n_rows,
+        evaluations=evaluations,
+        ended=ENDS[status],
+        stop=Stop(n_rows, STOP_VARIABLES[variable - 1], float(found)) if variable else None,
+        ier=None if listing.program == "runge-kutta" else ier[:n_rows],
+        exact=exact if n_rows else None,
+    )
+
+
+def compiled_words() -> tuple[str, ...]:
+    """Return the names of the words that the extension has; none where there is no extension."""
+    try:
+        from pyharness import _build
+    except ImportError:
+        return ()
+    return tuple(_build.WORDS)
+
+
+def _check_angles(scene: Scene) -> None:
+    # TIME of the collocation programs grows with the square of the steps.
+    latest = scene.step_size * scene.steps**2
+    law = scene.torque
+    for _, frequency in (*law.sines, *law.cosines):
+        if not abs(frequency) * latest < _MOST_ANGLE:
+            raise InputError(
+                f"frequency {frequency:g} rad/s over {scene.steps} steps of {scene.step_size:g} s: "
+                f"too large for the compiled sine of 128 bits; allowed: implementation python"
+            )

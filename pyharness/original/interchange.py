@@ -1,0 +1,71 @@
+"""Numbers of the words of IEEE 754 as the bytes of its interchange formats, and back.
+
+As this machine orders bytes: what the compiled programs take and give.
+"""
+
+import math
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.original.word import Number, Word
+
+Bytes = NDArray[np.int8]
+_BITS = {24: 32, 53: 64, 113: 128}
+
+
+def n_bytes(word: Word) -> int:
+    """Return the bytes of a number of a word, one of IEEE 754 with nearest-even."""
+    return _BITS[word.p] // 8
+
+
+def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
+    """Return numbers of a word, by columns, as an array of shape (bytes of a number, *shape)."""
+    size = n_bytes(word)
+    written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
+    # A copy: arrays that NumPy makes begin where any number may.
+    return np.array(np.frombuffer(written, np.int8).reshape((size, *shape), order="F"), order="F")
+
+
+def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
+    """Return the numbers of an array whose first axis is the bytes of a number."""
+    size = n_bytes(word)
+    written = given.tobytes(order="F")
+    found = np.empty(len(written) // size, dtype=object)
+    for index in range(len(found)):
+        each = written[index * size : (index + 1) * size]
+        found[index] = _number(int.from_bytes(each, sys.byteorder), word)
+    return found.reshape(given.shape[1:], order="F")
+
+
+def _pattern(x: Number) -> int:
+    """Return the sign, the biased exponent and the fraction as one whole number."""
+    p = x.word.p
+    places, most = p - 1, (1 << _BITS[p] - p) - 1
+    if x.m:
+        sign, coefficient = x.m < 0, abs(x.m)
+        # Gradual underflow, by its exponent 0, has the unit of exponent 1.
+        field = x.e + places + (most >> 1) if coefficient >> places else 0
+        fraction = coefficient & (1 << places) - 1
+    else:
+        sign, fraction = math.copysign(1.0, x.e) < 0.0, 0
+        field = 0 if x.e == 0.0 else most
+        if math.isnan(x.e):
+            sign, fraction = False, 1 << places - 1
+    return (sign << _BITS[p] - p | field) << places | fraction
+
+
+def _number(pattern: int, word: Word) -> Number:
+    places, most = word.p - 1, (1 << _BITS[word.p] - word.p) - 1
+    fraction = pattern & (1 << places) - 1
+    field = pattern >> places & most
+    sign = -1 if pattern >> _BITS[word.p] - 1 else 1
+    if field == most:
+        return word.number(0, math.nan if fraction else sign * math.inf)
+    coefficient = fraction | (1 << places if field else 0)
+    if not coefficient:
+        return word.number(0, sign * 0.0)
+    return word.number(sign * coefficient, max(field, 1) - places - (most >> 1))

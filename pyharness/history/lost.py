@@ -140,8 +140,9 @@ def _solved(weighting: str, length: float, rates: Array, mistake: str, second: b
     if mistake == "unscaled-solver":
         (a, b), (c, d) = matrix
         x, y = right.T
-        second = (y - c / a * x) / (d - c / a * b)
-        return np.array([(x - b * second) / a, second])
+        # A number of a word stands behind an array, which asks it then.
+        second = (y - x * (c / a)) / (d - c / a * b)
+        return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
     return np.array(solutions).T
 

@@ -24,7 +24,7 @@ from pyharness.history.claims.verdicts import (
     UNDECIDED,
 )
 from pyharness.history.family.members import Member
-from pyharness.model.listing import names_of, switches
+from pyharness.model.listing import PROGRAMS, names_of, switches
 from pyharness.views.render import render
 
 pytestmark = pytest.mark.claims
@@ -229,7 +229,7 @@ def test_claims_in_every_form(
         assert main(["claims", *options]) == 0
         return capsys.readouterr().out
 
-    monkeypatch.setattr("pyharness.cli.verbs.claims.judge", lambda entry: judged[entry["id"]])
+    monkeypatch.setattr("pyharness.cli.verbs.claims.judge", lambda entry, word: judged[entry["id"]])
     for options in ([], ["--assignments"]):
         assert max(map(len, told(*options).splitlines())) <= 100
     record: dict[str, Any] = json.loads(told("--format", "json"), parse_constant=pytest.fail)
@@ -315,3 +315,29 @@ def test_a_verdict_that_turns_on_either_side_does_not_survive(
     survivals = judge(claim("abstract-superior")).survivals
     assert survivals
     assert not any(each.survives for each in survivals)
+
+
+@pytest.mark.parametrize("word", ["cdc48", "cdc48-rounded"])
+def test_programs_run_in_the_word_that_is_assumed(word: str) -> None:
+    """The verdicts about stops are those of binary64; the numbers are the word's."""
+    floats, lab = (Laboratory(True, Assumptions(word=each)) for each in ("binary64", word))
+    for program in PROGRAMS:
+        found, expected = lab.run(program, 4), floats.run(program, 4)
+        assert found.exact is not None
+        assert found.steps == expected.steps
+        assert 0.0 < np.abs(found.omega - expected.omega).max() < 1e-8
+    for identity in ("v2-case-2-stopped", "v2-case-4-fails"):
+        entry = claim(identity)
+        assert outcome(entry, lab).verdict == outcome(entry, floats).verdict
+    assert 0.0 < np.abs(lab.models(4, 3) - floats.models(4, 3)).max() < 1e-8
+
+
+def test_computer_error_is_judged_in_the_machines_words() -> None:
+    entry = claim("iv2-computer-error")
+    numbers = outcome(entry, Laboratory(False)).numbers
+    apart = {name: x for name, x in numbers.items() if "apart from binary64" in name}
+    assert len(apart) == 6
+    assert all(1e-15 < x < 1e-11 for x in apart.values())
+    # A limit below what rounding does: the verdict hangs on it.
+    low = {**entry, "parameters": {**entry["parameters"], "limit": 2e-13}}
+    assert outcome(low, Laboratory(False)).verdict == REPRODUCED

@@ -1,11 +1,15 @@
 """The lost experiments: the weightings without a mistake, and what each mistake must show."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from pyharness.history import lost
-from pyharness.history.lost import Ranked, halved, march, ranked
+from pyharness.history.lost import CASES, WEIGHTINGS, Ranked, halved, march, ranked
 from pyharness.model.facts import facts
 from pyharness.model.scene_file import case_scene
+from pyharness.original.in_word import WORDS, scene_in
 
 
 @pytest.fixture(scope="module")
@@ -37,3 +41,27 @@ def test_symmetric_matrix_does_not_mind_being_transposed() -> None:
     scene = case_scene(2)
     same = march(scene, "least-squares", "transposed") == march(scene, "least-squares")
     assert same.all()
+
+
+def test_rounding_of_the_machine_makes_none_of_them_fail() -> None:
+    """In 24 bits the error is what such a word has; the CDC's is far below what was printed."""
+    for weighting in WEIGHTINGS:
+        for case in CASES:
+            floats = march(case_scene(case), weighting)
+            apart = {}
+            for word in ("binary64", "cdc48", "cdc48-rounded", "binary32"):
+                found = march(scene_in(case_scene(case), WORDS[word]), weighting)
+                apart[word] = np.abs(found - floats).max()
+            assert apart["binary64"] < 1e-14
+            assert 1e-15 < apart["cdc48-rounded"] < apart["cdc48"] < 1e-12
+            assert 1e-8 < apart["binary32"] < 1e-5
+
+
+def test_mistakes_fail_in_a_word_where_they_fail() -> None:
+    """One case is enough: what a mistake does is no matter of rounding."""
+    scene = scene_in(replace(case_scene(2), steps=20), WORDS["cdc48"])
+    floats = replace(case_scene(2), steps=20)
+    for mistake in ("matrix-used-up", "base-left-out", "unscaled-solver", "unit-interval"):
+        for weighting in WEIGHTINGS:
+            found, expected = march(scene, weighting, mistake), march(floats, weighting, mistake)
+            assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)

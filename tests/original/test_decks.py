@@ -11,7 +11,14 @@ from pyharness.model.listing import PROGRAMS, corrected, names_of, original, sub
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
-from pyharness.original.decks import compiler, deck_text, model_cards, run_deck
+from pyharness.original.decks import (
+    SYSTEMS,
+    compiler,
+    deck_text,
+    job_text,
+    model_cards,
+    run_deck,
+)
 from pyharness.verify.decks import decks
 from pyharness.verify.selection import Selection
 
@@ -54,6 +61,33 @@ def test_case_stands_on_the_cards_of_the_deck(case: int) -> None:
     assert cards[690].split() == ["DO", "100", "I=1,100,1"]
     # Table 1 gives torques that hold initially in Case 7.
     assert cards[250].strip() == ("N1=0." if case == 2 else "N1=100.")
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("rounds", [False, True])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_job_for_ftn_has_the_cards_as_they_are(program: str, rounds: bool, system: str) -> None:
+    listing = original(program)
+    job = job_text(deck_text(listing, None, "ftn"), system, rounds)
+    control, _, rest = job.partition("~eor\n")
+    assert rest.startswith(deck_text(listing))
+    after = rest.removeprefix(deck_text(listing))
+    assert ("SUBROUTINE LEQT1F" in after) == (program != "runge-kutta") == bool(after)
+    compiles = [line for line in control.splitlines() if line.startswith("FTN")]
+    assert len(compiles) == 1
+    assert ("ROUND=+-*/" in compiles[0]) == rounds
+    assert [line[:3] for line in control.splitlines()][-3:] == ["LGO", "REW", "COP"]
+    # What a card and the machine's character set have room for.
+    assert all(
+        len(line) <= 80 and line == line.upper() for line in job.splitlines()[6:] if line[0] != "~"
+    )
+
+
+def test_job_for_ftn_has_the_torque_of_case_7() -> None:
+    deck = deck_text(original("two-term"), case_scene(7), "ftn")
+    assert "SIN(100.*TIME)" in deck
+    assert "OPEN(" not in deck
+    assert "I=2 " not in deck_text(original("runge-kutta"), None, "ftn")
 
 
 def test_dialect_of_today_adds_marked_lines_alone() -> None:

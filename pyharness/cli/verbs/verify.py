@@ -8,6 +8,7 @@ from pyharness.cli import options as shared
 from pyharness.compare.checks import Check
 from pyharness.compare.checks_report import checks_report, samples, summary
 from pyharness.model.errors import InputError
+from pyharness.model.scene_file import case_numbers
 from pyharness.original.decks import compiler
 from pyharness.verify.kinds import KINDS, verify
 from pyharness.verify.random_methods import ROUNDING
@@ -21,6 +22,9 @@ OPTIONS = {
     "--seed S": "of the random draws (default: the week)",
     "--draws N": f"random draws (default {DRAWS})",
     "--external FILE": "a file of published figures, these alone",
+    "--listing-output FILE": "a page that one of the programs printed, anywhere: in which word?",
+    "--program P": "of that page (default: any)",
+    "--case N": "of that page, 1 to 7 (default: any)",
     "--self-test": "plant faults, and report which check catches which",
     "--update": "write the golden record anew",
     "--record DIR": "the golden record (default: the checkout's)",
@@ -30,6 +34,9 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Verify and show; 1 where something is not as it should be."""
+    if options.listing_output is not None:
+        return _listing_output(options)
+    shared.refuse(options, "the checks; give --listing-output", ("program", "case"))
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
@@ -55,6 +62,22 @@ def run(options: argparse.Namespace) -> int:
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
     shared.show(checks_report("verify", checks, text, seed=chosen.seed), options)
     return 0 if all(check.passed for check in checks) else 1
+
+
+def _listing_output(options: argparse.Namespace) -> int:
+    from pyharness.history.listing_output import fits, listing_output_report, read_page
+
+    others = ("only", "seed", "draws", "external", "self_test", "update", "record")
+    shared.refuse(options, "--listing-output", others)
+    shared.check_known("format", options.format, ("table", "json"))
+    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
+    cases = case_numbers() if options.case is None else [int(options.case)]
+    programs = shared.chosen_programs(options)
+    shared.check_outputs(options)
+    lines = read_page(options.listing_output)
+    found = fits(lines, programs, cases, shared.progress)
+    shared.show(listing_output_report(options.listing_output, found), options)
+    return 0 if found[0].is_whole else 1
 
 
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:

@@ -1,0 +1,164 @@
+"""A printed page from anywhere, held against the pages of the programs in every word.
+
+What a machine printed, an emulated one perhaps, says by its digits in which arithmetic it ran.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import zip_longest
+from pathlib import Path
+
+from pyharness.model.errors import InputError
+from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.report import Column, Report, Section, Table, words
+from pyharness.model.scene_file import case_scene
+from pyharness.original.printer import page
+from pyharness.original.programs import WORD_NAMES, run_program
+
+# A number as FORMAT writes it, asterisks where it has no room, R and I of the CDC.
+_FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
+_SHOWN = 5
+_LARGEST = 1 << 24  # bytes
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A number of a page that is not ours: its row and place in it, from 1, theirs and ours."""
+
+    row: int
+    place: int
+    theirs: str
+    ours: str
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A page against one of ours.
+
+    Attributes
+    ----------
+    program, listing, word : str
+    case : int
+    fields : int
+        Numbers in the rows of the page, theirs or ours, whichever has more.
+    differences : tuple of Difference
+        Those that are not printed alike.
+    """
+
+    program: str
+    case: int
+    listing: str
+    word: str
+    fields: int
+    differences: tuple[Difference, ...]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether every number is printed alike."""
+        return not self.differences
+
+
+def read_page(path: str) -> list[list[str]]:
+    """Return the lines of a file that hold numbers alone, field by field; InputError for others."""
+    try:
+        with Path(path).open("rb") as file:
+            text = file.read(_LARGEST).decode("ascii", "replace")
+    except OSError as error:
+        raise InputError(f"--listing-output {path}: {error.strerror}") from None
+    found = _numbers(text)
+    if not any(len(line) >= 6 for line in found):
+        raise InputError(
+            f"--listing-output {path}: no row of numbers; allowed: what a program printed to TAPE6"
+        )
+    return found
+
+
+def fits(
+    lines: Sequence[Sequence[str]],
+    programs: Sequence[str],
+    cases: Sequence[int],
+    progress: Callable[[str], None] = lambda told: None,
+) -> list[Fit]:
+    """Return how a page fits each of ours with its moments, torques and columns, the best first.
+
+    InputError where none of ours has them.
+    """
+    found = []
+    for program in programs:
+        for case in cases:
+            head, width = _form(program, case)
+            theirs = [line for line in lines if len(line) == width]
+            begins = any(list(lines[at : at + len(head)]) == head for at in range(len(lines)))
+            if not (begins and theirs):
+                continue
+            for listing in (original(program), corrected(program)):
+                for word in WORD_NAMES:
+                    progress(f"{program}, case {case}, {listing.label}, {word}")
+                    found.append(_fit(theirs, listing, case, word))
+    if not found:
+        raise InputError(
+            f"--listing-output: no page of {', '.join(programs)} in case "
+            f"{', '.join(map(str, cases))} has these moments, torques and columns"
+        )
+    return sorted(found, key=lambda each: len(each.differences))
+
+
+def _form(program: str, case: int) -> tuple[list[list[str]], int]:
+    """Return the lines of numbers before the rows, and how many numbers a row has."""
+    scene = replace(case_scene(case), steps=1)
+    *head, row = _numbers(page(scene, program, run_program(scene, original(program), "python")))
+    return head, len(row)
+
+
+def _fit(theirs: Sequence[Sequence[str]], listing: Listing, case: int, word: str) -> Fit:
+    scene = case_scene(case)
+    trajectory = run_program(scene, listing, "python", word=word)
+    ours = _numbers(page(scene, listing.program, trajectory))[-trajectory.steps :]
+    none: Sequence[str] = ()
+    places = [
+        (row, place, x, y)
+        for row, (a, b) in enumerate(zip_longest(theirs, ours, fillvalue=none), 1)
+        for place, (x, y) in enumerate(zip_longest(a, b, fillvalue="-"), 1)
+    ]
+    apart = tuple(Difference(*each) for each in places if each[2] != each[3])
+    return Fit(listing.program, case, listing.label, word, len(places), apart)
+
+
+def _numbers(text: str) -> list[list[str]]:
+    """Return the lines that hold numbers alone, field by field."""
+    lines = [line.split() for line in text.splitlines()]
+    return [line for line in lines if line and all(map(_FIELD.fullmatch, line))]
+
+
+def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
+    """Report which program, listing and word print a page, and the first numbers that differ."""
+    best = found[0]
+    whole = [each for each in found if each.is_whole]
+    told = [
+        f"{path}: {'printed so by' if whole else 'by none; the nearest is'} {name_of(each)}"
+        for each in whole or [best]
+    ]
+    rows = [
+        [each.program, each.case, each.listing, each.word, each.fields, len(each.differences)]
+        for each in found
+    ]
+    text: list[Section] = [told, [Table(_TABLE, rows)]]
+    if not whole:
+        first = [list(asdict(each).values()) for each in best.differences[:_SHOWN]]
+        text.append(["the first numbers that differ:", Table(_APART, first)])
+    return Report(
+        "verify",
+        text,
+        record=lambda: {"page": path, "passed": bool(whole), "fits": [asdict(f) for f in found]},
+        data=Table(_TABLE, rows),
+    )
+
+
+def name_of(fit: Fit) -> str:
+    """Return what makes a page."""
+    return f"{fit.program}, case {fit.case}, {fit.listing}, in {fit.word}"
+
+
+_TABLE = (*words("program case listing word"), Column("numbers"), Column("differ"))
+_APART = (Column("row"), Column("place"), *words("theirs ours"))

@@ -1,0 +1,106 @@
+"""A printed page held against the pages of every word; the pages that the project ships."""
+
+from pathlib import Path
+
+import pytest
+
+from pyharness import InputError, case_scene, run_program
+from pyharness.cli.main import main
+from pyharness.history.listing_output import Difference, fits, read_page
+from pyharness.model.listing import corrected, original
+from pyharness.original.printer import page
+
+MACHINE = Path(__file__).parents[2] / "docs" / "machine"
+PAGES = sorted(MACHINE.glob("*.txt"))
+
+
+def printed(folder: Path, program: str, case: int, word: str, *, mended: bool = False) -> str:
+    listing = (corrected if mended else original)(program)
+    scene = case_scene(case)
+    run = run_program(scene, listing, "python", word=word)
+    path = folder / "page.txt"
+    # As a printer has it: a banner, carriage control, a dayfile.
+    text = page(scene, program, run)
+    path.write_text("1JACOBS\n\n" + text.replace("\n", "  \n") + "\n 12.30.07.LGO.\n")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("program", "case", "word", "mended", "alike"),
+    [
+        ("two-term", 2, "cdc48", False, {"cdc48", "binary32"}),
+        ("two-term", 2, "binary64", True, {"binary64", "binary128", "cdc48-rounded"}),
+        ("runge-kutta", 3, "cdc48-rounded", False, None),
+    ],
+)
+def test_a_page_tells_its_word(
+    tmp_path: Path, program: str, case: int, word: str, mended: bool, alike: set[str] | None
+) -> None:
+    found = fits(
+        read_page(printed(tmp_path, program, case, word, mended=mended)), [program], [case]
+    )
+    whole = {each.word for each in found if each.is_whole}
+    assert word in whole
+    assert alike is None or whole == alike
+    assert {(each.listing == "corrected") for each in found if each.is_whole} == {mended}
+
+
+def test_every_program_and_case_is_tried(tmp_path: Path) -> None:
+    lines = read_page(printed(tmp_path, "four-term", 4, "binary64"))
+    best = fits(lines, ["two-term", "four-term", "runge-kutta"], range(1, 8))[0]
+    assert (best.program, best.case, best.is_whole) == ("four-term", 4, True)
+
+
+def test_a_digit_and_a_row_that_differ_are_told(tmp_path: Path) -> None:
+    path = Path(printed(tmp_path, "two-term", 2, "cdc48"))
+    lines = path.read_text().splitlines(keepends=True)
+    row = next(i for i, line in enumerate(lines) if "0.0999" in line)
+    lines[row] = lines[row].replace("0.0999", "0.0998")
+    path.write_text("".join(lines))
+    (best,) = (each for each in fits(read_page(str(path)), ["two-term"], [2])[:2]
+               if each.word == "cdc48")  # fmt: skip
+    assert best.differences == (Difference(2, 1, "0.0998", "0.0999"),)
+    last = max(i for i, line in enumerate(lines) if line.split()[3:4] == ["100"])
+    path.write_text("".join(lines[:last] + lines[last + 1 :]))
+    best = next(e for e in fits(read_page(str(path)), ["two-term"], [2]) if e.word == "cdc48")
+    assert {each.theirs for each in best.differences} == {"0.0998", "-"}
+
+
+@pytest.mark.parametrize("text", ["", "nothing\n", "1.0 2.0\n"])
+def test_what_is_no_page_is_told(tmp_path: Path, text: str) -> None:
+    (tmp_path / "page").write_text(text)
+    with pytest.raises(InputError, match="no row of numbers"):
+        read_page(str(tmp_path / "page"))
+
+
+def test_moments_of_no_case_are_told(tmp_path: Path) -> None:
+    path = Path(printed(tmp_path, "two-term", 2, "binary64"))
+    path.write_text(path.read_text().replace("  40.00 ", "  41.00 "))
+    with pytest.raises(InputError, match="has these moments"):
+        fits(read_page(str(path)), ["two-term"], [2])
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
+def test_shipped_pages_are_what_is_printed(path: Path) -> None:
+    program, _, rest = path.stem.partition("-case-")
+    case, _, word = rest.partition("-")
+    scene = case_scene(int(case))
+    assert path.read_text() == page(
+        scene, program, run_program(scene, original(program), "python", word=word)
+    )
+
+
+def test_command_exits_with_1_where_no_word_prints_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert len(PAGES) == 6
+    path = printed(tmp_path, "two-term", 2, "cdc48")
+    asked = ["verify", "--listing-output", path, "--program", "two-term", "--case", "2"]
+    assert main(asked) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "printed so by two-term, case 2, original, in cdc48" in told
+    Path(path).write_text(Path(path).read_text().replace("0.0999", "0.0998"))
+    assert main(asked) == 1
+    told = " ".join(capsys.readouterr().out.split())
+    assert "by none; the nearest is two-term, case 2, original" in told
+    assert "theirs ours 2 1 0.0998 0.0999" in told

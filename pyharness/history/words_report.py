@@ -134,7 +134,7 @@ def _picture(cells: Sequence[WordCell]) -> Picture:
     programs = list(dict.fromkeys(cell.double.program for cell in cells))
     listings = list(dict.fromkeys(cell.double.listing for cell in cells))
     figure = Figure(figsize=(4.4 * max(len(programs), 1.4), 7.5), dpi=110, layout="constrained")
-    axes = figure.subplots(len(listings), len(programs), sharex=True, squeeze=False)
+    axes = figure.subplots(len(listings), len(programs), sharex=True, sharey=True, squeeze=False)
     for cell in cells:
         row, column = listings.index(cell.double.listing), programs.index(cell.double.program)
         _draw(axes[row, column], cell)

@@ -24,7 +24,14 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
-from pyharness.original.programs import BINARY64, IMPLEMENTATIONS, PROGRAM_REGISTRY, checked_word
+from pyharness.original.compiled_in_word import compiled_words
+from pyharness.original.programs import (
+    BINARY64,
+    IMPLEMENTATIONS,
+    PROGRAM_REGISTRY,
+    checked_word,
+    work_of,
+)
 from pyharness.truth.reference import Reference, reference
 
 _TIMING_BATCHES = 3
@@ -138,8 +145,8 @@ def compare_programs(
         Whether attitudes are compared too, from that of the scene, or from the axes of space where
         it has none; beside the rows of a program by a step of order 4 from row to row.
     word : str
-        The arithmetic of the programs. In any but binary64 the twins run alone: there are no bits
-        to agree, and no orders, which are those of the compiled programs.
+        The arithmetic of the programs. Where the compiled programs have it not the twins run alone:
+        there are no bits to agree. Orders are those of binary64.
 
     Returns
     -------
@@ -155,9 +162,10 @@ def compare_programs(
     """
     listings = listings_for() if listings is None else listings
     in_floats = checked_word(word, "python") == BINARY64
-    languages = IMPLEMENTATIONS if in_floats else ("python",)
+    has_fortran = in_floats or word in compiled_words()
+    languages = IMPLEMENTATIONS if has_fortran else ("python",)
     for listing, language in itertools.product(listings, languages):
-        check_steps(scene, listing.program, language if in_floats else "another word", effort)
+        check_steps(scene, listing.program, work_of(word, language), effort)
     checked_scene(scene)
     scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)

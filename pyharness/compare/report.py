@@ -42,7 +42,7 @@ def comparison_report(comparison: Comparison) -> Report:
         "w1-w3, V: largest error against the reference (rad/s, m/s). energy, mom.sq: largest "
         "relative drift. ulp: distance between Fortran and Python in units in the last place. "
         "stop: variable and its Lipschitz quotient against the limit. us/step: "
-        f"{'Fortran, the call included' if in_floats else 'the twin in ' + comparison.word}."
+        f"{'Fortran, the call included' if in_floats else _in_word(comparison)}."
     )
     motion = []
     if comparison.growth is not None and comparison.digits is not None:
@@ -88,9 +88,14 @@ def verdict(comparison: Comparison) -> list[str]:
     return told + [f"not judged: {each}" for each in comparison.not_judged]
 
 
+def _in_word(comparison: Comparison) -> str:
+    has_fortran = all(each.ulps is not None for each in comparison.programs)
+    return f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
+
+
 def _as_expected(comparison: Comparison) -> str:
     same = sum(not each.differences for each in comparison.programs)
-    if comparison.word != BINARY64:
+    if any(each.ulps is None for each in comparison.programs):
         return (
             f"programs in {comparison.word}: their twins alone, so that there are no bits of two "
             "languages to agree, nor orders"

@@ -51,9 +51,8 @@ class Program:
         if checked_word(word, implementation) != BINARY64:
             from pyharness.original import compiled_in_word, in_word
 
-            is_twin = implementation == "python"
-            check_steps(scene, self.name, "another word" if is_twin else word, effort)
-            run = in_word.run if is_twin else compiled_in_word.run
+            check_steps(scene, self.name, work_of(word, implementation), effort)
+            run = in_word.run if implementation == "python" else compiled_in_word.run
             return run(scene, listing, in_word.WORDS[word], lipschitz, may_stop)
         check_steps(scene, self.name, implementation, effort)
         return self._computed(scene, listing, implementation, lipschitz, may_stop, velocity)
@@ -68,6 +67,13 @@ class Program:
         twin = importlib.import_module(f"pyharness.original.{self.name.replace('-', '_')}")
         trajectory: Trajectory = twin.run(scene, listing, lipschitz, may_stop)
         return trajectory
+
+
+def work_of(word: str, implementation: str) -> str:
+    """Return what `check_steps` calls the way that a program is run in."""
+    if word == BINARY64:
+        return implementation
+    return "another word" if implementation == "python" else word
 
 
 def checked_word(word: object, implementation: str) -> str:

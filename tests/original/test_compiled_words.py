@@ -13,6 +13,7 @@ import pytest
 
 from pyharness import run_program
 from pyharness.compare.agreement import differences
+from pyharness.compare.comparison import compare_programs
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, REFUSED, extension
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
@@ -23,7 +24,7 @@ from pyharness.original import compiled_in_word, in_word
 from pyharness.original.cells import all_listings
 from pyharness.original.compiled_in_word import compiled_words
 from pyharness.original.interchange import from_bytes, to_bytes
-from pyharness.original.programs import COMPILED_WORDS
+from pyharness.original.programs import BINARY64, COMPILED_WORDS
 from pyharness.original.word import WORDS, Number, Word
 
 pytestmark = pytest.mark.bitwise
@@ -244,3 +245,26 @@ def test_bytes_of_binary128() -> None:
 def test_names_of_words() -> None:
     assert set(HERE) <= set(COMPILED_WORDS)
     assert {"binary32", "binary64"} <= set(HERE)
+
+
+@pytest.mark.parametrize("word", HERE)
+def test_compare_holds_fortran_against_the_twin(word: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(case_scene(4), steps=20)
+    listings = [original("two-term"), corrected("runge-kutta")]
+    found = compare_programs(scene, listings, word=word)
+    assert [each.ulps for each in found.programs] == [0.0, 0.0]
+    assert not found.unexpected
+    honest = compiled_in_word.run
+
+    def wrong(*given: Any) -> Trajectory:
+        run = honest(*given)
+        assert run.exact is not None
+        numbers = run.exact.copy()
+        numbers[7, 3] = numbers[7, 3] + numbers[7, 3]
+        return replace(run, exact=numbers)
+
+    if word != BINARY64:
+        monkeypatch.setattr(compiled_in_word, "run", wrong)
+        found = compare_programs(scene, listings, word=word)
+        assert [each.differences for each in found.programs] == [("numbers of the word",)] * 2
+        assert len(found.unexpected) == 2

@@ -148,7 +148,13 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     yield Check(f"build/{name}", not wrong, None, None, replay, "; ".join(wrong))
     entries = facts("divergences")["divergence"]
     listed = {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
-    bits = list(compared(name, record["digests"], twin, listed))
+    # A compiler may have fewer words.
+    due = {
+        cell: each
+        for cell, each in twin.items()
+        if not cell.startswith("words/") or cell.split("/")[1] in record["words"]
+    }
+    bits = list(compared(name, record["digests"], due, listed))
     if build.contract != "off":
         seen = sum(not check.passed for check in bits)
         note = f"{seen} of {len(bits)} cells differ" if seen else "the comparison sees no fault"

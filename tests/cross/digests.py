@@ -13,8 +13,11 @@ from pyharness import _build, _kernels
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.original import compiled_in_word, in_word
 from pyharness.original.cells import all_cells, all_listings, cell_name, listing_name
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.original.compiled_in_word import compiled_words
+from pyharness.original.programs import BINARY64, COMPILED_WORDS, PROGRAM_REGISTRY
+from pyharness.original.word import WORDS
 from tests.original.test_programs import NASTY
 
 
@@ -28,13 +31,16 @@ def digest(run: Trajectory) -> str:
         assert array is not None
         bits = np.ascontiguousarray(np.where(np.isnan(array), np.nan, array))
         summed.update(repr(bits.shape).encode() + bits.tobytes())
+    if run.exact is not None:
+        numbers = [(x.m, x.e) for x in run.exact.ravel().tolist()]
+        summed.update(repr(numbers).encode())
     if run.ier is not None:
         summed.update(np.ascontiguousarray(run.ier, dtype=np.int32).tobytes())
     return summed.hexdigest()[:16]
 
 
 def all_digests(language: str) -> Iterator[tuple[str, str]]:
-    """Yield name and digest of every cell, then of every listing on the nasty scenes."""
+    """Yield name and digest of every cell, of every listing on the nasty scenes, and in words."""
     for listing, case in all_cells():
         run = PROGRAM_REGISTRY[listing.program].run(case_scene(case), listing, language)
         yield f"cells/{cell_name(listing, case)}", digest(run)
@@ -46,10 +52,23 @@ def all_digests(language: str) -> Iterator[tuple[str, str]]:
                     end = "" if may_stop else "/no-stop"
                     yield f"nasty/{program}/{name}/{listing_name(listing)}{end}", digest(run)
 
+    yield from _in_words(language)
+
+
+def _in_words(language: str) -> Iterator[tuple[str, str]]:
+    """Yield name and digest of the cells with all defects or none, in the other words of IEEE."""
+    compiled = language == "fortran"
+    run = compiled_in_word.run if compiled else in_word.run
+    for word in compiled_words() if compiled else COMPILED_WORDS:
+        for listing, case in all_cells():
+            if word != BINARY64 and listing.label != "custom" and not listing.readings:
+                found = run(case_scene(case), listing, WORDS[word])
+                yield f"words/{word}/{cell_name(listing, case)}", digest(found)
+
 
 def replay(cell: str) -> str:
     """Return what follows `python -m` to hold Fortran against twin in a cell again."""
-    if cell.startswith("cells/"):
+    if cell.startswith(("cells/", "words/")):
         return f"pyharness verify --only {cell}"
     _, program, name = cell.split("/")[:3]
     return (
@@ -64,6 +83,7 @@ def main(language: str, file: str) -> None:
         "extension": _kernels.__file__,
         "compiler": f"{_build.COMPILER} {_build.COMPILER_VERSION}",
         "flags": _build.FLAGS,
+        "words": compiled_words(),
         "digests": dict(all_digests(language)),
     }
     Path(file).write_text(json.dumps(record))

@@ -115,33 +115,14 @@ contains
   end subroutine turn_axes
 
   pure subroutine turn_back(m, odd, v)
-    !! Columns in the order of the body's axes again.
+    !! Columns in the order of the body's axes again: what took 3 to the middle takes 1 back there.
     integer, intent(in) :: m
     real(dp), intent(in) :: odd(LANES)
     real(dp), intent(inout) :: v(LANES, 3)
-    real(dp) :: v1, v2, v3, x, y, z
-    integer :: i
+    real(dp) :: opposite(LANES)
 
-    do i = 1, m
-      v1 = v(i, 1)
-      v2 = v(i, 2)
-      v3 = v(i, 3)
-      x = v2
-      y = v3
-      z = v1
-      if (odd(i) > 2.0_dp) then
-        x = v3
-        y = v1
-        z = v2
-      else if (odd(i) > 1.0_dp) then
-        x = v1
-        y = v2
-        z = v3
-      end if
-      v(i, 1) = x
-      v(i, 2) = y
-      v(i, 3) = z
-    end do
+    opposite(:m) = 4.0_dp - odd(:m)
+    call turn_axes(m, opposite, v)
   end subroutine turn_back
 
 end module many_columns

@@ -41,7 +41,6 @@ class PortProcess:
         """Say what to start, and how long to wait for an answer (s)."""
         self._words = split_command(command)
         self._patience = patience
-        self._read = b""
 
     def __enter__(self) -> Self:
         """Start it, in a group of its own: a shell's children end with it."""
@@ -82,7 +81,9 @@ class PortProcess:
         """Return the line that answers a line; PortError where none comes, or more than one."""
         end = time.monotonic() + self._patience
         rest = line + b"\n"
-        while rest or b"\n" not in self._read:
+        found = bytearray()
+        answered = False
+        while rest or not answered:
             writers = [self._in] if rest else []
             left = max(end - time.monotonic(), 0.0)
             readable, writable, _ = select.select([self._out], writers, [], left)
@@ -97,13 +98,13 @@ class PortProcess:
                 piece = os.read(self._out.fileno(), _PIECE)
                 if not piece:
                     raise PortError(self._ending())
-                self._read += piece
-                if len(self._read) > _LARGEST:
+                found += piece
+                answered = answered or b"\n" in piece
+                if len(found) > _LARGEST:
                     raise PortError(f"more than {_LARGEST >> 20} MB for one run")
-        answer, _, more = self._read.partition(b"\n")
+        answer, _, more = bytes(found).partition(b"\n")
         if more:
             raise PortError("more than one line for one run")
-        self._read = b""
         return answer
 
     def _ending(self) -> str:

@@ -298,7 +298,7 @@ FAULTS = {
         "runge-kutta",
     ),
     "the points of the stop test": (
-        "runge-kutta.js", "distances(point[3], firstPoint)", "distances(point[2], firstPoint)",
+        "runge-kutta.js", "distances(result, base)", "distances(result, firstPoint)",
         "runge-kutta",
     ),
     "a defect forgotten": ("two-term.js", '"c1-for-c"', '"no-such"', "two-term"),

@@ -14,8 +14,8 @@ function exact(key, value) {
 }
 
 for await (const line of createInterface({ input: process.stdin })) {
-  const { program, scene, listing, lipschitz } = JSON.parse(line);
+  const { program, scene, listing, lipschitz, may_stop: mayStop } = JSON.parse(line);
   const active = new Set([...listing.defects, ...listing.readings, ...listing.conjectures]);
-  const run = PROGRAMS[program].run(scene, active, lipschitz);
+  const run = PROGRAMS[program].run(scene, active, lipschitz, mayStop);
   process.stdout.write(`${JSON.stringify(run, exact)}\n`);
 }

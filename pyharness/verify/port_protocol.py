@@ -42,8 +42,13 @@ class Answer:
     ier: list[int] | None
 
 
-def request(scene: Scene, listing: Listing) -> bytes:
-    """Return the line that asks for a run; its decimals give the floats back."""
+def request(
+    scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
+) -> bytes:
+    """Return the line that asks for a run; its decimals give the floats back.
+
+    `lipschitz` in 1/s, by default that of the decks; without `may_stop` no test ends the run.
+    """
     asked = {
         "schema": 1,
         "program": listing.program,
@@ -54,7 +59,8 @@ def request(scene: Scene, listing: Listing) -> bytes:
             "initial_torque": card_torque(scene),
         },
         "listing": listing_record(listing),
-        "lipschitz": facts("cases")["deck"]["lipschitz"],
+        "lipschitz": facts("cases")["deck"]["lipschitz"] if lipschitz is None else lipschitz,
+        "may_stop": may_stop,
     }
     return json.dumps(asked, allow_nan=False).encode()
 

@@ -22,12 +22,13 @@ from mpmath import mp
 from pyharness import case_scene, run_program
 from pyharness.cli.main import main
 from pyharness.compare.checks import Check
+from pyharness.compare.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.cells import all_cells
 from pyharness.verify.port import Cell, differences, port, port_cells
 from pyharness.verify.port_process import PortError, PortProcess
-from pyharness.verify.port_protocol import Answer, read_answer, request
+from pyharness.verify.port_protocol import ENDINGS, Answer, read_answer, request
 
 ROOT = Path(__file__).parent.parent.parent
 WEB = ROOT / "web"
@@ -84,6 +85,24 @@ def test_a_right_port_has_the_twins_bits(right: str) -> None:
     assert [check.id for check in checks] == [f"port/{name}" for name, _, _ in cells]
     assert [check.note for check in checks if not check.passed] == []
     assert {check.value for check in checks} == {0.0}
+
+
+def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
+    """Orders of operations that no cell shows, velocity tested before omega among them."""
+    seen = set()
+    with PortProcess(_node(WEB)) as process:
+        for number in range(200):
+            drawn = draw("port", number)
+            if drawn.scene.torque.sines or drawn.scene.torque.cosines:
+                continue
+            options = drawn.lipschitz, drawn.may_stop
+            line = process.ask(request(drawn.scene, drawn.listing, *options))
+            answer = read_answer(line, drawn.scene.steps)
+            twin = run_program(drawn.scene, drawn.listing, "python", *options)
+            assert differences(twin, answer) == [], number
+            seen.add((drawn.listing.program, twin.ended))
+    assert {ended for program, ended in seen if program == "runge-kutta"} == set(ENDINGS)
+    assert {program for program, _ in seen} == set(PROGRAMS)
 
 
 def test_all_cells_are_asked_for_but_where_fewer_are_named() -> None:

@@ -3,47 +3,31 @@
 import json
 import math
 import os
-import random
 import re
 import shlex
-import shutil
-import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from mpmath import mp
 
 from pyharness import case_scene, run_program
 from pyharness.cli.main import main
 from pyharness.compare.checks import Check
-from pyharness.compare.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.cells import all_cells
-from pyharness.verify.port import Cell, differences, port, port_cells
+from pyharness.verify.port import differences, port, port_cells
 from pyharness.verify.port_process import PortError, PortProcess
-from pyharness.verify.port_protocol import ENDINGS, Answer, read_answer, request
+from pyharness.verify.port_protocol import Answer, read_answer, request
+from tests.ports import SAMPLE, WEB, node, sample
 
 ROOT = Path(__file__).parent.parent.parent
-WEB = ROOT / "web"
 Capture = pytest.CaptureFixture[str]
-# Ten cells: every program, every ending, a reading, the conjecture of Case 7.
-SAMPLE = (
-    "two-term/case-2/original", "two-term/case-6/original", "two-term/case-7/initial-torque",
-    "two-term/case-3/corrected:c1-for-c", "four-term/case-5/original", "four-term/case-7/corrected",
-    "runge-kutta/case-2/original", "runge-kutta/case-3/stage-base",
-    "runge-kutta/case-6/corrected:do-variable", "runge-kutta/case-7/original",
-)  # fmt: skip
-
-
-def _cells(names: Sequence[str] = SAMPLE) -> list[Cell]:
-    return port_cells(PROGRAMS, case_numbers(), names)
 
 
 def _example() -> str:
@@ -67,19 +51,12 @@ def _answering(path: Path, change: str) -> str:
 def right(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """Return the command of a port that has the twins' bits."""
     if request.param == "JavaScript":
-        return _node(WEB)
+        return node(WEB)
     return _python(tmp_path / "port.py", _example())
 
 
-def _node(web: Path) -> str:
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("no node on the PATH: the JavaScript is not held against the twins")
-    return shlex.join([node, str(web / "port.js")])
-
-
 def test_a_right_port_has_the_twins_bits(right: str) -> None:
-    cells = _cells()
+    cells = sample()
     assert len(cells) == len(SAMPLE)
     checks = list(port(right, cells))
     assert [check.id for check in checks] == [f"port/{name}" for name, _, _ in cells]
@@ -87,30 +64,12 @@ def test_a_right_port_has_the_twins_bits(right: str) -> None:
     assert {check.value for check in checks} == {0.0}
 
 
-def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
-    """Orders of operations that no cell shows, velocity tested before omega among them."""
-    seen = set()
-    with PortProcess(_node(WEB)) as process:
-        for number in range(200):
-            drawn = draw("port", number)
-            if drawn.scene.torque.sines or drawn.scene.torque.cosines:
-                continue
-            options = drawn.lipschitz, drawn.may_stop
-            line = process.ask(request(drawn.scene, drawn.listing, *options))
-            answer = read_answer(line, drawn.scene.steps)
-            twin = run_program(drawn.scene, drawn.listing, "python", *options)
-            assert differences(twin, answer) == [], number
-            seen.add((drawn.listing.program, twin.ended))
-    assert {ended for program, ended in seen if program == "runge-kutta"} == set(ENDINGS)
-    assert {program for program, _ in seen} == set(PROGRAMS)
-
-
 def test_all_cells_are_asked_for_but_where_fewer_are_named() -> None:
     assert len(port_cells(PROGRAMS, case_numbers(), ())) == len(list(all_cells()))
     assert {(listing.program, case) for _, listing, case in port_cells(["four-term"], [3], ())} == {
         ("four-term", 3)
     }
-    assert [name for name, _, _ in _cells(["two-term/case-2/original"])] == [
+    assert [name for name, _, _ in sample(["two-term/case-2/original"])] == [
         "two-term/case-2/original"
     ]
 
@@ -217,7 +176,7 @@ def test_what_is_no_object_is_told_in_a_line(line: bytes, words: str) -> None:
 
 
 def _answers_wrongly(command: str) -> Check:
-    checks = list(port(command, _cells(), patience=2.0))
+    checks = list(port(command, sample(), patience=2.0))
     assert not checks[-1].passed
     assert checks[-1].value is None
     return checks[-1]
@@ -242,7 +201,7 @@ def _answers_wrongly(command: str) -> Check:
 def test_a_port_that_does_not_answer(script: str, words: str, tmp_path: Path) -> None:
     check = _answers_wrongly(_python(tmp_path / "port.py", script))
     assert words in check.note
-    assert check.id == f"port/{_cells()[0][0]}"
+    assert check.id == f"port/{sample()[0][0]}"
 
 
 def test_too_few_rows_and_a_crash_later_end_the_checks(tmp_path: Path, capsys: Capture) -> None:
@@ -306,63 +265,3 @@ def test_requests_give_the_floats_back() -> None:
         assert asked["scene"]["masses"] == [100.0, 110.0, 120.0]
         assert asked["lipschitz"] == 500.0
     assert asked["scene"]["initial_torque"] is not None
-
-
-# File, what stands there, the fault, and in which of the programs it shows.
-FAULTS = {
-    "the control": ("equations.js", "m[0] + a *", "m[0] + a *", ""),
-    "a sign": ("equations.js", "m[2] + c * u[0]", "m[2] - c * u[0]", "two-term four-term"),
-    "another order": (
-        "runge-kutta.js", "2 * (slope[2][i] + slope[3][i])", "2 * slope[2][i] + 2 * slope[3][i]",
-        "runge-kutta",
-    ),
-    "the points of the stop test": (
-        "runge-kutta.js", "distances(result, base)", "distances(result, firstPoint)",
-        "runge-kutta",
-    ),
-    "a defect forgotten": ("two-term.js", '"c1-for-c"', '"no-such"', "two-term"),
-    "a point of collocation": ("four-term.js", "dt * 0.6", "dt * 0.60000001", "four-term"),
-    "a multiplier": (
-        "linear-solver.js", "a[i][j] / a[j][j]", "a[i][j] * (1 / a[j][j])", "four-term",
-    ),
-    "IER": ("linear-solver.js", "b)), 0]", "b)), 1]", "two-term four-term"),
-    "sine": (
-        "circular.js", "turned(x, 0)", "turned(x, 0) * 1.001", "two-term four-term runge-kutta",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_in_the_javascript_is_found(fault: str, tmp_path: Path) -> None:
-    name, here, planted, shows = FAULTS[fault]
-    web = Path(shutil.copytree(WEB, tmp_path / "web"))
-    path = web / "programs" / name
-    text = path.read_text()
-    assert text.count(here) == 1
-    path.write_text(text.replace(here, planted))
-    failed = [check for check in port(_node(web), _cells()) if not check.passed]
-    assert all("step" in check.note or "stop" in check.note for check in failed)
-    assert {check.id.split("/")[1] for check in failed} == set(shows.split())
-
-
-def test_sine_and_cosine_of_the_javascript_are_the_nearest_floats() -> None:
-    node = shlex.split(_node(WEB))[0]
-    draw = random.Random(1982)
-    angles = [draw.uniform(-1.0, 1.0) * 10.0 ** draw.uniform(-9.0, 8.0) for _ in range(20_000)]
-    # Close to a multiple of a quarter turn, where digits cancel.
-    angles += [n * (math.pi / 2) for n in range(-500, 500)]
-    angles += [0.0, -0.0, 1e-300, 2.0**-27, 29.2, 112.60000000000004, 170.00000000000006]
-    script = (
-        f"import {{ sine, cosine }} from {json.dumps(str(WEB / 'programs/circular.js'))};"
-        'import { readFileSync } from "node:fs";'
-        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map((x) => [sine(x), cosine(x)])));"
-    )
-    done = subprocess.run(
-        [node, "--input-type=module", "--eval", script],
-        input=json.dumps(angles), capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    found = json.loads(done.stdout)
-    assert len(found) == len(angles)
-    with mp.workprec(300):
-        wanted = [[float(mp.sin(x)), float(mp.cos(x))] for x in map(mp.mpf, angles)]
-    assert found == wanted

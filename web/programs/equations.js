@@ -44,17 +44,17 @@ export function normalizedTorque(scene, time) {
 
 // N at `time` (s), the terms added in the order of the definition.
 function torqueAt(law, time) {
-  return law.constant.map((constant, axis) => {
-    if (!varies(law)) return constant;
-    let torque = constant + law.rate[axis] * time;
-    for (const { amplitude, frequency } of law.sines) {
-      torque += amplitude[axis] * sine(frequency * time);
+  if (!varies(law)) return law.constant;
+  const torque = law.constant.map((constant, axis) => constant + law.rate[axis] * time);
+  const add = (waves, circular) => {
+    for (const { amplitude, frequency } of waves) {
+      const value = circular(frequency * time);
+      for (let axis = 0; axis < 3; axis++) torque[axis] += amplitude[axis] * value;
     }
-    for (const { amplitude, frequency } of law.cosines) {
-      torque += amplitude[axis] * cosine(frequency * time);
-    }
-    return torque;
-  });
+  };
+  add(law.sines, sine);
+  add(law.cosines, cosine);
+  return torque;
 }
 
 function varies(law) {

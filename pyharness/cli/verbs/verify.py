@@ -17,14 +17,17 @@ from pyharness.verify.selection import DRAWS, RECORD, Selection
 FORMATS = ("table", "json", "junit")
 # Options that no other kind looks at.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
+_OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record")
 OPTIONS = {
     "--only ID,...": f"kinds, or checks by name: {', '.join(KINDS)}",
     "--seed S": "of the random draws (default: the week)",
     "--draws N": f"random draws (default {DRAWS})",
     "--external FILE": "a file of published figures, these alone",
     "--listing-output FILE": "a page that one of the programs printed, anywhere: in which word?",
-    "--program P": "of that page (default: any)",
-    "--case N": "of that page, 1 to 7 (default: any)",
+    "--port COMMAND": "a port in any language, against the twins in every cell (docs/ports.md)",
+    "--program P": "of that page, or of that port (default: any)",
+    "--case N": "of that page, or of that port, 1 to 7 (default: any)",
+    "--cell NAME,...": "of that port, by leading parts of names, as in two-term/case-3",
     "--self-test": "plant faults, and report which check catches which",
     "--update": "write the golden record anew",
     "--record DIR": "the golden record (default: the checkout's)",
@@ -36,7 +39,10 @@ def run(options: argparse.Namespace) -> int:
     """Verify and show; 1 where something is not as it should be."""
     if options.listing_output is not None:
         return _listing_output(options)
-    shared.refuse(options, "the checks; give --listing-output", ("program", "case"))
+    if options.port is not None:
+        return _port(options)
+    shared.refuse(options, "the checks; give --listing-output or --port", ("program", "case"))
+    shared.refuse(options, "the checks; give --port", ("cell",))
     chosen = _selection(options)
     shared.check_outputs(options)
     if options.update:
@@ -67,17 +73,41 @@ def run(options: argparse.Namespace) -> int:
 def _listing_output(options: argparse.Namespace) -> int:
     from pyharness.history.listing_output import fits, listing_output_report, read_page
 
-    others = ("only", "seed", "draws", "external", "self_test", "update", "record")
-    shared.refuse(options, "--listing-output", others)
+    shared.refuse(options, "--listing-output", (*_OF_THE_CHECKS, "port", "cell"))
     shared.check_known("format", options.format, ("table", "json"))
-    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
-    cases = case_numbers() if options.case is None else [int(options.case)]
-    programs = shared.chosen_programs(options)
+    programs, cases = _programs_and_cases(options)
     shared.check_outputs(options)
     lines = read_page(options.listing_output)
     found = fits(lines, programs, cases, shared.progress)
     shared.show(listing_output_report(options.listing_output, found), options)
     return 0 if found[0].is_whole else 1
+
+
+def _port(options: argparse.Namespace) -> int:
+    from pyharness.verify.port import port, port_cells
+
+    shared.refuse(options, "--port", _OF_THE_CHECKS)
+    asked = port_cells(*_programs_and_cases(options), shared.names(options.cell))
+    if not asked:
+        raise InputError(f"--cell {options.cell}: no such cell; give one as in two-term/case-3")
+    shared.check_outputs(options)
+    checks = []
+    for check in port(options.port, asked):
+        checks.append(check)
+        if len(checks) % 20 == 0:
+            shared.progress(f"{len(checks)} of {len(asked)}: {check.id}")
+    title = [f"{options.port}: against the twins, bit for bit"]
+    if checks[-1].value is None:
+        title.append(f"ended at the first of {len(asked)} cells that it did not answer")
+    text = summary(title, checks, depth=2)
+    shared.show(checks_report("verify", checks, text, port=options.port), options)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], list[int]]:
+    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
+    cases = list(case_numbers()) if options.case is None else [int(options.case)]
+    return shared.chosen_programs(options), cases
 
 
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:

@@ -1,0 +1,34 @@
+"""Ports that tests ask: cells that touch all, and the port in JavaScript."""
+
+import shlex
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene_file import case_numbers
+from pyharness.verify.port import Cell, port_cells
+
+WEB = Path(__file__).parent.parent / "web"
+# Ten cells: every program, every ending, a reading, the conjecture of Case 7.
+SAMPLE = (
+    "two-term/case-2/original", "two-term/case-6/original", "two-term/case-7/initial-torque",
+    "two-term/case-3/corrected:c1-for-c", "four-term/case-5/original", "four-term/case-7/corrected",
+    "runge-kutta/case-2/original", "runge-kutta/case-3/stage-base",
+    "runge-kutta/case-6/corrected:do-variable", "runge-kutta/case-7/original",
+)  # fmt: skip
+
+
+def sample(names: Sequence[str] = SAMPLE) -> list[Cell]:
+    """Return the cells of these names, by leading parts."""
+    return port_cells(PROGRAMS, case_numbers(), names)
+
+
+def node(web: Path) -> str:
+    """Return the command of the port in a copy of `web`; the test is skipped without Node."""
+    engine = shutil.which("node")
+    if engine is None:
+        pytest.skip("no node on the PATH: the JavaScript is not held against the twins")
+    return shlex.join([engine, str(web / "port.js")])

@@ -1,0 +1,21 @@
+// The programs as a port: a scene with its listing a line in, a run a line out (docs/ports.md).
+import { createInterface } from "node:readline";
+import * as fourTerm from "./programs/four-term.js";
+import * as rungeKutta from "./programs/runge-kutta.js";
+import * as twoTerm from "./programs/two-term.js";
+
+const PROGRAMS = { "two-term": twoTerm, "four-term": fourTerm, "runge-kutta": rungeKutta };
+
+// JSON has no -0, no infinity and no NaN: those go as text.
+function exact(key, value) {
+  if (typeof value !== "number") return value;
+  if (Object.is(value, -0)) return "-0.0";
+  return Number.isFinite(value) ? value : String(value);
+}
+
+for await (const line of createInterface({ input: process.stdin })) {
+  const { program, scene, listing, lipschitz, may_stop: mayStop } = JSON.parse(line);
+  const active = new Set([...listing.defects, ...listing.readings, ...listing.conjectures]);
+  const run = PROGRAMS[program].run(scene, active, lipschitz, mayStop);
+  process.stdout.write(`${JSON.stringify(run, exact)}\n`);
+}

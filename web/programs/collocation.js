@@ -1,0 +1,75 @@
+// Collocation as in IV.2: an interval, and the march of the two programs.
+//
+// Every unknown is a polynomial x(0) + c1 t + c2 t^2 + ... (eq. 34) whose derivative meets the
+// right-hand side at as many points as there are terms (eq. 36). The right-hand side needs the
+// unknowns themselves: a first estimate takes it constant, one correction takes it at the points.
+import { Record, allFinite, initialTorque, normalizedTorque } from "./equations.js";
+import { leqt1f } from "./linear-solver.js";
+
+// Run a program whose points lie in a step as `pointsOf` says. `rates` gets the torques at the
+// beginning and at the points, k, and the unknowns there.
+export function march(scene, listing, pointsOf, rates) {
+  const { step_size: h, steps } = scene.run;
+  let dt = h;
+  let time = 0;
+  let state = [...scene.initial.omega, 0, 0, 0];
+  const record = new Record();
+  const first = listing.has("initial-torque") ? initialTorque(scene) : null;
+
+  for (let step = 0; step < steps; step++) {
+    const begin = step * h;
+    time = time + dt;
+    const points = pointsOf(dt);
+    let torques;
+    if (step === 0 && first !== null) {
+      torques = [first, ...points.map(() => first)];
+    } else if (listing.has("torque-held")) {
+      const held = normalizedTorque(scene, time);
+      torques = [held, ...points.map(() => held)];
+    } else {
+      torques = [0, ...points].map((t) => normalizedTorque(scene, begin + t));
+    }
+    let ier;
+    [state, ier] = interval(state, points, h, (k, x) => rates(torques, k, x));
+    if (!allFinite(state.slice(0, 3))) return record.trajectory("overflow");
+    record.add(time, state.slice(0, 3), state.slice(3), ier);
+    if (listing.has("dt-accumulates")) dt = dt + h;
+  }
+  return record.trajectory();
+}
+
+// All unknowns at `end`, and IER of the second solution. The points of collocation and the end
+// are in s from the interval's beginning.
+function interval(start, points, end, rates) {
+  const constant = rates(0, start);
+  const [estimate] = fit(points, points.map(() => constant));
+  const atPoints = points.map((t, k) => rates(k + 1, values(start, estimate, t)));
+  const [corrected, ier] = fit(points, atPoints);
+  return [values(start, corrected, end), ier];
+}
+
+// The coefficients c1, c2, ... of every unknown whose derivative meets `rates`, and IER.
+function fit(points, rates) {
+  const byUnknown = rates[0].map((_, unknown) => rates.map((at) => at[unknown]));
+  return leqt1f(collocationMatrix(points), byUnknown);
+}
+
+// The derivatives of t, t^2, ... at every point, a row for each (eq. 36).
+function collocationMatrix(points) {
+  return points.map((t) =>
+    [1, 2 * t, 3 * (t * t), 4 * (t * t * t)].slice(0, points.length),
+  );
+}
+
+// x(0) + c1 t + c2 t^2 + ... for every unknown, added in this order.
+function values(start, coefficients, t) {
+  const t2 = t * t;
+  const powers = [t, t2, t2 * t, t2 * t2];
+  return start.map((x, unknown) => {
+    let total = x;
+    coefficients[unknown].forEach((c, k) => {
+      total = total + c * powers[k];
+    });
+    return total;
+  });
+}

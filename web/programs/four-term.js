@@ -1,0 +1,18 @@
+// Four-term collocation: the second program of the appendix, Jacobs 1982, IV.2.
+//
+// Residual zero at .2, .4, .6 and .8 of the interval. It has no stop test.
+import { march } from "./collocation.js";
+import { accelerations, eulerCoefficients, omegaRate, velocityRate } from "./equations.js";
+
+export function run(scene, listing) {
+  const coefficients = eulerCoefficients(scene);
+  const acceleration = accelerations(scene);
+
+  const rates = (torques, k, x) => {
+    const u = x.slice(0, 3);
+    const v = x.slice(3);
+    return [...omegaRate(coefficients, torques[k], u), ...velocityRate(acceleration, u, v)];
+  };
+
+  return march(scene, listing, (dt) => [dt * 0.2, dt * 0.4, dt * 0.6, dt * 0.8], rates);
+}

@@ -16,7 +16,7 @@ FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
     "--case N": "this case only, 1 to 7",
     "--program P": "this program only",
-    "--all": f"every p from {LENGTHS[0]} to {LENGTHS[-1]}; some ten minutes",
+    "--all": f"every p from {LENGTHS[0]} to {LENGTHS[-1]}; some twelve minutes",
     "--vectors FILE": "hold the CDC's arithmetic against the operations of a file (JSON)",
     **shared.outputs(FORMATS, plot="draw the error against p (with --case)"),
 }

@@ -1,7 +1,9 @@
 """Ports that tests ask: cells that touch all, and the port in JavaScript."""
 
+import re
 import shlex
 import shutil
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +13,8 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene_file import case_numbers
 from pyharness.verify.port import Cell, port_cells
 
-WEB = Path(__file__).parent.parent / "web"
+ROOT = Path(__file__).parent.parent
+WEB = ROOT / "web"
 # Ten cells: every program, every ending, a reading, the conjecture of Case 7.
 SAMPLE = (
     "two-term/case-2/original", "two-term/case-6/original", "two-term/case-7/initial-torque",
@@ -24,6 +27,17 @@ SAMPLE = (
 def sample(names: Sequence[str] = SAMPLE) -> list[Cell]:
     """Return the cells of these names, by leading parts."""
     return port_cells(PROGRAMS, case_numbers(), names)
+
+
+def documented() -> str:
+    """Return the port that the documentation shows."""
+    (text,) = re.findall(r"```py\n(.*?)```", (ROOT / "docs/ports.md").read_text(), re.DOTALL)
+    return str(text)
+
+
+def documented_command() -> str:
+    """Return the command that starts it."""
+    return shlex.join([sys.executable, "-c", documented()])
 
 
 def node(web: Path) -> str:

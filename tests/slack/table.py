@@ -31,6 +31,7 @@ from pyharness.stress.trials import length, step_size
 from pyharness.theory import brouwer
 from pyharness.truth.reference import Reference, reference
 from pyharness.verify.plants.plants import changed, instead
+from pyharness.verify.port_process import PortError
 
 # Half a unit in the last place of 1, and a whole one.
 U = 2.0**-53
@@ -39,6 +40,7 @@ ULP = 2.0 * U
 _RUN = "pyharness.original.programs.Program.run"
 _COMPILED = "pyharness.original.compiled.run"
 _IN_WORD = "pyharness.original.in_word.run"
+_ANSWER = "pyharness.verify.port.read_answer"
 _DECK = "pyharness.verify.decks.run_deck"
 _DRAWN = "pyharness.verify.random_methods"
 _SOLVE = "pyharness.compare.candidates.solve"
@@ -402,6 +404,8 @@ VERIFY = (
     exact("random/0/program", on(_COMPILED, bit_off), ULP),
     exact("words/two-term/case-3/corrected", on(_IN_WORD, bit_off), ULP),
     exact("words/vectors", on("pyharness.verify.words.answers", without_answer)),
+    exact("port/two-term/case-3/original", on(_ANSWER, partial(bit_off, name="rows")), ULP),
+    exact("port/runge-kutta/case-2/original", refuses(_ANSWER, PortError)),
     exact("decks/two-term/case-3/original", on(_COMPILED, bit_off), ULP),
     exact("decks/runge-kutta/case-2/original", refuses(_DECK, RuntimeError)),
     exact(_BITS, on(_COMPILED, partial(bit_off, name="velocity")), ULP),

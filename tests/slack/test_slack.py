@@ -16,7 +16,9 @@ import pyharness
 from pyharness.compare.checks import Check, Sample
 from pyharness.stress.run import TRIALS, stress
 from pyharness.verify.kinds import KINDS, verify
+from pyharness.verify.port import port
 from pyharness.verify.selection import Selection
+from tests.ports import documented_command, sample
 from tests.slack.table import SLACK, Slack, kept
 
 PACKAGE = Path(pyharness.__file__).parent
@@ -28,6 +30,8 @@ def _made(id: str) -> list[Check]:
     """Make one check."""
     if id.partition("/")[0] in KINDS:
         return list(verify(Selection(only=[id], seed="fixed", draws=1000)))
+    if id.startswith("port/"):
+        return list(port(documented_command(), sample([id.removeprefix("port/")])))
     return [outcome.check for outcome in stress([id])]
 
 
@@ -91,7 +95,7 @@ def test_limit_lies_between_the_plants(slack: Slack) -> None:
 
 
 def test_every_kind_and_every_trial_has_a_plant() -> None:
-    assert {slack.check.partition("/")[0] for slack in SLACK} == {*KINDS, *TRIALS}
+    assert {slack.check.partition("/")[0] for slack in SLACK} == {*KINDS, *TRIALS, "port"}
 
 
 def _sites() -> Iterator[tuple[str, range]]:

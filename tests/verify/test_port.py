@@ -24,16 +24,10 @@ from pyharness.original.cells import all_cells
 from pyharness.verify.port import differences, port, port_cells
 from pyharness.verify.port_process import PortError, PortProcess
 from pyharness.verify.port_protocol import Answer, read_answer, request
-from tests.ports import SAMPLE, WEB, node, sample
+from tests.ports import SAMPLE, WEB, documented, node, sample
 
 ROOT = Path(__file__).parent.parent.parent
 Capture = pytest.CaptureFixture[str]
-
-
-def _example() -> str:
-    """Return the port that the documentation shows."""
-    (text,) = re.findall(r"```py\n(.*?)```", (ROOT / "docs/ports.md").read_text(), re.DOTALL)
-    return str(text)
 
 
 def _python(path: Path, text: str) -> str:
@@ -43,7 +37,7 @@ def _python(path: Path, text: str) -> str:
 
 def _answering(path: Path, change: str) -> str:
     """Return the command of the documented port, whose `rows` a line of Python changes."""
-    before, place, after = _example().partition("    ier = ")
+    before, place, after = documented().partition("    ier = ")
     return _python(path, f"{before}    {change}\n{place}{after}")
 
 
@@ -52,7 +46,7 @@ def right(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """Return the command of a port that has the twins' bits."""
     if request.param == "JavaScript":
         return node(WEB)
-    return _python(tmp_path / "port.py", _example())
+    return _python(tmp_path / "port.py", documented())
 
 
 def test_a_right_port_has_the_twins_bits(right: str) -> None:

@@ -5,6 +5,7 @@ module wide_functions
   !! twin has them from mpmath, by the same definition.
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: binary64, wp => binary128
+  use waves, only: ANGLE_BITS
   implicit none(type, external)
   private
 
@@ -23,7 +24,7 @@ module wide_functions
                                        -1.42671545571947929048415935735977663232251099e-69_wp]
   integer, parameter :: N_TERMS = 25  ! up to a quarter of pi, the next is below 2**-240
   real(wp), parameter :: LEAST = 2.0_wp**(-60) ! an angle below is its own sine
-  real(wp), parameter :: MOST = 2.0_wp**60     ! its quarters are counted
+  real(wp), parameter :: MOST = 2.0_wp**ANGLE_BITS ! its quarters are counted
 
   interface sqrt
     module procedure square_root

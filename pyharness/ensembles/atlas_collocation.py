@@ -7,6 +7,7 @@ import numpy as np
 
 from pyharness.ensembles.atlas_maps import region_panels, thinned, values_of
 from pyharness.ensembles.store import Store
+from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
 from pyharness.model.trajectory import Array
 from pyharness.theory.regions import regions
@@ -88,4 +89,4 @@ def _finish(plot: "Axes", steps: Array, sizes: Array, size: float) -> None:
     plot.set_ylim(steps[0], steps[-1])
     plot.set_xlabel("length of omega (rad/s)", fontsize=8)
     plot.set_ylabel("step (s)", fontsize=8)
-    plot.plot([size], [0.01], "x", color="black", markersize=6)
+    plot.plot([size], [facts("cases")["deck"]["step_size"]], "x", color="black", markersize=6)

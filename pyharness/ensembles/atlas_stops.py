@@ -12,6 +12,7 @@ from pyharness.ensembles.sweep import Sweep
 from pyharness.methods.linearised import jacobians
 from pyharness.methods.solve import solve
 from pyharness.model.codes import Statuses
+from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_numbers, case_scene
@@ -171,4 +172,5 @@ def _finish(plot: "Axes", title: str, steps: Array, constants: Array) -> None:
     plot.set_title(title, fontsize=8)
     plot.set_xlabel("step (s)", fontsize=8)
     plot.set_ylabel("Lipschitz constant (1/s)", fontsize=8)
-    plot.plot([0.01], [500.0], "x", color="black", markersize=6)
+    deck = facts("cases")["deck"]
+    plot.plot([deck["step_size"]], [deck["lipschitz"]], "x", color="black", markersize=6)

@@ -46,6 +46,12 @@ class Places:
     WAVES = 21  # four for each sine, then for each cosine
 
 
+class Waves:
+    """Of our own sine in binary128 (`wide_functions.f90`)."""
+
+    ANGLE_BITS = 60  # of angles from 2 to this power on, rad, quarters are not counted
+
+
 class Blocks:
     """How many bodies go side by side through the programs of the appendix."""
 

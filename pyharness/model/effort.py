@@ -16,13 +16,15 @@ from pyharness.model.values import Number, number
 _SLACK = 2.0  # of a forecast: the pace so far is not that of the rest
 _ROUNDING = 1.0 + 1e-9  # of an effort that was advised
 _UNFORESEEN = 10.0  # where there is no forecast
-# Steps of a program without waves, some 30 s of the slowest; and what a wave costs of such a step.
-# Another word is that of a twin; those by name are of the compiled programs, of which binary128 has
-# no waves but by its own sine.
-_MOST_STEPS = {"fortran": 1e8, "python": 5e5, "another word": 5e4}
-_A_WAVE = {"fortran": 1.0, "python": 0.05, "another word": 0.3}
-_MOST_STEPS |= {"binary32": 2e5, "binary128": 2e5}
-_A_WAVE |= {"binary32": 0.1, "binary128": 10.0}
+# Steps of a program without waves, some 30 s of the slowest, and what a wave costs of such a step.
+# Another word is that of a twin; words by name are of the compiled programs.
+_LIMITS = {
+    "fortran": (1e8, 1.0),
+    "python": (5e5, 0.05),
+    "another word": (5e4, 0.3),
+    "binary32": (2e5, 0.1),
+    "binary128": (2e5, 10.0),  # its sine is our own
+}
 # The same of the compiled programs on many bodies, a step of each counted.
 _MOST_STEPS_OF_ALL = 1e9
 
@@ -69,10 +71,10 @@ def waves(scene: Scene) -> int:
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Refuse a scene that takes a program longer than anyone waits who was not asked."""
-    if implementation not in _MOST_STEPS:
-        raise unknown("implementation", implementation, _MOST_STEPS)
-    cost = 1.0 + _A_WAVE[implementation] * waves(scene)
-    needed = scene.steps * cost / _MOST_STEPS[implementation]
+    if implementation not in _LIMITS:
+        raise unknown("implementation", implementation, _LIMITS)
+    most, a_wave = _LIMITS[implementation]
+    needed = scene.steps * (1.0 + a_wave * waves(scene)) / most
     if needed <= checked_effort(effort) * _ROUNDING:
         return
     raise InputError(
@@ -83,7 +85,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
     """Refuse so many bodies that their steps take longer than anyone waits who was not asked."""
-    cost = 1.0 + _A_WAVE["fortran"] * waves(scene)
+    cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL
     factor = checked_effort(effort)
     if needed > factor * _ROUNDING:

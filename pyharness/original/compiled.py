@@ -3,10 +3,13 @@
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pyharness.model.extension import ENDS, columns, extension
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
+from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.original.equations import initial_torque
 
 
@@ -24,17 +27,28 @@ def run(
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
         *program_arguments(scene, listing, lipschitz, may_stop, velocity)
     )
-    results = rows.T[:n_rows]
+    ended = ENDS[status], variable, quotient
+    found = read_rows(listing, rows.T[:n_rows], ier, evaluations, *ended)
+    return found if velocity else replace(found, velocity=None)
+
+
+def read_rows(
+    listing: Listing, rows: Array, ier: NDArray[np.int32], evaluations: int,
+    ended: str, stop_variable: int, stop_quotient: float,
+) -> Trajectory:  # fmt: skip
+    """Return what a compiled program gave, rows (n, 8) and as many IER or more, as a trajectory."""
+    n = len(rows)
+    is_stopped = stop_variable > 0
     return Trajectory(
-        time=results[:, 0],
-        recorded_time=results[:, 1],
-        omega=results[:, 2:5],
-        velocity=results[:, 5:8] if velocity else None,
-        steps=n_rows,
+        time=rows[:, 0],
+        recorded_time=rows[:, 1],
+        omega=rows[:, 2:5],
+        velocity=rows[:, 5:8],
+        steps=n,
         evaluations=evaluations,
-        ended=ENDS[status],
-        stop=Stop(n_rows, STOP_VARIABLES[variable - 1], quotient) if variable else None,
-        ier=None if listing.program == "runge-kutta" else ier[:n_rows],
+        ended=ended,
+        stop=Stop(n, STOP_VARIABLES[stop_variable - 1], stop_quotient) if is_stopped else None,
+        ier=None if listing.program == "runge-kutta" else ier[:n],
     )
 
 

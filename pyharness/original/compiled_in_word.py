@@ -1,21 +1,20 @@
 """The compiled programs in the words of IEEE 754, whose numbers go in and come out as bytes."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
+from pyharness.model.codes import Waves
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, REFUSED, columns, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import STOP_VARIABLES, Stop, Trajectory
-from pyharness.original.compiled import program_arguments
+from pyharness.model.trajectory import Trajectory
+from pyharness.original.compiled import program_arguments, read_rows
 from pyharness.original.in_word import scene_in
 from pyharness.original.interchange import from_bytes, n_bytes, to_bytes
 from pyharness.original.word import Word
-
-# Of fortran/original/wide_functions.f90: of angles beyond, rad, quarters are not counted.
-_MOST_ANGLE = 2.0**60
 
 
 def run(
@@ -54,20 +53,10 @@ def run(
             "allowed: implementation python"
         )
     exact = from_bytes(rows[:, :, :n_rows], word).T
-    results = exact.astype(np.float64)
-    found = from_bytes(quotient, word)[()]
-    return Trajectory(
-        time=results[:, 0],
-        recorded_time=results[:, 1],
-        omega=results[:, 2:5],
-        velocity=results[:, 5:8],
-        steps=n_rows,
-        evaluations=evaluations,
-        ended=ENDS[status],
-        stop=Stop(n_rows, STOP_VARIABLES[variable - 1], float(found)) if variable else None,
-        ier=None if listing.program == "runge-kutta" else ier[:n_rows],
-        exact=exact if n_rows else None,
-    )
+    results, found = exact.astype(np.float64), float(from_bytes(quotient, word)[()])
+    ended = ENDS[status], variable, found
+    trajectory = read_rows(listing, results, ier, evaluations, *ended)
+    return replace(trajectory, exact=exact if n_rows else None)
 
 
 def compiled_words() -> tuple[str, ...]:
@@ -84,7 +73,7 @@ def _check_angles(scene: Scene) -> None:
     latest = scene.step_size * scene.steps**2
     law = scene.torque
     for _, frequency in (*law.sines, *law.cosines):
-        if not abs(frequency) * latest < _MOST_ANGLE:
+        if not abs(frequency) * latest < 2.0**Waves.ANGLE_BITS:
             raise InputError(
                 f"frequency {frequency:g} rad/s over {scene.steps} steps of {scene.step_size:g} s: "
                 f"too large for the compiled sine of 128 bits; allowed: implementation python"

@@ -107,19 +107,19 @@ class Number:
 
     def __lt__(self, other: Any) -> bool:
         """Whether the difference is below zero; its sign is exact, that of the CDC's too."""
-        return self._below(self.word(other))
+        return self._order(other) < 0
 
     def __gt__(self, other: Any) -> bool:
         """Whether the difference is above zero."""
-        return self.word(other)._below(self)
+        return self._order(other) > 0
 
     def __le__(self, other: Any) -> bool:
         """Whether the difference is not above zero, nor nan."""
-        return self < other or self._order(self.word(other)) == 0
+        return self._order(other) <= 0
 
     def __ge__(self, other: Any) -> bool:
         """Whether the difference is not below zero, nor nan."""
-        return self > other or self._order(self.word(other)) == 0
+        return self._order(other) >= 0
 
     def __float__(self) -> float:
         """Return the nearest float; infinite beyond their range."""
@@ -189,16 +189,13 @@ class Number:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
-    def _below(self, other: "Number") -> bool:
-        return self._order(other) < 0
-
-    def _order(self, other: "Number") -> float:
+    def _order(self, other: Any) -> float:
         """Return a number below, at or above zero as the exact difference is; or nan."""
-        if not (self.m and other.m):
-            x, y = self._shadow, other._shadow
-            return 0.0 if x == y else x - y
-        apart: int = self.e - other.e
-        return (self.m << apart) - other.m if apart >= 0 else self.m - (other.m << -apart)
+        x, y = self, self.word(other)
+        if not (x.m and y.m):
+            return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
+        apart: int = x.e - y.e
+        return (x.m << apart) - y.m if apart >= 0 else x.m - (y.m << -apart)
 
 
 def _quotient(x: float, y: float) -> float:

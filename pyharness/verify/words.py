@@ -14,6 +14,8 @@ from pyharness.original.vectors import answers
 from pyharness.original.word import WORDS
 from pyharness.verify.selection import Selection, replay
 
+_THIN_CASE = 3
+
 
 def words(chosen: Selection) -> Iterator[Check]:
     """Hold every vector, the twin in `Word(53)` against that in floats, and Fortran in its words.
@@ -26,7 +28,7 @@ def words(chosen: Selection) -> Iterator[Check]:
         wrong = [each.vector.name for each in answers() if not each.agrees]
         yield bounded(id, len(wrong), 0.0, replay(id), ", ".join(wrong))
     for listing, case in all_cells():
-        if chosen.thin and case not in (3, 7):
+        if chosen.thin and (case != _THIN_CASE or not _has_all_or_none(listing)):
             continue
         yield from _against_floats(chosen, listing, case)
         yield from _against_fortran(chosen, listing, case)
@@ -40,7 +42,7 @@ def _against_floats(chosen: Selection, listing: Listing, case: int) -> Iterator[
 
 
 def _against_fortran(chosen: Selection, listing: Listing, case: int) -> Iterator[Check]:
-    if not chosen.only and (listing.label == "custom" or listing.readings):
+    if not (chosen.only or _has_all_or_none(listing)):
         return
     for word in compiled_in_word.compiled_words():
         id = f"words/{word}/{cell_name(listing, case)}"
@@ -55,7 +57,12 @@ def _check(id: str, one: Trajectory, other: Trajectory) -> Check:
     return Check(id, not found, distance(one, other), 0.0, replay(id), ", ".join(found))
 
 
+def _has_all_or_none(listing: Listing) -> bool:
+    """Whether a listing is the original or the corrected one."""
+    return listing.label != "custom" and not listing.readings
+
+
 def _is_few(listing: Listing) -> bool:
     """Whether a listing has no reading and all defects, one or none; or a reading alone."""
     few = len(listing.defects) + len(listing.readings) <= 1
-    return few or (listing.label == "original" and not listing.readings)
+    return few or _has_all_or_none(listing)

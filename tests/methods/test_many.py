@@ -1,7 +1,6 @@
 """Many bodies in one call: the promise of the single calls, whatever the others and the threads."""
 
 import tracemalloc
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,23 +10,11 @@ import pytest
 
 from pyharness import Ensemble, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
 from pyharness.model.codes import Methods, Statuses
-from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from tests.as_written import compiler_here, many_as_written
 from tests.many_errors import KINDS, bodies, exceeding, scene_of
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
-LEVELS = [0, 1, 2]
-
-
-@pytest.fixture(params=LEVELS)
-def level(request: pytest.FixtureRequest) -> Iterator[int]:
-    """One instruction set; skipped where the processor has it not."""
-    if extension().choose_instructions(request.param) != request.param:
-        extension().choose_instructions(2)
-        pytest.skip("this processor has it not")
-    yield request.param
-    extension().choose_instructions(2)
 
 
 def only(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:

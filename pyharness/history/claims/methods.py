@@ -241,13 +241,11 @@ def computer_error(
             error = distance(found, lab.truth(1).omega)
             numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
     # The machine's own words, the products written out: what they differ by is rounding.
-    for word in words:
-        for weighting in _OTHERS:
+    for weighting in _OTHERS:
+        floats = {case: march(lab.scene(case), weighting) for case in cases}
+        for word in words:
             numbers[f"{weighting} in {word}: apart from binary64 (rad/s)"] = max(
-                distance(
-                    march(scene_in(lab.scene(case), WORDS[word]), weighting),
-                    march(lab.scene(case), weighting),
-                )
+                distance(march(scene_in(lab.scene(case), WORDS[word]), weighting), floats[case])
                 for case in cases
             )
     return graded(numbers, max(numbers.values()) >= limit, otherwise=FALSE)

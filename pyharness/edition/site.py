@@ -112,7 +112,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) 
         "claims.html", "Claims", "claims.html", ledger.context(judged),
         [
             Found(f"claims.html#{each.claim['id']}", each.claim["id"], "claim",
-                  f"{each.claim['quote']} {each.claim['statement']}")
+                  f"{each.claim['quote']}: {each.claim['statement']}")
             for each in judged
         ],
     )  # fmt: skip
@@ -122,7 +122,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) 
         "apparatus.html", "Apparatus", "apparatus.html", {"entries": entries},
         [
             Found(f"apparatus.html#{each['id']}", each["id"], each["kind"],
-                  " ".join(str(each.get(name, "")) for name in ("summary", "evidence", "why")))
+                  ". ".join(each[name] for name in ("summary", "evidence", "why") if name in each))
             for each, _ in entries
         ],
     )  # fmt: skip

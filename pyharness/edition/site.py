@@ -179,11 +179,11 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     web = shipped("web")
     content = {
         f"assets/{file.name}": file.read_bytes()
-        for package in facts_of_vendor()
+        for package in vendor()
         for file in sorted((web / "vendor" / package["name"]).iterdir())
         if file.suffix in (".js", ".css")
     }
-    for package in facts_of_vendor():
+    for package in vendor():
         licence = (web / "vendor" / package["name"] / "LICENSE").read_bytes()
         content[f"assets/{package['name']}-LICENSE.txt"] = licence
     for file in sorted((web / "site").iterdir()):
@@ -201,7 +201,7 @@ def script(name: str, value: Any) -> bytes:
     return f"window.{name}={text};\n".encode()
 
 
-def facts_of_vendor() -> list[dict[str, Any]]:
+def vendor() -> list[dict[str, Any]]:
     """Return what the pages bring along of others: names, versions, checksums."""
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]

@@ -90,7 +90,7 @@ def test_document_with_a_mistake_is_refused(ours: str, other: str, schema: Any) 
 
 
 def test_schema_is_named_and_its_source_too() -> None:
-    assert SOURCE["source"] == SCHEMA
+    assert SOURCE["home"] == SCHEMA
     assert f"/{SOURCE['version']}/" in SCHEMA
     assert SCHEMA in TEXT.splitlines()[1]
 

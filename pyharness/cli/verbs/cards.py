@@ -6,7 +6,6 @@ from pathlib import Path
 
 from pyharness.cli import options as shared
 from pyharness.history.cards_report import cards_report, classes_report, scan_report
-from pyharness.history.tei import tei_document
 from pyharness.model.errors import InputError
 from pyharness.original.cards import chosen
 from pyharness.original.collation import expected_lines, undeclared, unexplained
@@ -23,6 +22,8 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Show the cards; with a scan, what they do not explain, and 1 where there is any."""
     if options.format == "tei":
+        from pyharness.history.tei import tei_document
+
         # Only the whole edition has a header and an apparatus.
         shared.refuse(options, "--format tei", ("classes", "scan"))
         _no_card(options, "--format tei")

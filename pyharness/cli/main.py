@@ -26,6 +26,7 @@ VERBS = {
     "sweep": "a grid of scenes, solved here or by a cluster, in a store that resumes",
     "verify": "bits between languages, error against the truth, and what changed since recorded",
     "stress": "numerical stability tried to breaking, each trial with a bound derived beforehand",
+    "edition": "all of it as pages: a static site in which the programs run",
     "doctor": "what is built, with what, and what is missing",
 }
 

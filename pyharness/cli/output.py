@@ -1,6 +1,7 @@
 """Where results go: a file is there whole or not at all."""
 
 import os
+import shutil
 import signal
 from collections.abc import Iterable
 from contextlib import suppress
@@ -199,3 +200,46 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
             if isinstance(error, OSError):
                 raise InputError(f"{option} '{path}': {error.strerror or error}") from None
             raise
+
+
+def check_tree(path: str, mark: str, option: str) -> None:
+    """Refuse a folder that `write_tree` may not make anew, before anything is computed for it."""
+    check_folder(path, (), option)
+    folder = Path(path)
+    try:
+        if folder.is_dir() and not (folder / mark).is_file() and any(folder.iterdir()):
+            raise InputError(
+                f"{option} '{path}': is neither empty nor has a '{mark}' of before; "
+                "give a new name, or the folder that was made before"
+            )
+    except OSError as error:
+        raise InputError(f"{option} '{path}': {error.strerror or error}") from None
+
+
+def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
+    """Write all files, and no other, into a folder with folders in it; all or nothing.
+
+    They are written beside it first. What stood there is gone when they have its place.
+    """
+    folder = Path(os.path.realpath(path))
+    new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
+    try:
+        with _Patience() as patience:
+            try:
+                for name, content in contents.items():
+                    file = new / name
+                    file.parent.mkdir(parents=True, exist_ok=True)
+                    file.write_bytes(content)
+                    patience.check()
+                if folder.is_dir():
+                    os.rename(folder, old)
+                os.rename(new, folder)
+            except BaseException:
+                if old.is_dir() and not folder.exists():
+                    os.rename(old, folder)
+                raise
+            finally:
+                for left in (new, old):
+                    shutil.rmtree(left, ignore_errors=True)
+    except OSError as error:
+        raise InputError(f"{option} '{path}': {error.strerror or error}") from None

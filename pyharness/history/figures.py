@@ -228,6 +228,38 @@ def figure_picture(finding: FigureFinding) -> Picture:
     return Picture(figure, curve_numbers(finding))
 
 
+def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
+    """Draw omega1 of a figure, original and corrected, over the reference and the limit.
+
+    Where the original ends, its limit says where it would have gone.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.2), dpi=110, layout="constrained")
+    axes = figure.subplots()
+    truth, start = first.reference, np.array(first.scene.omega)
+    time = _from_zero(truth.time)
+    axes.plot(time, _from_zero(truth.omega, start)[:, 0], label="reference", **_REFERENCE)
+    if first.limit is not None:
+        name, omega = first.limit
+        axes.plot(time, _from_zero(omega, start)[:, 0], label=name, **_LIMIT)
+    bottom, top = _frame(first, 0)
+    for finding in (first, second):
+        # Corrected, the programs that were right before would draw the same line again.
+        curves = finding.curves if finding is first else finding.curves[-1:]
+        for curve in curves:
+            _draw(axes, curve, start, 0, bottom, top)
+            line = axes.lines[-2 if curve.ending else -1]
+            line.set_label(f"{curve.label}, {finding.plan.set}")
+            if finding is not first:
+                line.set(color="#b06000", marker="v", markevery=(4, 15))
+    axes.set(ylim=(bottom, top), xlim=(0.0, time[-1]), xlabel="time (s)")
+    axes.set_ylabel("$\\omega_1$ (rad/s)")
+    axes.grid(visible=True, linewidth=0.3)
+    figure.legend(loc="outside lower center", ncols=2, handlelength=5.0, frameon=False)
+    return Picture(figure, curve_numbers(first))
+
+
 def _heading(finding: FigureFinding) -> str:
     plan, scene = finding.plan, finding.scene
     title = f"{plan.title}. Case {scene.case}: {scene.name}; {plan.set} programs"

@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from pyharness.model.errors import InputError
-from pyharness.model.facts import facts
+from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 
 _MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
 _SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
 _PACKAGE = Path(__file__).parent.parent
-# An installed package brings the sources of the port along; a checkout has them beside it.
-_PORTS = (_PACKAGE / "data" / "fortran", _PACKAGE.parent / "fortran" / "original")
+_PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
@@ -262,7 +261,7 @@ def _cards_of(asked: str) -> list[Card]:
 def margin(program: str) -> Iterator[tuple[Place, str]]:
     """Give the lines of the port that name cards, and the cards that they name."""
     file = f"{program.replace('-', '_')}.fypp"
-    for number, text in enumerate(_lines(next(f for f in _PORTS if f.exists()) / file), 1):
+    for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
         if match := _MARGIN.match(text):
             yield Place(file, number, match[1].strip()), match[2]
 

@@ -1,0 +1,93 @@
+"""What the package offers in Python, from its docstrings."""
+
+import inspect
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import pyharness
+from pyharness.edition.markdown import Markup, inline
+
+
+class Item(NamedTuple):
+    """A name with its type and what is said of it."""
+
+    name: str
+    type: str
+    text: Markup
+
+
+class Entry(NamedTuple):
+    """A public name: its signature, its docstring in parts, and the methods of a class."""
+
+    name: str
+    anchor: str
+    kind: str
+    signature: str
+    summary: Markup
+    text: list[Markup]
+    groups: list[tuple[str, list[Item]]]
+    methods: "list[Entry]"
+
+
+def entries() -> list[Entry]:
+    """Return an entry for each public name."""
+    return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
+
+
+def _entry(name: str, of: Any, of_class: str = "") -> Entry:
+    from docstring_parser import DocstringStyle, parse
+
+    told = parse(inspect.getdoc(of) or "", DocstringStyle.NUMPYDOC)
+    groups: dict[str, list[Item]] = {}
+    for each in told.params:
+        title = {"attribute": "Attributes"}.get(each.args[0], "Parameters")
+        groups.setdefault(title, []).append(
+            Item(each.arg_name, each.type_name or "", _line(each.description))
+        )
+    for each in told.many_returns:
+        groups.setdefault("Returns", []).append(
+            Item(each.return_name or "", each.type_name or "", _line(each.description))
+        )
+    for each in told.raises:
+        groups.setdefault("Raises", []).append(
+            Item("", each.type_name or "", _line(each.description))
+        )
+    return Entry(
+        name,
+        f"{of_class}.{name}" if of_class else name,
+        "class" if inspect.isclass(of) else "function",
+        _signature(of),
+        _line(told.short_description),
+        [_line(part) for part in (told.long_description or "").split("\n\n") if part],
+        list(groups.items()),
+        list(_methods(name, of)) if inspect.isclass(of) else [],
+    )
+
+
+def _methods(owner: str, of: type) -> Iterator[Entry]:
+    for name, value in vars(of).items():
+        told = value.fget if isinstance(value, property) else value
+        if not name.startswith("_") and inspect.isfunction(told) and inspect.getdoc(told):
+            entry = _entry(name, told, owner)
+            yield entry._replace(kind="property", signature="") if told is not value else entry
+
+
+def _signature(of: Any) -> str:
+    try:
+        told = str(inspect.signature(of))
+    except (TypeError, ValueError):
+        return ""
+    # The names alone, and arrays as the sources write them.
+    told = re.sub(r"<class '(.*?)'>", r"\1", told).replace("NoneType", "None")
+    told = re.sub(r"numpy\.ndarray\[tuple\[.*?\], numpy\.dtype\[(.*?)\]\]", _array, told)
+    return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Za-z])", "", told)
+
+
+def _array(found: re.Match[str]) -> str:
+    kind = found[1].rpartition(".")[2]
+    return "Array" if kind == "float64" else f"Array[{kind}]"
+
+
+def _line(text: str | None) -> Markup:
+    return inline(" ".join((text or "").split()))

@@ -1,0 +1,72 @@
+"""Claims, sentences and apparatus for their pages: verdicts as computed, reports as they are."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from markupsafe import Markup
+
+from pyharness.history.ablation import effects_of, entries
+from pyharness.history.apparatus_report import entry_report
+from pyharness.history.claims.ledger import Judgement, claims, judge
+from pyharness.history.claims.report import claims_report, explanation
+from pyharness.history.claims.sentences import Sentence, sentences
+from pyharness.views import html
+
+
+class Told(NamedTuple):
+    """A sentence of the thesis with the verdicts of the claims that it makes."""
+
+    sentence: Sentence
+    judged: list[Judgement]
+
+
+def judgements() -> list[Judgement]:
+    """Judge every claim."""
+    return [judge(entry) for entry in claims()]
+
+
+def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
+    """Return by verdict how many claims have it: of the original programs, and corrected."""
+    found: dict[str, tuple[int, int]] = {}
+    for each in judged:
+        for verdict in (each.original.verdict, each.corrected.verdict):
+            found[verdict] = (0, 0)
+    for verdict in found:
+        found[verdict] = (
+            sum(each.original.verdict == verdict for each in judged),
+            sum(each.corrected.verdict == verdict for each in judged),
+        )
+    return found
+
+
+def context(judged: Sequence[Judgement]) -> dict[str, Any]:
+    """Return the ledger as a table, and the story of each claim."""
+    table = claims_report(judged).data
+    assert table is not None
+    links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
+    stories = []
+    for each in judged:
+        # The first section is the heading, which the page has as one.
+        story = explanation(each).text[1:]
+        stories.append((each, Markup(html.sections(story))))
+    return {"table": Markup(html.table(table, "all claims", links)), "stories": stories}
+
+
+def apparatus() -> list[tuple[dict[str, Any], Markup]]:
+    """Return each entry of the apparatus, and its report with its effect in every case."""
+    found = []
+    for entry in entries():
+        effects = list(effects_of(entry["id"])) if "flag" in entry else []
+        report = entry_report(entry, effects)
+        found.append((entry, Markup(html.sections(report.text[1:]))))
+    return found
+
+
+def thesis(judged: Iterable[Judgement]) -> dict[str, list[Told]]:
+    """Return the sentences by the section that they stand in, in the thesis's order."""
+    by_name = {each.claim["id"]: each for each in judged}
+    found: dict[str, list[Told]] = {}
+    for each in sentences():
+        section = each.where.partition(",")[0]
+        found.setdefault(section, []).append(Told(each, [by_name[name] for name in each.claims]))
+    return found

@@ -1,0 +1,145 @@
+"""The project's Markdown as HTML: anchors as on GitHub, formulas as MathML, links of the site."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from markupsafe import Markup, escape
+
+if TYPE_CHECKING:
+    from markdown_it import MarkdownIt
+    from markdown_it.token import Token
+
+
+class Part(NamedTuple):
+    """What stands under a heading, for the search."""
+
+    anchor: str
+    title: str
+    text: str
+
+
+class Document(NamedTuple):
+    """A rendered document: its title, its HTML without that title, and its parts."""
+
+    title: str
+    html: Markup
+    parts: list[Part]
+
+
+def document(text: str, link: Callable[[str], str | None]) -> Document:
+    """Render a document that begins with its title.
+
+    `link` gives what a target in the text becomes, None where the site has no such page.
+    """
+    tokens = _parser().parse(text)
+    for token in _all(tokens):
+        if token.type == "link_open":
+            target = link(str(token.attrs["href"]))
+            # Without a target it is a name, and no link.
+            token.attrs = {} if target is None else {"href": target}
+        elif token.type == "image":
+            source = link(str(token.attrs["src"]))
+            if source is None:
+                raise ValueError(f"the site has no picture {token.attrs['src']!r}")
+            token.attrs["src"], token.attrs["loading"] = source, "lazy"
+    _anchor(tokens)
+    title = tokens[1].content
+    html = _parser().renderer.render(tokens[3:], _parser().options, {})
+    return Document(_plain(title), Markup(html), list(_parts(tokens)))
+
+
+def inline(text: str) -> Markup:
+    """Render a line of Markdown: code, emphasis, formulas."""
+    return Markup(_parser().renderInline(text))
+
+
+def formula(tex: str, display: bool = False) -> Markup:
+    """Return a formula of LaTeX as MathML."""
+    from latex2mathml.converter import convert
+
+    return Markup(convert(tex, display="block" if display else "inline"))
+
+
+def scrolling(html: str, label: str) -> Markup:
+    """Wrap what may be wider than the page; it scrolls by keyboard too."""
+    return Markup('<div class="wide" role="region" tabindex="0" aria-label="{}">{}</div>').format(
+        label, Markup(html)
+    )
+
+
+@cache
+def _parser() -> "MarkdownIt":
+    from markdown_it import MarkdownIt
+    from mdit_py_plugins.dollarmath import dollarmath_plugin
+
+    parser = MarkdownIt("commonmark", {"html": False}).enable("table")
+    parser.use(
+        dollarmath_plugin,
+        allow_digits=False,
+        allow_space=False,
+        renderer=lambda tex, options: formula(tex, options["display_mode"]),
+    )
+    rules: Any = parser.renderer.rules
+    rules["table_open"] = lambda *_: _OPEN.format("table") + "<table>\n"
+    rules["table_close"] = lambda *_: "</table></div>\n"
+    rules["math_block"] = _block
+    for kind in ("fence", "code_block"):
+        rules[kind] = _code
+    return parser
+
+
+_OPEN = '<div class="wide" role="region" tabindex="0" aria-label="{}">'
+
+
+def _block(tokens: Sequence["Token"], index: int, *_: Any) -> str:
+    return f'<div class="formula">{formula(tokens[index].content.strip(), display=True)}</div>\n'
+
+
+def _code(tokens: Sequence["Token"], index: int, *_: Any) -> str:
+    token = tokens[index]
+    language = escape(token.info or "text")
+    text = escape(token.content)
+    return (
+        f'<pre class="code language-{language}" role="region" tabindex="0" '
+        f'aria-label="{language}"><code>{text}</code></pre>\n'
+    )
+
+
+def _all(tokens: Sequence["Token"]) -> Iterator["Token"]:
+    for token in tokens:
+        yield token
+        yield from _all(token.children or [])
+
+
+def _anchor(tokens: Sequence["Token"]) -> None:
+    """Name headings as GitHub does: links between documents hold here too."""
+    seen: dict[str, int] = {}
+    for opening, content in zip(tokens, tokens[1:], strict=False):
+        if opening.type == "heading_open":
+            name = slug(_plain(content.content))
+            count = seen[name] = seen.get(name, -1) + 1
+            opening.attrs["id"] = name + (f"-{count}" if count else "")
+
+
+def slug(title: str) -> str:
+    """Return the anchor of a heading."""
+    return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+
+
+def _plain(text: str) -> str:
+    """Return a line of Markdown as words alone."""
+    return re.sub(r"[`*$\\]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text))
+
+
+def _parts(tokens: Sequence["Token"]) -> Iterator[Part]:
+    anchor, title, text = "", "", []
+    for index, token in enumerate(tokens):
+        if token.type == "heading_open":
+            if title:
+                yield Part(anchor, title, " ".join(text))
+            anchor, title, text = str(token.attrs["id"]), _plain(tokens[index + 1].content), []
+        elif token.type in ("inline", "fence") and tokens[index - 1].type != "heading_open":
+            text.append(_plain(token.content))
+    yield Part(anchor, title, " ".join(text))

@@ -1,0 +1,26 @@
+"""The report of `edition`: how much was written, by kind."""
+
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+from pyharness.model.records import build_record
+from pyharness.model.report import Column, Report, Table, digits, words
+
+_KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
+
+
+def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
+    """Report the files of a site that stands in a folder."""
+    sizes: dict[str, list[int]] = {}
+    for name, each in content.items():
+        sizes.setdefault(PurePosixPath(name).suffix.lstrip("."), []).append(len(each))
+    rows = [[kind, len(found), sum(found)] for kind, found in sorted(sizes.items())]
+    rows.append(["all", len(content), sum(map(len, content.values()))])
+
+    def record() -> dict[str, Any]:
+        files = {name: len(each) for name, each in content.items()}
+        return {"folder": folder, "files": files, "build": build_record()}
+
+    text = [[Table(_KINDS, rows)], [f"Open {folder}/index.html in a browser."]]
+    return Report("edition", text, record)

@@ -1,0 +1,224 @@
+"""The site: which pages there are, and what they are made of. Nothing is fetched or computed twice.
+
+Every page is a template filled with data and with what the reports of findings say. A page works
+from a file, under any path, and without JavaScript.
+"""
+
+import json
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from pyharness.edition import api, decks, documents, figures, laboratory, ledger
+from pyharness.edition.bundle import bundle
+from pyharness.edition.markdown import formula, inline
+from pyharness.history.tei import tei_document
+from pyharness.model.errors import InputError
+from pyharness.model.facts import facts, shipped
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.records import build_record
+from pyharness.views.json import json_text
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+# A folder that has it was made by `edition`, and may be made anew.
+MARK = "edition.json"
+# The menu: title and path, in its order.
+MENU = (
+    ("Listing", "listing/index.html"),
+    ("Laboratory", "laboratory.html"),
+    ("Thesis", "thesis.html"),
+    ("Figures", "figures.html"),
+    ("Claims", "claims.html"),
+    ("Apparatus", "apparatus.html"),
+    ("Findings", "docs/findings.html"),
+    ("Methods", "docs/methods.html"),
+    ("Documents", "docs/index.html"),
+    ("API", "api.html"),
+    ("Search", "search.html"),
+)
+_DECKS = {"two-term": "Two-term collocation", "four-term": "Four-term collocation",
+          "runge-kutta": "Runge-Kutta"}  # fmt: skip
+
+
+class Found(NamedTuple):
+    """What the search knows of a place: where it is, its title, its kind, and its words."""
+
+    href: str
+    title: str
+    kind: str
+    text: str
+
+
+class Page(NamedTuple):
+    """A page: where it is, what fills its template, and what the search finds on it."""
+
+    path: str
+    title: str
+    template: str
+    context: Mapping[str, Any] = {}
+    found: Sequence[Found] = ()
+    menu: str = ""  # the entry of the menu that leads here; its own path where empty
+
+
+def build_site(progress: Callable[[str], None] = lambda _: None) -> dict[str, bytes]:
+    """Return the files of the site by path; `progress` is told what is being made."""
+    progress("figures")
+    drawn = figures.drawn()
+    pictures = figures.together(drawn)
+    for each in drawn.values():
+        pictures |= each.files
+    content = {f"figures/{name}": file for name, file in pictures.items()}
+    places: list[Found] = []
+    for page in _pages(drawn, progress):
+        content[page.path] = _rendered(page)
+        places += page.found
+    content |= _assets(places)
+    content[MARK] = json_text(
+        {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
+    ).encode()
+    return content
+
+
+def check_libraries() -> None:
+    """Refuse to build where what writes the pages is missing."""
+    try:
+        import docstring_parser  # noqa: F401
+        import jinja2  # noqa: F401
+        import latex2mathml  # noqa: F401
+        import markdown_it  # noqa: F401
+        import matplotlib  # noqa: F401
+        import mdit_py_plugins  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            f"edition needs {error.name}: 'pip install pyharness[edition]'"
+        ) from None
+
+
+def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) -> Iterator[Page]:
+    progress("claims")
+    judged = ledger.judgements()
+    yield Page("index.html", "Rigid bodies, 1982", "index.html", {"counts": ledger.counts(judged)})
+    progress("listing")
+    yield from _listing()
+    yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
+    sentences = ledger.thesis(judged)
+    yield Page("thesis.html", "The thesis, executable", "thesis.html", {"sections": sentences})
+    yield Page("figures.html", "Figures 6 to 12", "figures.html", {"figures": drawn})
+    yield Page(
+        "claims.html", "Claims", "claims.html", ledger.context(judged),
+        [
+            Found(f"claims.html#{each.claim['id']}", each.claim["id"], "claim",
+                  f"{each.claim['quote']} {each.claim['statement']}")
+            for each in judged
+        ],
+    )  # fmt: skip
+    progress("apparatus")
+    entries = ledger.apparatus()
+    yield Page(
+        "apparatus.html", "Apparatus", "apparatus.html", {"entries": entries},
+        [
+            Found(f"apparatus.html#{each['id']}", each["id"], each["kind"],
+                  " ".join(str(each.get(name, "")) for name in ("summary", "evidence", "why")))
+            for each, _ in entries
+        ],
+    )  # fmt: skip
+    progress("documents")
+    yield from _documents()
+    offered = api.entries()
+    yield Page(
+        "api.html", "API", "api.html", {"entries": offered},
+        [Found(f"api.html#{each.name}", each.name, "API", each.summary) for each in offered],
+    )  # fmt: skip
+    yield Page("search.html", "Search", "search.html")
+
+
+def _listing() -> Iterator[Page]:
+    for program in PROGRAMS:
+        views = decks.card_views(program)
+        path = f"listing/{program}.html"
+        context = {"program": program, "cards": views, "kinds": decks.kinds_of(views)}
+        found = [
+            Found(f"{path}#{each.number}", f"{program} {each.number}", "card",
+                  "".join(run.text for run in each.card).strip())
+            for each in views
+        ]  # fmt: skip
+        yield Page(path, f"{_DECKS[program]}: the deck", "deck.html", context, found,
+                   menu="listing/index.html")  # fmt: skip
+    context = {"programs": _DECKS, "scan": facts("cards/scan")}
+    yield Page("listing/index.html", "The listing", "listing.html", context)
+
+
+def _documents() -> Iterator[Page]:
+    listed = []
+    for path, each in documents.documents():
+        found = [
+            Found(f"{path}#{part.anchor}", part.title, "document", part.text)
+            for part in each.parts
+        ]
+        listed.append((path, each.title, len(each.parts)))
+        yield Page(path, each.title, "document.html", {"document": each}, found,
+                   menu=path if path in dict(MENU).values() else "docs/index.html")  # fmt: skip
+    yield Page("docs/index.html", "Documents", "documents.html", {"documents": listed})
+
+
+def _rendered(page: Page) -> bytes:
+    # From a page in a folder the site's top is above it: links hold under any path.
+    root = "../" * page.path.count("/")
+    html = _templates().get_template(page.template).render(
+        {"page": page, "root": root, "menu": MENU, "here": page.menu or page.path,
+         "build": build_record(), **page.context}
+    )  # fmt: skip
+    return html.encode()
+
+
+def _assets(places: Sequence[Found]) -> dict[str, bytes]:
+    web = shipped("web")
+    content = {
+        f"assets/{file.name}": file.read_bytes()
+        for package in facts_of_vendor()
+        for file in sorted((web / "vendor" / package["name"]).iterdir())
+        if file.suffix in (".js", ".css")
+    }
+    for package in facts_of_vendor():
+        licence = (web / "vendor" / package["name"] / "LICENSE").read_bytes()
+        content[f"assets/{package['name']}-LICENSE.txt"] = licence
+    for file in sorted((web / "site").iterdir()):
+        content[f"assets/{file.name}"] = file.read_bytes()
+    content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
+    content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
+    content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
+    content["listing/edition.xml"] = tei_document()
+    return content | documents.files()
+
+
+def script(name: str, value: Any) -> bytes:
+    """Return data as a script, for a page that may not fetch: it may come from a file."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    return f"window.{name}={text};\n".encode()
+
+
+def facts_of_vendor() -> list[dict[str, Any]]:
+    """Return what the pages bring along of others: names, versions, checksums."""
+    with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
+        packages: list[dict[str, Any]] = tomllib.load(file)["package"]
+    return packages
+
+
+@cache
+def _templates() -> "Environment":
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters["inline"] = inline
+    templates.globals["formula"] = formula
+    return templates

@@ -45,7 +45,7 @@ def _add(
             if name not in exports[needed]:
                 raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
     names = [found["name"] for found in _EXPORT.finditer(text)]
-    # The comments of a statement over several lines must not move what is told of other lines.
+    # What replaces a statement has as many lines, for what is told of others.
     body = _IMPORT.sub(lambda found: _as_constant(found, path, list(exports)), text)
     body = _EXPORT.sub("", body)
     unknown = _UNKNOWN.search(body)

@@ -21,7 +21,11 @@ DEFAULTS = {"case": 2, "program": "runge-kutta", "listing": "original"}
 """What the page shows whose address says nothing."""
 MOST_STEPS = 3000
 """What a page draws without a pause; the decks' 300 steps in a tenth of their length."""
-_KINDS = {"defect": "Defects", "reading": "Readings", "conjecture": "Conjectures"}
+_KINDS = {
+    "defect": "Defects left in",
+    "reading": "Readings not adopted",
+    "conjecture": "Conjectures assumed",
+}
 _SHOWN = 3
 
 
@@ -88,10 +92,12 @@ def _first() -> dict[str, Any]:
     error = np.abs(run.omega - truth[: run.steps])
     numbers = [*range(_SHOWN), *range(run.steps - _SHOWN, run.steps)]
     return {
-        "scene": scene,
-        "state": {**DEFAULTS, "omega0": ",".join(f"{x:g}" for x in scene.omega)},
+        "state": DEFAULTS,
+        "fragment": "&".join(f"{word}={value}" for word, value in DEFAULTS.items()),
+        "command": " ".join(
+            ["pyharness run", *(f"--{word} {value}" for word, value in DEFAULTS.items())]
+        ),
         "ending": ending(run),
-        "stop": run.stop,
         "error": short(float(error.max())),
         "rows": [_row(run, number, float(error[number].max())) for number in numbers],
         "page": page(scene, program, run),
@@ -99,7 +105,9 @@ def _first() -> dict[str, Any]:
 
 
 def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    """Return step, time (s), omega (rad/s), velocity (m/s) and the error, as the script has them."""
+    """Return a row of the table: step, time, omega, velocity, TIME, IER and the error."""
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]
-    return [str(number + 1), *(repr(float(x)) for x in values), short(error)]
+    values.append(run.recorded_time[number])
+    # The program has no IER.
+    return [str(number + 1), *(repr(float(x)) for x in values), "", short(error)]

@@ -29,6 +29,14 @@ def printed(capsys: pytest.CaptureFixture[str]) -> Printed:
     return run
 
 
+@pytest.fixture(scope="session")
+def built_site() -> dict[str, bytes]:
+    """Return the files of the edition's pages by path."""
+    from pyharness.edition.site import build_site
+
+    return build_site()
+
+
 @pytest.fixture(params=range(len(LEVELS)), ids=LEVELS)
 def level(request: pytest.FixtureRequest) -> Iterator[int]:
     """Run the kernels of one instruction set, where this machine has it."""

@@ -110,7 +110,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) 
         "claims.html", "Claims", "claims.html", ledger.context(judged),
         [
             Found(f"claims.html#{each.claim['id']}", each.claim["id"], "claim",
-                  f"{each.claim['quote']} {each.claim['statement']}")
+                  f"{each.claim['quote']}: {each.claim['statement']}")
             for each in judged
         ],
     )  # fmt: skip
@@ -120,7 +120,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) 
         "apparatus.html", "Apparatus", "apparatus.html", {"entries": entries},
         [
             Found(f"apparatus.html#{each['id']}", each["id"], each["kind"],
-                  " ".join(str(each.get(name, "")) for name in ("summary", "evidence", "why")))
+                  ". ".join(each[name] for name in ("summary", "evidence", "why") if name in each))
             for each, _ in entries
         ],
     )  # fmt: skip
@@ -176,11 +176,11 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     web = shipped("web")
     content = {
         f"assets/{file.name}": file.read_bytes()
-        for package in facts_of_vendor()
+        for package in vendor()
         for file in sorted((web / "vendor" / package["name"]).iterdir())
         if file.suffix in (".js", ".css")
     }
-    for package in facts_of_vendor():
+    for package in vendor():
         licence = (web / "vendor" / package["name"] / "LICENSE").read_bytes()
         content[f"assets/{package['name']}-LICENSE.txt"] = licence
     for file in sorted((web / "site").iterdir()):
@@ -198,7 +198,7 @@ def script(name: str, value: Any) -> bytes:
     return f"window.{name}={text};\n".encode()
 
 
-def facts_of_vendor() -> list[dict[str, Any]]:
+def vendor() -> list[dict[str, Any]]:
     """Return what the pages bring along of others: names, versions, checksums."""
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]

@@ -1,0 +1,196 @@
+"""The site: no dead link, nothing from outside, everything of the edition on its page."""
+
+import hashlib
+import json
+import re
+import tomllib
+
+import pytest
+
+from pyharness.edition import api, decks, site
+from pyharness.edition.markdown import document
+from pyharness.history.ablation import entries
+from pyharness.history.claims.ledger import claims
+from pyharness.history.claims.sentences import sentences
+from pyharness.model.facts import facts, shipped
+from pyharness.model.listing import PROGRAMS
+from pyharness.original.cards import deck, tight
+from tests.edition.pages import dead, pages
+
+
+def test_no_link_is_dead(built_site: dict[str, bytes]) -> None:
+    assert list(dead(built_site)) == []
+
+
+@pytest.mark.parametrize(
+    ("page", "old", "new"),
+    [
+        ("index.html", b'href="claims.html"', b'href="claim.html"'),
+        ("claims.html", b'href="#vi-superior"', b'href="#vi-inferior"'),
+        ("docs/findings.html", b'src="figures/', b'src="figure/'),
+        ("listing/two-term.html", b"../apparatus.html#", b"../apparatus.html#no-"),
+    ],
+)
+def test_dead_links_are_found(
+    built_site: dict[str, bytes], page: str, old: bytes, new: bytes
+) -> None:
+    assert old in built_site[page]
+    broken = built_site | {page: built_site[page].replace(old, new)}
+    assert any(each.startswith(page) for each in dead(broken))
+
+
+def test_pages_load_nothing_from_outside_and_name_no_place_twice(
+    built_site: dict[str, bytes],
+) -> None:
+    for name, page in pages(built_site).items():
+        assert len(set(page.anchors)) == len(page.anchors), name
+        for element, path, _ in page.targets:
+            assert element == "a" or "//" not in path, (name, path)
+            assert not path.startswith("/"), (name, path)  # it works under any path
+        kinds = [each.get("type") for tag, each in page.elements if tag == "script"]
+        assert "module" not in kinds, name  # which browsers refuse from a file
+    ours = [name for name in built_site if name.endswith((".css", ".js"))]
+    vendor = {file for each in site.vendor() for file in each["sha256"]}
+    for name in ours:
+        text = built_site[name].decode()
+        if name.rpartition("/")[2] not in vendor:
+            assert not re.search(r"\bfetch\(|XMLHttpRequest|new Worker|\bimport\(", text), name
+        if name.endswith(".css"):
+            assert "url(" not in text and "@import" not in text, name
+
+
+def test_pages_have_landmarks_and_one_title(built_site: dict[str, bytes]) -> None:
+    for name, page in pages(built_site).items():
+        tags = [tag for tag, _ in page.elements]
+        for tag in ("main", "header", "nav", "footer", "h1", "title"):
+            assert tags.count(tag) == 1, (name, tag)
+        attributes = dict(page.elements)
+        assert attributes["html"]["lang"] == "en"
+        # A menu says where one is; a page behind an entry of it is under that entry.
+        current = [each for _, each in page.elements if each.get("aria-current")]
+        assert len(current) == 1, name
+        for tag, each in page.elements:
+            if tag == "img":
+                assert each.get("alt"), (name, each)
+
+
+def test_the_site_is_small(built_site: dict[str, bytes]) -> None:
+    assert sum(map(len, built_site.values())) < 15e6
+    home = pages(built_site)["index.html"]
+    loaded = {path for element, path, _ in home.targets if element != "a"}
+    assert sum(len(built_site[path]) for path in {"index.html", *loaded}) < 300e3
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_card_is_there_with_its_scan(built_site: dict[str, bytes], program: str) -> None:
+    page = pages(built_site)[f"listing/{program}.html"]
+    cards = deck(program).cards
+    assert [each for each in page.anchors if each.isdigit()] == [str(each) for each in cards]
+    for card, view in zip(cards.values(), decks.card_views(program), strict=True):
+        assert "".join(run.text for run in view.card) == card.text
+        scan = None if view.scan is None else "".join(run.text for run in view.scan)
+        assert scan == card.scan
+        for runs in (view.card, view.scan or []):
+            for run in runs:
+                assert run.entry is None or run.entry in card.entries
+        marked = [tight(run.text) for run in view.card if run.entry]
+        # Neighbours of one entry are one mark.
+        assert "".join(marked) == "".join(each.ours for each in card.differences)
+
+
+def test_marks_stand_where_the_scan_differs() -> None:
+    card = deck("two-term").cards[1260]
+    (view,) = [each for each in decks.card_views("two-term") if each.number == 1260]
+    assert [run.text for run in view.card if run.entry] == ["V", "V"]
+    assert [run.text for run in view.scan or [] if run.entry] == ["U", "U"]
+    assert [each["id"] for each in view.entries] == list(card.entries)
+    assert view.kinds[0] == "defect"
+
+
+def test_every_claim_entry_and_sentence_is_there(built_site: dict[str, bytes]) -> None:
+    read = pages(built_site)
+    for page, names in (
+        ("claims.html", [each["id"] for each in claims()]),
+        ("apparatus.html", [each["id"] for each in entries()]),
+        ("figures.html", ["figure-07", "figure-10b-corrected"]),
+        ("api.html", [each.name for each in api.entries()]),
+    ):
+        assert set(names) <= set(read[page].anchors), page
+    thesis = " ".join(" ".join(read["thesis.html"].text).split())
+    for each in sentences():
+        assert " ".join(each.quote.split()) in thesis
+    assert {each["number"] for each in facts("figures")["figure"]} == {
+        int(anchor[7:9]) for anchor in read["figures.html"].anchors if anchor.startswith("figure-")
+    }
+
+
+def test_the_ledger_has_the_verdicts(built_site: dict[str, bytes]) -> None:
+    """What is on the page is what is judged: a claim that turns, turns there."""
+    text = built_site["claims.html"].decode()
+    _, _, story = text.partition('id="vi-superior"')
+    verdicts = re.findall(r'class="verdict [\w-]+">([\w ]+)<', story)[:2]
+    assert verdicts == ["reproduced in part", "false"]
+
+
+def test_the_search_knows_cards_entries_claims_documents_and_names(
+    built_site: dict[str, bytes],
+) -> None:
+    data = built_site["assets/search-data.js"].decode()
+    places = json.loads(data.removeprefix("window.searchData=").removesuffix(";\n"))
+    read = pages(built_site)
+    for each in places:
+        page, _, anchor = each["href"].partition("#")
+        assert anchor in read[page].anchors, each["href"]
+    kinds = {each["kind"] for each in places}
+    assert {"card", "claim", "defect", "misreading", "document", "API"} <= kinds
+    assert sum(each["kind"] == "card" for each in places) == 528
+
+
+def test_what_others_wrote_is_what_its_checksum_says() -> None:
+    folder = shipped("web") / "vendor"
+    listed = tomllib.loads((folder / "vendor.toml").read_text())["package"]
+    assert {each["name"] for each in listed} == {each.name for each in folder.iterdir()} - {
+        "vendor.toml"
+    }
+    for package in listed:
+        files = {file.name: file for file in (folder / package["name"]).iterdir()}
+        assert set(files) == set(package["sha256"])
+        for name, digest in package["sha256"].items():
+            assert hashlib.sha256(files[name].read_bytes()).hexdigest() == digest
+
+
+def test_two_builds_have_the_same_bytes(built_site: dict[str, bytes]) -> None:
+    again = site.build_site()
+    assert [name for name in again if again[name] != built_site[name]] == []
+    assert again.keys() == built_site.keys()
+
+
+def test_documents_link_to_pages() -> None:
+    text = "# Title\n\nSee [it](methods.md#which-one), [that](../setup.py) and ![p](a.svg).\n"
+    links = {"methods.md#which-one": "methods.html#which-one", "a.svg": "a.svg"}
+    found = document(text, links.get)
+    assert found.title == "Title"
+    assert '<a href="methods.html#which-one">it</a>' in found.html
+    assert "<a>that</a>" in found.html
+    assert 'src="a.svg"' in found.html
+    with pytest.raises(ValueError, match="no picture"):
+        document("# T\n\n![p](b.svg)\n", links.get)
+
+
+def test_formulas_are_mathml_and_html_is_text() -> None:
+    found = document("# T\n\nSo $a_1 < b$ and <b>no</b>, `$x$`.\n\n$$c = d$$\n", lambda _: None)
+    assert found.html.count("<math") == 2
+    assert 'display="block"' in found.html
+    assert "&lt;b&gt;no&lt;/b&gt;" in found.html
+    assert "<code>$x$</code>" in found.html
+
+
+def test_headings_are_named_as_on_github() -> None:
+    text = "# T\n\n## Which one, *now*?\n\na\n\n## Which one now\n\nb `c` [d](e.md)\n"
+    found = document(text, lambda _: None)
+    assert [(part.anchor, part.title, part.text) for part in found.parts] == [
+        ("t", "T", ""),
+        ("which-one-now", "Which one, now?", "a"),
+        ("which-one-now-1", "Which one now", "b c d"),
+    ]
+    assert 'id="which-one-now-1"' in found.html

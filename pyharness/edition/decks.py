@@ -59,7 +59,7 @@ def card_views(program: str) -> list[CardView]:
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
     """Return the number of cards by kind of their entries, those with a say first."""
-    counts = dict.fromkeys(_ORDER, 0)
+    counts = {kind: 0 for kind in _ORDER}
     for view in views:
         for kind in view.kinds:
             counts[kind] += 1

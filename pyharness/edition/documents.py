@@ -48,8 +48,6 @@ def _link(name: str, target: str) -> str | None:
 
 def _exists(name: str) -> bool:
     file = Path(name)
-    return (
-        file.suffix in (".md", *_PICTURES)
-        and not name.startswith("..")
-        and (shipped("docs") / file).exists()
-    )
+    return file.suffix in (".md", *_PICTURES) and not name.startswith("..") and (
+        shipped("docs") / file
+    ).exists()

@@ -93,7 +93,9 @@ def check_libraries() -> None:
         import matplotlib  # noqa: F401
         import mdit_py_plugins  # noqa: F401
     except ImportError as error:
-        raise InputError(f"edition needs {error.name}: 'pip install pyharness[edition]'") from None
+        raise InputError(
+            f"edition needs {error.name}: 'pip install pyharness[edition]'"
+        ) from None
 
 
 def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) -> Iterator[Page]:
@@ -154,7 +156,8 @@ def _documents() -> Iterator[Page]:
     listed = []
     for path, each in documents.documents():
         found = [
-            Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
+            Found(f"{path}#{part.anchor}", part.title, "document", part.text)
+            for part in each.parts
         ]
         listed.append((path, each.title, len(each.parts)))
         yield Page(path, each.title, "document.html", {"document": each}, found,

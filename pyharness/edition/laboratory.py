@@ -90,6 +90,7 @@ def _first() -> dict[str, Any]:
     run = run_program(scene, original(program), "python")
     truth = reference(scene, scene.times()).omega
     error = np.abs(run.omega - truth[: run.steps])
+    told = ending(run)
     numbers = [*range(_SHOWN), *range(run.steps - _SHOWN, run.steps)]
     return {
         "state": DEFAULTS,
@@ -97,7 +98,7 @@ def _first() -> dict[str, Any]:
         "command": " ".join(
             ["pyharness run", *(f"--{word} {value}" for word, value in DEFAULTS.items())]
         ),
-        "ending": ending(run),
+        "ending": told[0].upper() + told[1:],
         "error": short(float(error.max())),
         "rows": [_row(run, number, float(error[number].max())) for number in numbers],
         "page": page(scene, program, run),

@@ -63,10 +63,9 @@ function write(descriptors, values) {
 // A number in its field; halves go away from zero, which has no sign, and what does not fit, or is
 // not finite, is asterisks.
 function edited(value, width, places) {
-  const digits = Math.abs(value).toFixed(places);
-  const sign = value < 0 && Number(digits) !== 0 ? "-" : "";
-  const text = sign + digits;
-  return Number.isFinite(value) && text.length <= width
-    ? text.padStart(width)
-    : "*".repeat(width);
+  const size = Math.abs(value);
+  const digits = size.toFixed(places);
+  const text = value < 0 && Number(digits) !== 0 ? `-${digits}` : digits;
+  // A billion has more digits than any field; what toFixed writes beyond 1e21 is no digits.
+  return size < 1e9 && text.length <= width ? text.padStart(width) : "*".repeat(width);
 }

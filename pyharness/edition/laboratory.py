@@ -17,7 +17,7 @@ from pyharness.original.programs import run_program
 from pyharness.truth.reference import reference
 from pyharness.verify.port_protocol import asked_scene
 
-DEFAULTS = {"case": 2, "program": "runge-kutta", "listing": "original"}
+DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
 """What the page shows whose address says nothing."""
 MOST_STEPS = 3000
 """What a page draws without a pause; the decks' 300 steps in a tenth of their length."""
@@ -85,8 +85,8 @@ def _told(scene: Scene) -> list[str]:
 
 def _first() -> dict[str, Any]:
     """Return the default state's ending, its first and last rows, and its printer page."""
-    scene = case_scene(int(DEFAULTS["case"]))
-    program = str(DEFAULTS["program"])
+    scene = case_scene(DEFAULTS["case"])
+    program = DEFAULTS["program"]
     run = run_program(scene, original(program), "python")
     truth = reference(scene, scene.times()).omega
     error = np.abs(run.omega - truth[: run.steps])

@@ -26,9 +26,15 @@ def laboratory(browser: Chrome, site: Path) -> Iterator[Open]:
         browser.get("about:blank")
         browser.get(f"{(site / 'laboratory.html').as_uri()}{fragment}")
 
-    browser.get_log("browser")
+    _said(browser)
     yield opened
-    assert browser.get_log("browser") == []
+    assert _said(browser) == []
+
+
+def _said(browser: Chrome) -> list[dict[str, Any]]:
+    """Return what the console has had since it was asked."""
+    said: list[dict[str, Any]] = browser.get_log("browser")  # type: ignore[no-untyped-call]
+    return said
 
 
 def _text(browser: Chrome, id: str) -> str:

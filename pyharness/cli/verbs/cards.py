@@ -10,16 +10,26 @@ from pyharness.model.errors import InputError
 from pyharness.original.cards import chosen
 from pyharness.original.collation import expected_lines, undeclared, unexplained
 
+FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "two-term, 1660, 1040-1090, two-term:1660; all where nothing is named",
     "--classes": "count the alterations by class",
     "--scan FILE": "hold the cards against a scan of the thesis, character by character",
-    **shared.outputs(plot=""),
+    **shared.outputs(FORMATS, plot=""),
 }
 
 
 def run(options: argparse.Namespace) -> int:
     """Show the cards; with a scan, what they do not explain, and 1 where there is any."""
+    if options.format == "tei":
+        from pyharness.history.tei import tei_document
+
+        # Only the whole edition has a header and an apparatus.
+        shared.refuse(options, "--format tei", ("classes", "scan"))
+        _no_card(options, "--format tei")
+        shared.check_outputs(options)
+        shared.emit(tei_document(), options.out)
+        return 0
     if options.classes:
         shared.refuse(options, "--classes", ("scan",))
         _no_card(options, "--classes")

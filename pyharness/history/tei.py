@@ -1,0 +1,297 @@
+"""The edition as TEI P5: every card, the scan's characters beside ours, and the apparatus.
+
+Decks stand in the order of their cards, with a `pb` where a page of the scan begins; its `n` is
+the place of the page in the scan. Where the scan differs there is an `app`: `lem` is what we read,
+`rdg` what the scan has. Taken in the order of the pages, with `rdg` for `lem`, the lines of cards,
+`fw` and `surplus` are the scan.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as xml
+
+import pyharness
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.original.cards import Card, Difference, Place, deck, numbers, parallels
+
+TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
+AUTHOR = "Richard Jacobs"
+SCHEMA = "https://www.tei-c.org/Vault/P5/4.12.0/xml/tei/custom/schema/relaxng/tei_all.rng"
+"""The edition of the guidelines that the document is written to."""
+
+_XML = "{http://www.w3.org/XML/1998/namespace}"
+_HEAD = (
+    '<?xml version="1.0" encoding="utf-8"?>\n'
+    f'<?xml-model href="{SCHEMA}" type="application/xml" '
+    'schematypens="http://relaxng.org/ns/structure/1.0"?>\n'
+)
+_KINDS = {
+    "defect": "a fault of the author, kept in the text",
+    "reading": "the reading that is not adopted, where the scan leaves two open",
+    "conjecture": "what is assumed where no card exists",
+    "misreading": "characters or numbers that the scan has wrong",
+    "dead code": "a card that has no effect",
+    "missing text": "cards that the scan or the report does not have",
+    "dialect": "what only the FORTRAN of the machine explains",
+}
+# The words of the apparatus, and those of TEI.
+_CERTAINTY = {
+    "certain": "high",
+    "probable": "medium",
+    "conjecture": "low",
+    "undecidable": "unknown",
+}
+# What an entry says, in the words of the table.
+_TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
+
+
+class _Page(NamedTuple):
+    """A page of the scan: its place there, its lines, and the entry that says why it is moved."""
+
+    number: int
+    lines: list[Any]
+    moved: str | None
+
+    @property
+    def first(self) -> int:
+        return min(n for each in self.lines if isinstance(each, str) for n in numbers(each))
+
+
+def tei_document() -> bytes:
+    """Return the three decks and their apparatus as a TEI document, in UTF-8."""
+    root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
+    root.set(_XML + "lang", "en")
+    _header(root)
+    text = xml.SubElement(root, "text")
+    body = xml.SubElement(text, "body")
+    blocks = [block for program in PROGRAMS for block in _deck(body, program)]
+    back = xml.SubElement(text, "back")
+    _apparatus(_named(back, "div", type="apparatus"))
+    _places(_named(back, "div", type="places"))
+    # Blanks count in a card, so it is filled when all else is indented.
+    xml.indent(root)
+    for block, card in blocks:
+        _fill(block, card)
+    return (_HEAD + xml.tostring(root, "unicode") + "\n").encode()
+
+
+def _header(root: xml.Element) -> None:
+    edition = facts("cards/scan")
+    header = xml.SubElement(root, "teiHeader")
+    file = xml.SubElement(header, "fileDesc")
+    titles = xml.SubElement(file, "titleStmt")
+    _said(titles, "title", f"{TITLE}: the three programs of the appendix, with an apparatus")
+    _said(titles, "author", AUTHOR)
+    _said(titles, "editor", "The pyharness authors")
+    _said(xml.SubElement(file, "editionStmt"), "edition", f"pyharness {pyharness.__version__}")
+    publication = xml.SubElement(file, "publicationStmt")
+    _said(publication, "publisher", "The pyharness authors")
+    available = xml.SubElement(publication, "availability")
+    _said(available, "licence", "The edition: MIT", target="https://opensource.org/license/mit")
+    source = xml.SubElement(file, "sourceDesc")
+    printed = xml.SubElement(source, "bibl")
+    _said(printed, "author", AUTHOR)
+    _said(printed, "title", TITLE)
+    _said(printed, "publisher", "AFWAL")
+    _said(printed, "date", "March 1982", when="1982-03")
+    _said(printed, "biblScope", "appendix", unit="section")
+    witnesses = xml.SubElement(source, "listWit")
+    for each in edition["witness"]:
+        if _is_read(each):
+            witness = _said(witnesses, "witness", each["what"], id=each["siglum"])
+            _said(witness, "idno", each["sha256"], type="SHA-256")
+
+    encoding = xml.SubElement(header, "encodingDesc")
+    declared = xml.SubElement(encoding, "editorialDecl")
+    principles = edition["principles"]
+    _said(declared, "p", f"Kept: {principles['kept']}.")
+    _said(
+        declared,
+        "p",
+        "A line of the listing is the number of a card, a dash, and its text: the num and the seg "
+        "of an ab. The columns of seg are those of the card.",
+    )
+    correction = xml.SubElement(declared, "correction", method="markup")
+    _said(correction, "p", f"Emended: {principles['emended']}.")
+    _said(correction, "p", f"Conjectured: {principles['conjectured']}.")
+    normalization = xml.SubElement(declared, "normalization", method="markup")
+    _said(normalization, "p", f"Normalized: {principles['normalized']}.")
+    xml.SubElement(encoding, "variantEncoding", method="parallel-segmentation", location="internal")
+    classes = xml.SubElement(encoding, "classDecl")
+    _taxonomy(classes, "kind", "kinds of entries", _KINDS.items())
+    sure = _CERTAINTY.items()
+    _taxonomy(classes, "certainty", "how sure an entry is, and its value of cert", sure)
+    # One text was read; the others are what an emendation rests on.
+    grounds = [(each["siglum"], each["what"]) for each in edition["witness"] if not _is_read(each)]
+    _taxonomy(classes, "ground", "grounds of emendation, no witnesses of the text", grounds)
+
+
+def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
+    """Give the block of every card, still empty, in the order of the cards."""
+    div = _named(body, "div", program, type="deck")
+    _said(div, "head", f"The {program} program")
+    cards = deck(program).cards
+    lost = [n for n, card in cards.items() if card.lost]
+    for page in sorted(_pages(program), key=lambda each: each.first):
+        begin = xml.SubElement(div, "pb", n=str(page.number), edRef="#S")
+        if page.moved:
+            begin.set("corresp", f"#{page.moved}")
+        for item in page.lines:
+            if isinstance(item, str):
+                for number in numbers(item):
+                    # A lost card is on no page; it stands before the next that is.
+                    while lost and lost[0] < number:
+                        card = cards[lost.pop(0)]
+                        yield _block(div, card), card
+                    yield _block(div, cards[number]), cards[number]
+            elif "furniture" in item:
+                _said(div, "fw", item["furniture"], type="furniture")
+            else:
+                line = xml.SubElement(div, "ab", type="phantom", corresp=f"#{item['entry']}")
+                _said(line, "surplus", item["phantom"])
+
+
+def _pages(program: str) -> list[_Page]:
+    return [
+        _Page(place, page["lines"], page.get("moved"))
+        for place, page in enumerate(facts("cards/scan")["page"], 1)
+        if page["program"] == program
+    ]
+
+
+def _block(div: xml.Element, card: Card) -> xml.Element:
+    computes = card.number in deck(card.program).executable
+    kind = "comment" if card.is_comment else "executable" if computes else "specification"
+    block = _named(div, "ab", _id(card), type="card", subtype=kind, n=str(card.number))
+    if beside := parallels(card):
+        block.set("corresp", " ".join(f"#{_id(each)}" for each in beside))
+    return block
+
+
+def _fill(block: xml.Element, card: Card) -> None:
+    block.set(_XML + "space", "preserve")
+    if card.lost:
+        where = {"reason": "lost", "corresp": f"#{card.lost}", "cert": _cert(card.lost)}
+        block = xml.SubElement(block, "supplied", where)
+    number = xml.SubElement(block, "num")
+    if card.printed:
+        _app(number, str(card.number), *card.printed)
+    else:
+        number.text = str(card.number)
+    text = xml.SubElement(block, "seg")
+    before: xml.Element | None = None
+    for passage, difference in _passages(card):
+        if difference is None:
+            if before is None:
+                text.text = passage
+            else:
+                before.tail = passage
+        else:
+            before = _app(text, passage, difference.scans, difference.entry)
+
+
+def _passages(card: Card) -> Iterator[tuple[str, Difference | None]]:
+    """Give the text in pieces, each as the scan has it or with the difference that it shows."""
+    # Differences are found in the text without its blanks; these are the places of its characters.
+    places = [n for n, character in enumerate(card.text) if character != " "]
+    tight = "".join(card.text[n] for n in places)
+    done = at = 0
+    for each in card.differences:
+        first = tight.index(each.ours, at)
+        at = first + len(each.ours)
+        begin, end = places[first], places[at - 1] + 1
+        yield card.text[done:begin], None
+        yield card.text[begin:end], each
+        done = end
+    yield card.text[done:], None
+
+
+def _app(parent: xml.Element, ours: str, scans: str, entry: str) -> xml.Element:
+    app = xml.SubElement(parent, "app", corresp=f"#{entry}")
+    _said(app, "lem", ours, cert=_cert(entry))
+    _said(app, "rdg", scans, wit="#S")
+    return app
+
+
+def _apparatus(div: xml.Element) -> None:
+    _said(div, "head", "The apparatus")
+    for entry in facts("apparatus")["entry"]:
+        classes = f"#{_class('kind', entry['kind'])} #{_class('certainty', entry['certainty'])}"
+        note = _named(div, "note", entry["id"], type="entry", ana=classes)
+        if entry["programs"]:
+            note.set("target", " ".join(f"#{each}" for each in _targets(entry)))
+        for name in _TOLD:
+            if name in entry:
+                _said(note, "seg", entry[name], type=name)
+        xml.SubElement(note, "certainty", locus="value", cert=_CERTAINTY[entry["certainty"]])
+
+
+def _targets(entry: dict[str, Any]) -> Iterator[str]:
+    """Give the cards of an entry, and the deck where it names none of a program."""
+    for program in entry["programs"]:
+        cards = deck(program).cards
+        named = numbers(entry["cards"].get(program, ""))
+        yield from (_id(cards[n]) for n in named) if named else (program,)
+
+
+def _places(div: xml.Element) -> None:
+    _said(div, "head", "Where the cards stand in the port and in the twin")
+    for program in PROGRAMS:
+        found = deck(program)
+        for number, card in found.cards.items():
+            for kind, places in (("port", found.port), ("twin", found.twin)):
+                for place in places.get(number, ()):
+                    _place(xml.SubElement(div, "note", type=kind, target=f"#{_id(card)}"), place)
+            if number in found.absent:
+                _said(div, "note", found.absent[number], type="absent", target=f"#{_id(card)}")
+
+
+def _place(note: xml.Element, place: Place) -> None:
+    cited = xml.SubElement(note, "cit")
+    _said(cited, "quote", place.text)
+    where = xml.SubElement(cited, "bibl")
+    _said(where, "title", place.file)
+    _said(where, "biblScope", str(place.line), unit="line")
+
+
+def _taxonomy(
+    classes: xml.Element, name: str, told: str, categories: Iterable[tuple[str, str]]
+) -> None:
+    taxonomy = _named(classes, "taxonomy", name)
+    _said(taxonomy, "desc", told)
+    for each, what in categories:
+        category = _named(taxonomy, "category", _class(name, each))
+        _said(category, "catDesc", f"{each}: {what}")
+
+
+def _named(parent: xml.Element, tag: str, id: str | None = None, **more: str) -> xml.Element:
+    named = {} if id is None else {_XML + "id": id}
+    return xml.SubElement(parent, tag, {**named, **more})
+
+
+def _said(
+    parent: xml.Element, tag: str, text: str, id: str | None = None, **more: str
+) -> xml.Element:
+    element = _named(parent, tag, id, **more)
+    element.text = text
+    return element
+
+
+def _id(card: Card) -> str:
+    """``two-term.1660``: a colon has no place in an XML name."""
+    return f"{card.program}.{card.number}"
+
+
+def _class(taxonomy: str, name: str) -> str:
+    return f"{taxonomy}.{name.replace(' ', '-')}"
+
+
+def _cert(entry: str) -> str:
+    found = next(each for each in facts("apparatus")["entry"] if each["id"] == entry)
+    return _CERTAINTY[found["certainty"]]
+
+
+def _is_read(witness: dict[str, str]) -> bool:
+    """Whether it is a text that was read: it has a digest."""
+    return "sha256" in witness

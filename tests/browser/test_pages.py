@@ -1,0 +1,167 @@
+"""Every page in a browser: no error, nothing wider than the screen, no barrier."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
+
+WIDTHS = (360, 800, 1440)
+# Told by axe-core, from the least to the worst; of these two none is allowed.
+SEVERE = ("serious", "critical")
+
+
+@contextmanager
+def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]:
+    """Give the browser a width (pixels) and a preference."""
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    yield
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def addresses(site: Path) -> list[str]:
+    return [each.as_uri() for each in sorted(site.rglob("*.html"))]
+
+
+def errors(browser: Chrome) -> list[str]:
+    """Return what the console says, and forget it."""
+    return [each["message"] for each in browser.get_log("browser")]  # type: ignore[no-untyped-call]
+
+
+def too_wide(browser: Chrome) -> int:
+    """Return by how many pixels a page is wider than the screen."""
+    script = "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    found: int = browser.execute_script(script)  # type: ignore[no-untyped-call]
+    return found
+
+
+def barriers(browser: Chrome) -> list[dict[str, Any]]:
+    """Return what axe-core finds in a page: rule, how severe, where."""
+    source = files("axe_core_python").joinpath("axe.min.js").read_text()
+    browser.execute_script(source)  # type: ignore[no-untyped-call]
+    found = browser.execute_async_script(  # type: ignore[no-untyped-call]
+        "const done = arguments[arguments.length - 1]; axe.run().then(done);"
+    )
+    return [
+        {"rule": each["id"], "impact": each["impact"], "where": each["nodes"][0]["html"]}
+        for each in found["violations"]
+    ]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_no_page_has_an_error_or_is_wider_than_the_screen(
+    browser: Chrome, site: Path, width: int
+) -> None:
+    errors(browser)
+    found = {}
+    with screen(browser, width):
+        for address in addresses(site):
+            browser.get(address)
+            if (beyond := too_wide(browser)) > 0 or (said := errors(browser)):
+                found[address] = [beyond, said if beyond <= 0 else ""]
+    assert found == {}
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_has_a_severe_barrier(browser: Chrome, site: Path, scheme: str) -> None:
+    found = {}
+    with screen(browser, 1000, scheme):
+        for address in addresses(site):
+            browser.get(address)
+            severe = [each for each in barriers(browser) if each["impact"] in SEVERE]
+            if severe:
+                found[address] = severe
+    assert found == {}, json.dumps(found, indent=1)
+
+
+def test_what_is_wrong_is_found(browser: Chrome, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text(
+        "<!doctype html><html><title>t</title><body><main><h1>t</h1><input>"
+        "<p style='color:#ccc;width:3000px'>a</p><script>nothing()</script></main>"
+    )
+    errors(browser)
+    with screen(browser, 800):
+        browser.get(page.as_uri())
+        assert too_wide(browser) > 2000
+        assert "nothing is not defined" in errors(browser)[0]
+        rules = {each["rule"] for each in barriers(browser) if each["impact"] in SEVERE}
+    assert {"label", "color-contrast", "html-has-lang"} <= rules
+
+
+def test_a_reader_chooses_dark_or_light(browser: Chrome, site: Path) -> None:
+    def paper() -> str:
+        script = "return getComputedStyle(document.body).backgroundColor"
+        return str(browser.execute_script(script))  # type: ignore[no-untyped-call]
+
+    with screen(browser, 1000, "light"):
+        browser.get((site / "index.html").as_uri())
+        light = paper()
+        browser.find_element(By.ID, "theme").click()
+        dark = paper()
+        assert dark != light
+        # It is kept for the other pages.
+        browser.get((site / "claims.html").as_uri())
+        assert paper() == dark
+        browser.find_element(By.ID, "theme").click()
+        assert paper() == light
+    browser.execute_script("localStorage.clear()")  # type: ignore[no-untyped-call]
+
+
+def test_the_search_finds_a_card_and_keeps_its_words_in_the_address(
+    browser: Chrome, site: Path
+) -> None:
+    browser.get((site / "search.html").as_uri())
+    query = browser.find_element(By.ID, "query")
+    query.send_keys("stage-base")
+    link = browser.find_element(By.CSS_SELECTOR, "#results a")
+    assert str(link.get_dom_attribute("href")) == "apparatus.html#stage-base"
+    assert browser.current_url.endswith("#q=stage-base")
+    browser.get("about:blank")
+    browser.get((site / "search.html").as_uri() + "#q=DT%3DDT%2B.01")
+    links = browser.find_elements(By.CSS_SELECTOR, "#results a")
+    found = [str(each.get_dom_attribute("href")) for each in links]
+    assert "listing/two-term.html#1660" in found
+    browser.execute_script("location.hash = '#q=Lipschitz'")  # type: ignore[no-untyped-call]
+    WebDriverWait(browser, 5).until(
+        lambda _: "lipschitz-tests-velocity" in browser.find_element(By.ID, "results").text
+    )
+
+
+def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> None:
+    browser.get((site / "listing/two-term.html").as_uri())
+
+    def shown() -> set[str]:
+        cards = browser.find_elements(By.CSS_SELECTOR, ".card")
+        return {str(each.get_dom_attribute("id")) for each in cards if each.is_displayed()}
+
+    every = shown()
+    browser.find_element(By.ID, "kind-defect").click()
+    defects = shown()
+    assert "1660" in defects < every
+    assert "160" not in defects
+    browser.find_element(By.ID, "kind-all").click()
+    assert shown() == every
+
+
+def test_without_scripts_pages_say_what_they_have(browser: Chrome, site: Path) -> None:
+    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        browser.get((site / "laboratory.html").as_uri())
+        text = browser.find_element(By.TAG_NAME, "main").text
+        assert "step 25" in text
+        assert "V2" in text
+        browser.get((site / "listing/two-term.html").as_uri() + "#1660")
+        assert "DT=DT+.01" in browser.find_element(By.ID, "1660").text
+    finally:
+        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})

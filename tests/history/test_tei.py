@@ -1,0 +1,252 @@
+"""The edition as TEI: valid, whole, and the scan can be had from it again."""
+
+import lzma
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as xml
+
+import pytest
+import yaml
+from lxml import etree
+
+from pyharness.cli.main import main
+from pyharness.history.cards_report import card_record
+from pyharness.history.tei import AUTHOR, SCHEMA, TITLE, tei_document
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.original.cards import chosen, tight
+from pyharness.original.collation import expected_lines
+
+HERE = Path(__file__).parent
+SOURCE = tomllib.loads((HERE / "tei_all.toml").read_text())
+TEI = "{http://www.tei-c.org/ns/1.0}"
+ID = "{http://www.w3.org/XML/1998/namespace}id"
+SPACE = "{http://www.w3.org/XML/1998/namespace}space"
+POINTERS = ("target", "corresp", "ana", "wit", "edRef")
+TEXT = tei_document().decode()
+
+
+@pytest.fixture(scope="module")
+def schema() -> Any:
+    """Return the schema, which takes some seconds to read."""
+    text = lzma.decompress((HERE / "tei_all.rng.xz").read_bytes())
+    assert sha256(text).hexdigest() == SOURCE["sha256"]
+    begin = " ".join(text[:1000].decode().split())
+    assert f"TEI Edition: P5 Version {SOURCE['version']}." in begin
+    return etree.RelaxNG(etree.fromstring(text))
+
+
+@pytest.fixture(scope="module")
+def root() -> xml.Element:
+    return xml.fromstring(TEXT)
+
+
+def _blocks(root: xml.Element) -> list[xml.Element]:
+    return [each for each in root.iter(TEI + "ab") if each.get("type") == "card"]
+
+
+def _reading(element: xml.Element, without: str) -> str:
+    """Return the text of an element but for what stands in `without`: in `lem` or in `rdg`."""
+    own = "" if element.tag == TEI + without else element.text or ""
+    return own + "".join(_reading(each, without) + (each.tail or "") for each in element)
+
+
+def _line(block: xml.Element) -> str | None:
+    """Return the line of the scan without blanks, as a card's `scan` is."""
+    if block.find(TEI + "supplied") is not None:
+        return None
+    number, text = block
+    return f"{tight(_reading(number, 'lem'))}-{tight(_reading(text, 'lem'))}"
+
+
+def _unresolved(root: xml.Element) -> set[str]:
+    pointers = {p for e in root.iter() for name in POINTERS for p in (e.get(name) or "").split()}
+    ids = {each.get(ID) for each in root.iter()}
+    return {p for p in pointers if p[0] == "#" and p[1:] not in ids}
+
+
+def test_document_is_valid(schema: Any) -> None:
+    assert schema.validate(etree.fromstring(TEXT.encode())), schema.error_log
+
+
+@pytest.mark.parametrize(
+    ("ours", "other"),
+    [
+        ("lem", "lemma"),
+        (' locus="value"', ""),
+        ('<lem cert="high">', '<lem cert="certain">'),
+        ("<listWit>", "<listWit><p>none</p>"),
+        ('method="parallel-segmentation" ', ""),
+        ('unit="line"', 'line="line"'),
+    ],
+)
+def test_document_with_a_mistake_is_refused(ours: str, other: str, schema: Any) -> None:
+    assert ours in TEXT
+    assert not schema.validate(etree.fromstring(TEXT.replace(ours, other).encode()))
+
+
+def test_schema_is_named_and_its_source_too() -> None:
+    assert SOURCE["home"] == SCHEMA
+    assert f"/{SOURCE['version']}/" in SCHEMA
+    assert SCHEMA in TEXT.splitlines()[1]
+
+
+def test_every_card_stands_there_once_in_the_order_of_the_decks(root: xml.Element) -> None:
+    found = [(each.get(ID), each.get("n")) for each in _blocks(root)]
+    assert found == [(f"{c.program}.{c.number}", str(c.number)) for c in chosen(())]
+    ids = Counter(each.get(ID) for each in root.iter() if each.get(ID))
+    assert ids.most_common(1)[0][1] == 1
+    decks = [each.get(ID) for each in root.iter(TEI + "div") if each.get("type") == "deck"]
+    assert decks == list(PROGRAMS)
+
+
+def test_text_of_every_card_is_there_with_its_blanks(root: xml.Element) -> None:
+    for block, card in zip(_blocks(root), chosen(()), strict=True):
+        assert block.get(SPACE) == "preserve"
+        assert _reading(block, "rdg") == f"{card.number}{card.text}", card.name
+
+
+def test_every_line_of_the_scan_can_be_had_again(root: xml.Element) -> None:
+    for block, card in zip(_blocks(root), chosen(()), strict=True):
+        assert _line(block) == card.scan, card.name
+
+
+def test_every_page_of_the_scan_can_be_had_again(root: xml.Element) -> None:
+    """Cards, furniture and phantoms, in the order of the pages."""
+    pages: dict[int, list[str]] = {}
+    for div in root.iter(TEI + "div"):
+        number = 0
+        for each in div if div.get("type") == "deck" else ():
+            if each.tag == TEI + "pb":
+                number = int(each.attrib["n"])
+                pages[number] = []
+            elif each.tag == TEI + "fw" or each.get("type") == "phantom":
+                pages[number].append(tight("".join(each.itertext())))
+            elif (line := _line(each) if each.tag == TEI + "ab" else None) is not None:
+                pages[number].append(line)
+    assert sorted(pages) == list(range(1, len(facts("cards/scan")["page"]) + 1))
+    assert [each for n in sorted(pages) for each in pages[n]] == [e for e, _ in expected_lines()]
+    moved = [each for each in root.iter(TEI + "pb") if each.get("corresp")]
+    assert [(each.get("n"), each.get("corresp")) for each in moved] == [("12", "#noise-order")]
+
+
+def test_every_difference_stands_there_once_with_its_entry(root: xml.Element) -> None:
+    cert = {
+        each.get(ID): part.get("cert")
+        for each in root.iter(TEI + "note")
+        for part in each.iter(TEI + "certainty")
+    }
+    for block, card in zip(_blocks(root), chosen(()), strict=True):
+        wanted = [(str(card.number), *card.printed)] if card.printed else []
+        wanted += [(each.ours, each.scans, each.entry) for each in card.differences]
+        found = []
+        for app in block.iter(TEI + "app"):
+            lemma, reading = app
+            entry = app.attrib["corresp"].removeprefix("#")
+            found.append((tight(lemma.text or ""), reading.text or "", entry))
+            assert reading.get("wit") == "#S"
+            assert lemma.get("cert") == cert[entry]
+        assert found == wanted, card.name
+
+
+def _records(root: xml.Element) -> Iterator[dict[str, Any]]:
+    """Make the JSON of every card of what stands in the document."""
+    notes = list(root.iter(TEI + "note"))
+    named: dict[tuple[str | None, str], list[xml.Element]] = {}
+    for each in notes:
+        for target in each.get("target", "").split():
+            named.setdefault((each.get("type"), target), []).append(each)
+    for block in _blocks(root):
+        pointer = f"#{block.get(ID)}"
+        program, number = pointer[1:].rsplit(".", 1)
+        text, line = _reading(block[-1], "rdg"), _line(block)
+        if block.find(TEI + "supplied") is not None:
+            text = text.removeprefix(number)
+        places: dict[str, list[dict[str, Any]]] = {"port": [], "twin": []}
+        for kind, found in places.items():
+            for each in named.get((kind, pointer), []):
+                quote, bibl = each[0]
+                found.append(
+                    {"file": bibl[0].text, "line": int(bibl[1].text or ""), "text": quote.text}
+                )
+        absent = [each.text for each in named.get(("absent", pointer), [])]
+        yield {
+            "program": program,
+            "card": int(number),
+            "statement": " ".join(text.split()),
+            "scan": None if line == f"{number}-{tight(text)}" else line or "",
+            "differences": [
+                {"ours": tight(app[0].text or ""), "scans": app[1].text or "",
+                 "entry": app.attrib["corresp"][1:]}
+                for app in block[-1].iter(TEI + "app")
+            ],
+            "entries": [each.get(ID) for each in named.get(("entry", pointer), [])],
+            "fortran": places["port"],
+            "twin": places["twin"],
+            "absent": absent[0] if absent else None,
+            "parallels": [
+                ":".join(each[1:].rsplit(".", 1)) for each in block.get("corresp", "").split()
+            ],
+        }  # fmt: skip
+
+
+def test_what_json_has_of_a_card_can_be_had_from_it(root: xml.Element) -> None:
+    for found, card in zip(_records(root), chosen(()), strict=True):
+        assert found == card_record(card), card.name
+
+
+def test_every_entry_stands_there_once_as_in_the_table(root: xml.Element) -> None:
+    entries = [each for each in root.iter(TEI + "note") if each.get("type") == "entry"]
+    classes = {
+        f"#{each.get(ID)}": (each[0].text or "").split(": ") for each in root.iter(TEI + "category")
+    }
+    assert [each.get(ID) for each in entries] == [
+        each["id"] for each in facts("apparatus")["entry"]
+    ]
+    for note, entry in zip(entries, facts("apparatus")["entry"], strict=True):
+        told = {part.get("type"): part.text for part in note.iter(TEI + "seg")}
+        names = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
+        assert told == {name: entry[name] for name in names if name in entry}
+        kind, certainty = (classes[each] for each in note.attrib["ana"].split())
+        assert (kind[0], certainty[0]) == (entry["kind"], entry["certainty"])
+        (sure,) = note.iter(TEI + "certainty")
+        assert sure.get("cert") == certainty[1]
+        programs = {each[1:].split(".")[0] for each in note.get("target", "").split()}
+        assert programs == set(entry["programs"])
+
+
+def test_every_pointer_leads_somewhere(root: xml.Element) -> None:
+    assert _unresolved(root) == set()
+    assert _unresolved(xml.fromstring(TEXT.replace('xml:id="noise-t3"', 'n="noise-t3"'))) == {
+        "#noise-t3"
+    }
+
+
+def test_the_scan_alone_is_a_witness(root: xml.Element) -> None:
+    sigla = [each["siglum"] for each in facts("cards/scan")["witness"]]
+    assert [each.get(ID) for each in root.iter(TEI + "witness")] == ["S"]
+    grounds = next(e for e in root.iter(TEI + "taxonomy") if e.get(ID) == "ground")
+    assert [each.get(ID) for each in grounds.iter(TEI + "category")] == [
+        f"ground.{each}" for each in sigla if each != "S"
+    ]
+    for text in facts("cards/scan")["principles"].values():
+        assert text in TEXT
+
+
+def test_work_is_that_of_the_citation() -> None:
+    citation = yaml.safe_load((HERE.parents[1] / "CITATION.cff").read_text())
+    (thesis,) = citation["references"]
+    (author,) = thesis["authors"]
+    assert thesis["title"] == TITLE
+    assert f"{author['given-names']} {author['family-names']}" == AUTHOR
+    assert f'when="{thesis["year"]}-{thesis["month"]:02}"' in TEXT
+
+
+def test_command_writes_it(tmp_path: Path) -> None:
+    out = tmp_path / "edition.xml"
+    assert main(["cards", "--format", "tei", "--out", str(out)]) == 0
+    assert out.read_bytes() == TEXT.encode()

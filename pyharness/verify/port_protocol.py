@@ -52,17 +52,22 @@ def request(
     asked = {
         "schema": 1,
         "program": listing.program,
-        "scene": {
-            **scene_record(scene),
-            "masses": scene.masses,
-            "forces": scene.forces,
-            "initial_torque": card_torque(scene),
-        },
+        "scene": asked_scene(scene),
         "listing": listing_record(listing),
         "lipschitz": facts("cases")["deck"]["lipschitz"] if lipschitz is None else lipschitz,
         "may_stop": may_stop,
     }
     return json.dumps(asked, allow_nan=False).encode()
+
+
+def asked_scene(scene: Scene) -> dict[str, Any]:
+    """Return a scene as a port reads it."""
+    return {
+        **scene_record(scene),
+        "masses": scene.masses,
+        "forces": scene.forces,
+        "initial_torque": card_torque(scene),
+    }
 
 
 def read_answer(line: bytes, steps: int) -> Answer:

@@ -1,0 +1,85 @@
+"""ES modules as one classic script: browsers refuse to import modules where a page is a file.
+
+Every module becomes a function that returns what the module exports, in order of dependency.
+Known are the forms that the project's modules use; any other is refused.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+_IMPORT = re.compile(
+    r'^import (?:\{(?P<names>[^}]*)\}|\* as (?P<all>\w+)) from "(?P<path>\.\.?/[\w./-]+)";$', re.M
+)
+_EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
+# What is left of another form, once those are taken.
+_UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
+
+
+def bundle(entry: Path) -> str:
+    """Return a module, and all that it imports, as one script in a function of its own.
+
+    ValueError, with file and line, for a form of import or export that is not known, an import of
+    what is not exported, and modules that import each other.
+    """
+    exports: dict[Path, list[str]] = {}
+    parts: list[str] = []
+    _add(entry.resolve(), (), exports, parts)
+    return "\n".join(['"use strict";', "(() => {", *parts, "})();", ""])
+
+
+def _add(
+    path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
+) -> None:
+    """Add a module behind those that it imports; `importing` are on the way to it."""
+    text = path.read_text(encoding="utf-8")
+    for found in _IMPORT.finditer(text):
+        needed = (path.parent / found["path"]).resolve()
+        if needed in (*importing, path):
+            raise _error(path, text, found.start(), f"{needed.name} imports this module too")
+        if not needed.is_file():
+            raise _error(path, text, found.start(), f"there is no {found['path']}")
+        if needed not in exports:
+            _add(needed, (*importing, path), exports, parts)
+        for name, _ in _names(found):
+            if name not in exports[needed]:
+                raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
+    names = [found["name"] for found in _EXPORT.finditer(text)]
+    # What replaces a statement has as many lines, for what is told of others.
+    body = _IMPORT.sub(lambda found: _as_constant(found, path, list(exports)), text)
+    body = _EXPORT.sub("", body)
+    unknown = _UNKNOWN.search(body)
+    if unknown is not None:
+        shown = unknown[0].strip()
+        raise _error(path, body, unknown.start(), f"a form that is not known: {shown}")
+    number = len(exports)
+    exports[path] = names
+    parts += [
+        f"// {path.parent.name}/{path.name}",
+        f"const module{number} = (() => {{",
+        body.rstrip(),
+        f"return {{ {', '.join(names)} }};",
+        "})();",
+        "",
+    ]
+
+
+def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
+    """Yield what an import names there, and here."""
+    for each in (found["names"] or "").split(","):
+        name, _, alias = each.strip().partition(" as ")
+        if name:
+            yield name, alias or name
+
+
+def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
+    """Return an import as a declaration, over as many lines."""
+    number = modules.index((path.parent / found["path"]).resolve())
+    renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))
+    lines = "\n" * found[0].count("\n")
+    return f"const {found['all'] or f'{{ {renamed} }}'} = module{number};{lines}"
+
+
+def _error(path: Path, text: str, start: int, what: str) -> ValueError:
+    start += len(text[start:]) - len(text[start:].lstrip())
+    return ValueError(f"{path}:{text.count(chr(10), 0, start) + 1}: {what}")

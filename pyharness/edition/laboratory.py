@@ -1,0 +1,114 @@
+"""What the laboratory's page is made of: data of the programs, and a run for who has no script."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS, flagged, original, switches
+from pyharness.model.report import short
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.scene_report import ending, heading
+from pyharness.model.trajectory import Trajectory
+from pyharness.original.printer import formats_of, page
+from pyharness.original.programs import run_program
+from pyharness.truth.reference import reference
+from pyharness.verify.port_protocol import asked_scene
+
+DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
+"""What the page shows whose address says nothing."""
+MOST_STEPS = 3000
+"""What a page draws without a pause; the decks' 300 steps in a tenth of their length."""
+_KINDS = {
+    "defect": "Defects left in",
+    "reading": "Readings not adopted",
+    "conjecture": "Conjectures assumed",
+}
+_SHOWN = 3
+
+
+@cache
+def context() -> dict[str, Any]:
+    """Return what the template of the laboratory needs.
+
+    `data` is what the script reads as `window.laboratoryData`; `switches` are the flags under the
+    heads of their kinds; `first` is the default state, run here.
+    """
+    given = data()
+    kinds = [
+        (head, [flag for flag in given["flags"] if flag["kind"] == kind])
+        for kind, head in _KINDS.items()
+    ]
+    return {
+        "data": given,
+        "titles": {number: case_scene(number).name for number in case_numbers()},
+        "programs": PROGRAMS,
+        "switches": kinds,
+        "first": _first(),
+    }
+
+
+def data() -> dict[str, Any]:
+    """Return what the script needs to run any state, as JSON can have it."""
+    return {
+        "scenes": [asked_scene(case_scene(number)) for number in case_numbers()],
+        "headings": {number: _told(case_scene(number)) for number in case_numbers()},
+        "programs": list(PROGRAMS),
+        "flags": [
+            {
+                "id": entry["id"],
+                "kind": entry["kind"],
+                "programs": entry["programs"],
+                "summary": entry["summary"],
+                "in_original": any(entry["id"] in switches(name) for name in entry["programs"]),
+            }
+            for entry in flagged()
+        ],
+        "lipschitz": facts("cases")["deck"]["lipschitz"],
+        "most_steps": MOST_STEPS,
+        "printer": {
+            name: {part: formats_of(name)[part] for part in ("header", "heads", "rows")}
+            for name in PROGRAMS
+        },
+        "defaults": DEFAULTS,
+    }
+
+
+def _told(scene: Scene) -> list[str]:
+    """Return body and torque, and what else there is to say of the case, but not the start."""
+    lines = heading(scene)
+    body, torque, *_ = lines[1].split("; ")
+    return [f"{body}; {torque}", *lines[2:]]
+
+
+def _first() -> dict[str, Any]:
+    """Return the default state's ending, its first and last rows, and its printer page."""
+    scene = case_scene(DEFAULTS["case"])
+    program = DEFAULTS["program"]
+    run = run_program(scene, original(program), "python")
+    truth = reference(scene, scene.times()).omega
+    error = np.abs(run.omega - truth[: run.steps])
+    told = ending(run)
+    numbers = [*range(_SHOWN), *range(run.steps - _SHOWN, run.steps)]
+    return {
+        "state": DEFAULTS,
+        "fragment": "&".join(f"{word}={value}" for word, value in DEFAULTS.items()),
+        "command": " ".join(
+            ["pyharness run", *(f"--{word} {value}" for word, value in DEFAULTS.items())]
+        ),
+        "ending": told[0].upper() + told[1:],
+        "error": short(float(error.max())),
+        "rows": [_row(run, number, float(error[number].max())) for number in numbers],
+        "page": page(scene, program, run),
+    }
+
+
+def _row(run: Trajectory, number: int, error: float) -> list[str]:
+    """Return a row of the table: step, time, omega, velocity, TIME, IER and the error."""
+    assert run.velocity is not None
+    values = [run.time[number], *run.omega[number], *run.velocity[number]]
+    values.append(run.recorded_time[number])
+    # The program has no IER.
+    return [str(number + 1), *(repr(float(x)) for x in values), "", short(error)]

@@ -1,0 +1,215 @@
+"""The laboratory in a browser: numbers, switches, addresses, and how long a change takes."""
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium.webdriver import Chrome, Keys
+from selenium.webdriver.common.by import By
+
+from pyharness import case_scene, run_program
+from pyharness.model.listing import PROGRAMS, subset
+from pyharness.original.printer import page
+
+Open = Callable[[str], None]
+
+
+@pytest.fixture
+def laboratory(browser: Chrome, site: Path) -> Iterator[Open]:
+    """Return what opens the page anew with a fragment; nothing may be said on its console."""
+
+    def opened(fragment: str = "") -> None:
+        # A change of the fragment alone would not load the page.
+        browser.get("about:blank")
+        browser.get(f"{(site / 'laboratory.html').as_uri()}{fragment}")
+
+    _said(browser)
+    yield opened
+    assert _said(browser) == []
+
+
+def _said(browser: Chrome) -> list[dict[str, Any]]:
+    """Return what the console has had since it was asked."""
+    said: list[dict[str, Any]] = browser.get_log("browser")  # type: ignore[no-untyped-call]
+    return said
+
+
+def _text(browser: Chrome, id: str) -> str:
+    return str(
+        browser.execute_script("return document.getElementById(arguments[0]).textContent", id)
+    )
+
+
+def _rows(browser: Chrome) -> list[list[str]]:
+    """Return the table's cells, once it has been opened."""
+    browser.execute_script("document.getElementById('numbers').open = true")
+    read = (
+        "return [...document.querySelectorAll('#rows tr')]"
+        ".map((row) => [...row.cells].map((cell) => cell.textContent))"
+    )
+    # It is filled when the browser has told that it was opened.
+    deadline = time.monotonic() + 5.0
+    while True:
+        found: list[list[str]] = browser.execute_script(read)
+        if len(found) > 6 or time.monotonic() > deadline:
+            return found
+        time.sleep(0.02)
+
+
+def _fragment(browser: Chrome) -> str:
+    return browser.current_url.partition("#")[2]
+
+
+def _click(browser: Chrome, selector: str) -> None:
+    browser.execute_script("document.querySelector(arguments[0]).click()", selector)
+
+
+def test_the_numbers_are_the_twins(browser: Chrome, laboratory: Open) -> None:
+    laboratory("")
+    twin = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert twin.velocity is not None
+    rows = _rows(browser)
+    assert len(rows) == 25
+    assert [float(row[2]) for row in rows] == twin.omega[:, 0].tolist()
+    assert [[float(x) for x in row[5:8]] for row in rows] == twin.velocity.tolist()
+    assert "Stopped at step 25 of 100, at 0.25 s, by V2" in _text(browser, "status")
+    assert _text(browser, "printer-page") == page(case_scene(2), "runge-kutta", twin)
+    assert _text(browser, "problems") == ""
+    assert browser.execute_script("return document.querySelectorAll('canvas').length") == 2
+
+
+def test_a_switch_draws_anew_and_is_in_the_address(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=2&program=runge-kutta&listing=original")
+    draw = "return document.querySelector('canvas').toDataURL()"
+    before = browser.execute_script(draw)
+    _click(browser, "input[value=stage-base]")
+    assert _fragment(browser) == "case=2&program=runge-kutta&listing=original&fix=stage-base"
+    assert "step 25 " not in _text(browser, "status")
+    twin = run_program(case_scene(2), subset("runge-kutta", fix=["stage-base"]), "python")
+    assert [float(row[2]) for row in _rows(browser)] == twin.omega[:, 0].tolist()
+    assert _text(browser, "command").endswith("--listing original --fix stage-base")
+    assert browser.execute_script(draw) != before
+
+
+def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> None:
+    words = "case=5&program=two-term&listing=corrected&keep=x3-reads-acl2&steps=30"
+    laboratory(f"#{words}")
+    assert browser.find_element(By.ID, "case").get_property("value") == "5"
+    assert browser.find_element(By.ID, "steps").get_property("value") == "30"
+    on = "return [...document.querySelectorAll('input[name=switch]:checked')].map((x) => x.value)"
+    assert browser.execute_script(on) == ["x3-reads-acl2"]
+    assert not browser.find_element(By.ID, "stop-test").is_displayed()
+    assert not browser.find_element(By.CSS_SELECTOR, "[value=stage-base]").is_displayed()
+    assert len(_rows(browser)) == 30
+    # Another address in the same page.
+    browser.execute_script("location.hash = 'case=2&program=runge-kutta&listing=original'")
+    deadline = time.monotonic() + 5.0
+    while "step 25" not in _text(browser, "status") and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert "Stopped at step 25" in _text(browser, "status")
+    assert browser.find_element(By.ID, "stop-test").is_displayed()
+
+
+def test_controls_make_the_address_that_restores_them(browser: Chrome, laboratory: Open) -> None:
+    laboratory("")
+    for id, keys in (
+        ("omega0", "-1, 0.5, 2e0"), ("step-size", "0.005"), ("steps", "40"), ("lipschitz", "60"),
+    ):  # fmt: skip
+        field = browser.find_element(By.ID, id)
+        field.send_keys(Keys.CONTROL, "a")
+        field.send_keys(keys, Keys.TAB)
+    _click(browser, "input[value=corrected]")
+    expected = "case=2&program=runge-kutta&listing=corrected&omega0=-1,0.5,2&step-size=0.005"
+    assert _fragment(browser) == f"{expected}&steps=40&lipschitz=60"
+    told = _text(browser, "status")
+    laboratory(f"#{_fragment(browser)}")
+    assert _text(browser, "status") == told
+    _click(browser, "#reset")
+    assert _fragment(browser) == "case=2&program=runge-kutta&listing=original"
+
+
+def test_mistakes_are_told_and_the_rest_holds(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=9&program=runge-kutta&listing=original&spin=1")
+    assert _text(browser, "problems").startswith("unknown word 'spin'; allowed: ")
+    assert "case: unknown '9'; allowed: 1, 2" in _text(browser, "problems")
+    assert "Stopped at step 25" in _text(browser, "status")
+    field = browser.find_element(By.ID, "steps")
+    field.send_keys("x", Keys.TAB)
+    assert "steps: '100x'; allowed: a whole number" in _text(browser, "problems")
+    assert field.get_attribute("aria-invalid") == "true"
+    field.send_keys(Keys.BACKSPACE, Keys.TAB)
+    assert _text(browser, "problems") == ""
+    assert field.get_attribute("aria-invalid") is None
+
+
+def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
+    browser: Chrome, laboratory: Open
+) -> None:
+    laboratory("#case=7&program=two-term&listing=original")
+    unnamed = (
+        "return [...document.querySelectorAll('#controls :is(input, select)')]"
+        ".filter((x) => x.labels.length === 0).map((x) => x.id)"
+    )
+    assert browser.execute_script(unnamed) == []
+    try:
+        for width in (360, 800, 1440):
+            size: dict[str, Any] = {"width": width, "height": 900, "deviceScaleFactor": 1}
+            metrics = {**size, "mobile": False}
+            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+            laboratory("#case=7&program=two-term&listing=original")
+            _rows(browser)
+            root = "return document.documentElement"
+            wide = browser.execute_script(f"{root}.scrollWidth")
+            assert wide == browser.execute_script(f"{root}.clientWidth"), width
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_colours_change_with_the_theme(browser: Chrome, laboratory: Open) -> None:
+    laboratory("")
+    draw = "return document.querySelector('canvas').toDataURL()"
+    before = browser.execute_script(draw)
+    _click(browser, "#theme")
+    assert browser.execute_script(draw) != before
+    _click(browser, "#theme")
+    assert browser.execute_script(draw) == before
+
+
+def test_without_script_the_default_state_is_there(site: Path) -> None:
+    text = (site / "laboratory.html").read_text()
+    assert "step 25 by V2" in re.sub(r"\s+", " ", text)
+    twin = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert page(case_scene(2), "runge-kutta", twin) in text
+    assert repr(float(twin.omega[-1, 0])) in text
+
+
+def test_how_long_a_change_takes(
+    browser: Chrome, laboratory: Open, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Printed, not judged: seconds are the machine's."""
+    change = """const done = arguments[arguments.length - 1];
+      const box = document.querySelector("input[value=torque-held]");
+      const taken = [];
+      const again = async () => {
+        const begin = performance.now();
+        box.click();
+        await null;  // the charts draw at the end of the task
+        taken.push(performance.now() - begin);
+        if (taken.length < 20) requestAnimationFrame(again); else done(taken);
+      };
+      requestAnimationFrame(again);"""
+    lines = []
+    for program in PROGRAMS:
+        laboratory(f"#case=7&program={program}&listing=original&steps=300")
+        taken = browser.execute_async_script(change)
+        assert len(taken) == 20
+        ordered = sorted(taken)
+        lines.append(
+            f"{program}: first {taken[0]:.1f} ms, median {ordered[10]:.1f} ms, "
+            f"longest {ordered[-1]:.1f} ms"
+        )
+    with capsys.disabled():
+        print("\nCase 7, 300 steps, a change in the page:", *lines, sep="\n  ")

@@ -1,0 +1,113 @@
+"""Modules as one script: the same numbers, and a line for what is no known form."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pyharness import case_scene, run_program
+from pyharness.edition.bundle import bundle
+from pyharness.model.listing import PROGRAMS, original
+from pyharness.verify.port_protocol import asked_scene
+from tests.ports import WEB
+
+
+def _run(script: str, **known: object) -> str:
+    """Return what a classic script leaves in `said`; it knows what is given, and no module."""
+    engine = shutil.which("node")
+    if engine is None:
+        pytest.skip("no node on the PATH: the bundled scripts are not run")
+    run = (
+        "const vm = require('node:vm');"
+        "const { script, known } = JSON.parse(require('node:fs').readFileSync(0));"
+        "const world = { ...known, said: null };"
+        "vm.runInNewContext(script, world); console.log(JSON.stringify(world.said));"
+    )
+    given = json.dumps({"script": script, "known": known})
+    done = subprocess.run(
+        [engine, "--eval", run], input=given, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-500:]
+    return done.stdout
+
+
+def test_the_bundled_programs_have_the_twins_bits(tmp_path: Path) -> None:
+    entry = tmp_path / "entry.js"
+    shutil.copytree(WEB / "programs", tmp_path / "programs")
+    entry.write_text(
+        'import * as fourTerm from "./programs/four-term.js";\n'
+        'import * as rungeKutta from "./programs/runge-kutta.js";\n'
+        'import { run as twoTerm } from "./programs/two-term.js";\n'
+        'const runs = { "four-term": fourTerm.run, "runge-kutta": rungeKutta.run,\n'
+        '  "two-term": twoTerm };\n'
+        "said = asked.map(([name, scene, on]) => runs[name](scene, new Set(on)).rows);\n"
+    )
+    asked = [
+        (program, asked_scene(case_scene(number)), [*listing.defects, *listing.conjectures])
+        for number in (2, 7)
+        for program in PROGRAMS
+        for listing in [original(program)]
+    ]
+    found = json.loads(_run(bundle(entry), asked=asked))
+    for (program, scene, _), rows in zip(asked, found, strict=True):
+        twin = run_program(case_scene(scene["case"]), original(program), "python")
+        assert [row[1:4] for row in rows] == twin.omega.tolist()
+
+
+def test_every_module_is_there_once_and_behind_what_it_needs() -> None:
+    text = bundle(WEB / "laboratory" / "laboratory.js")
+    names = re.findall(r"^// (\w+/[\w-]+\.js)$", text, re.MULTILINE)
+    assert len(set(names)) == len(names)
+    assert names[-1] == "laboratory/laboratory.js"
+    assert names.index("programs/circular.js") < names.index("programs/equations.js")
+    assert re.search(r"^\s*(import|export)\b", text, re.MULTILINE) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "told"),
+    [
+        ('import x from "./other.js";', 1, "a form that is not known: import x from"),
+        ('\n\nimport "./other.js";', 3, "a form that is not known"),
+        ('import { one } from "other";', 1, "a form that is not known"),
+        ('import { one } from "./other.js"', 1, "a form that is not known"),
+        ("export default 3;", 1, "a form that is not known: export default 3;"),
+        ("const a = 1;\nexport { a };", 2, "a form that is not known"),
+        ('export * from "./other.js";', 1, "a form that is not known"),
+        ("export let a = 1;", 1, "a form that is not known"),
+        ('const a = 1;\n\nconst b = import("./other.js");', 3, "a form that is not known"),
+        ("const a = import.meta.url;", 1, "a form that is not known"),
+        ('// A line.\nimport { two } from "./other.js";', 2, "other.js exports no two"),
+        ('import { one } from "./none.js";', 1, "there is no ./none.js"),
+        ('import { back } from "./round.js";', 1, "this module too"),
+        ('import {\n  one,\n} from "./other.js";\nimport x from "./other.js";', 4, "not known"),
+    ],
+)
+def test_unknown_forms_are_refused_with_file_and_line(
+    text: str, line: int, told: str, tmp_path: Path
+) -> None:
+    (tmp_path / "other.js").write_text("export const one = 1;\n")
+    (tmp_path / "round.js").write_text('import { x } from "./entry.js";\nexport const back = 1;\n')
+    entry = tmp_path / "entry.js"
+    entry.write_text(f"{text}\nexport const x = 1;\n")
+    with pytest.raises(ValueError, match=re.escape(told)) as caught:
+        bundle(entry)
+    at = "round.js:1" if "round" in text else f"entry.js:{line}"
+    assert f"{at}: " in str(caught.value)
+
+
+def test_names_may_be_changed_and_taken_together(tmp_path: Path) -> None:
+    (tmp_path / "other.js").write_text(
+        "const hidden = 2;\nexport const one = 1;\nexport function two() {\n  return hidden;\n}\n"
+        "export class Three {\n  value = 3;\n}\n"
+    )
+    entry = tmp_path / "entry.js"
+    entry.write_text(
+        'import { one as first, two, Three } from "./other.js";\n'
+        'import * as other from "./other.js";\n'
+        "const hidden = 4;\n"
+        "said = [first, two(), new Three().value, hidden, other.one];\n"
+    )
+    assert json.loads(_run(bundle(entry))) == [1, 2, 3, 4, 1]

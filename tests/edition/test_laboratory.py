@@ -1,0 +1,303 @@
+"""The laboratory without a page: runs, words, reference and printer page in JavaScript."""
+
+import itertools
+import json
+import math
+import random
+import shutil
+import subprocess
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import case_scene, run_program
+from pyharness.cli.main import main
+from pyharness.compare.random_scenes import draw
+from pyharness.edition.laboratory import MOST_STEPS, context, data
+from pyharness.methods.solve import solve
+from pyharness.model.listing import PROGRAMS, names_of, subset
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_numbers
+from pyharness.original.printer import page
+from pyharness.truth.reference import reference
+from pyharness.verify.port_protocol import asked_scene
+from tests.ports import WEB
+
+LABORATORY = WEB / "laboratory"
+
+
+def ask(body: str, given: Any) -> Any:
+    """Return what JavaScript makes of `given`; `body` returns it, and may import our modules."""
+    engine = shutil.which("node")
+    if engine is None:
+        pytest.skip("no node on the PATH: the laboratory's JavaScript is not tried")
+    names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P"}
+    imports = [
+        f"import * as {name} from {json.dumps(str(LABORATORY / f'{file}.js'))};"
+        for file, name in names.items()
+    ]
+    script = (
+        f"{''.join(imports)} import {{ readFileSync }} from 'node:fs';"
+        "const { data, given } = JSON.parse(readFileSync(0));"
+        f"console.log(JSON.stringify((() => {{ {body} }})()));"
+    )
+    done = subprocess.run(
+        [engine, "--input-type=module", "--eval", script],
+        input=json.dumps({"data": data(), "given": given}),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-500:]
+    return json.loads(done.stdout)
+
+
+def test_printer_pages_are_those_of_the_program() -> None:
+    cells = list(itertools.product(case_numbers(), PROGRAMS, ("original", "corrected"), (100, 300)))
+    found = ask(
+        """return given.map(([number, program, listing, steps]) => {
+          const words = `case=${number}&program=${program}&listing=${listing}&steps=${steps}`;
+          const { scene, run } = E.experiment(data, S.stateFrom(data, words).state);
+          return P.printerPage(data.printer[program], scene, run);
+        });""",
+        cells,
+    )
+    for (number, program, listing, steps), text in zip(cells, found, strict=True):
+        scene = replace(case_scene(number), steps=steps)
+        run = run_program(scene, subset(program, listing))
+        assert text == page(scene, program, run), (number, program, listing)
+
+
+def test_numbers_that_do_not_fit_are_printed_as_the_formats_have_it() -> None:
+    """Asterisks, steps of four digits, zeros without a sign, halves away from zero."""
+    values = [0.0, -0.0, -0.00001, 0.03125, -0.03125, 99999.99994, 99999.99996, -9999.99994]
+    values += [-9999.99996, 1e22, 0.00005, -0.99999, 1e-300, math.inf, -math.inf, math.nan]
+    source = random.Random(1982)
+    values += [source.uniform(-1.0, 1.0) * 10.0 ** source.uniform(-6.0, 6.0) for _ in range(301)]
+    scene = replace(case_scene(2), steps=1200)
+    run = run_program(scene, subset("two-term", "corrected"))
+    omega, velocity = (np.resize(np.array(each), (1200, 3)) for each in (values, values[::-1]))
+    ier = np.resize(np.array([0, 129], np.int32), 1200)
+    changed = replace(run, omega=omega, velocity=velocity, ier=ier)
+    names = {"inf": "Infinity", "-inf": "-Infinity", "nan": "NaN"}
+    rows = [
+        ["0", *(names.get(repr(x), repr(x)) for x in row)]
+        for row in np.hstack([omega, velocity]).tolist()
+    ]
+    body = """const rows = given.rows.map((row) => row.map(Number));
+      const run = { rows, ier: given.ier };
+      return P.printerPage(data.printer["two-term"], given.scene, run);"""
+    given = {"scene": asked_scene(scene), "rows": rows, "ier": ier.tolist()}
+    assert ask(body, given) == page(scene, "two-term", changed)
+
+
+def _words() -> list[str]:
+    """Return what may stand behind the page's address: random states, in words."""
+    source = random.Random(1982)
+    found = []
+    for _ in range(300):
+        program = source.choice(PROGRAMS)
+        listing = source.choice(("original", "corrected"))
+        words = [f"case={source.choice(case_numbers())}", f"program={program}"]
+        words.append(f"listing={listing}")
+        option = "fix" if listing == "original" else "keep"
+        for word, kind in (
+            (option, "defect"),
+            ("reading", "reading"),
+            ("conjecture", "conjecture"),
+        ):
+            names = [name for name in names_of(kind, program) if source.random() < 0.5]
+            if names and source.random() < 0.7:
+                words.append(f"{word}={','.join(names)}")
+        if source.random() < 0.3:
+            words.append(f"omega0={source.uniform(-9, 9)},-0.0,1e-7")
+        if source.random() < 0.3:
+            words += [
+                f"step-size={10.0 ** source.uniform(-4, -1)}",
+                f"steps={source.randint(1, 50)}",
+            ]
+        if program == "runge-kutta" and source.random() < 0.5:
+            words.append(source.choice(("no-stop", "lipschitz=60", "lipschitz=0.5")))
+        found.append("&".join(words))
+    return found
+
+
+def test_states_go_round_through_words_and_mean_what_the_command_line_means(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = ask(
+        """return given.map((words) => {
+          const { state, problems } = S.stateFrom(data, `#${words}`);
+          const again = S.stateFrom(data, S.fragmentOf(data, state));
+          const run = E.experiment(data, state).run;
+          return { state, problems, again: again.state, command: S.commandOf(data, state), run };
+        });""",
+        _words(),
+    )
+    for each in found:
+        assert each["problems"] == []
+        assert each["again"] == each["state"]
+    for each in found[:60]:
+        command = each["command"].removeprefix("pyharness ").split()
+        assert main([*command, "--implementation", "python", "--format", "json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert each["run"]["ended"] == told["ended"]
+        assert told["stop"] is None or each["run"]["stop"]["variable"] == told["stop"]["variable"]
+        rows = [row[1:4] for row in each["run"]["rows"]]
+        assert rows == told["trajectory"]["omega"], each["command"]
+
+
+def test_only_what_differs_is_in_the_address() -> None:
+    body = """return given.map((words) => {
+      const { state } = S.stateFrom(data, words);
+      return [S.fragmentOf(data, state), S.commandOf(data, state)];
+    });"""
+    first = "case=2&program=runge-kutta&listing=original"
+    asked = [
+        "", "#", "keep=stage-base", "omega0=0,1,10&steps=100", "conjecture=none&no-stop",
+        "listing=corrected&program=two-term&case=7&conjecture=torque-held&steps=+30",
+    ]  # fmt: skip
+    found = ask(body, asked)
+    assert [each[0] for each in found] == [
+        first, first, "case=2&program=runge-kutta&listing=corrected&keep=stage-base",
+        f"{first}&omega0=0,1,10", f"{first}&conjecture=none&no-stop",
+        "case=7&program=two-term&listing=corrected&conjecture=torque-held&steps=30",
+    ]  # fmt: skip
+    given = "--case 2 --program runge-kutta --listing original --conjecture none --no-stop"
+    assert found[4][1] == f"pyharness run {given}"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("case=8", "case: unknown '8'; allowed: 1, 2, 3, 4, 5, 6, 7"),
+        ("case", "case: unknown ''; allowed: 1"),
+        ("program=euler", "program: unknown 'euler'; allowed: two-term, four-term, runge-kutta"),
+        ("listing=mine", "listing: unknown 'mine'; allowed: original, corrected"),
+        ("fix=dt-accumulates", "fix: unknown defect 'dt-accumulates'; allowed: stage-base"),
+        ("fix=stage-base&keep=stage-base", "'stage-base' is given to both fix and keep"),
+        ("reading=", "reading: unknown reading ''; allowed: do-variable"),
+        ("conjecture=none,torque-held", "conjecture: unknown conjecture 'none'"),
+        ("omega0=1,2", "omega0: 2 numbers; allowed: three, as in 0,1,10"),
+        ("omega0=1,2,x", "omega0: 'x' where a number belongs"),
+        ("omega0=1,2,0x10", "omega0: '0x10' where a number belongs"),
+        ("omega0=1,2,1e999", "omega0: '1e999' is not finite"),
+        ("step-size=0", "step-size: 0; allowed: a number above 0"),
+        ("steps=0", f"steps: '0'; allowed: a whole number from 1 to {MOST_STEPS}"),
+        ("steps=1e3", "steps: '1e3'; allowed: a whole number"),
+        ("steps=4000", "steps: '4000'"),
+        ("lipschitz=-1", "lipschitz: -1; allowed: a number above 0"),
+        ("no-stop=1", "no-stop: '1' where no value belongs"),
+        ("no-stop&lipschitz=60", "lipschitz has no meaning with no-stop"),
+        ("program=two-term&no-stop", "no-stop has no meaning with program=two-term"),
+        ("spin=3", "unknown word 'spin'; allowed: case, program"),
+        ("%zz=%", "unknown word '%zz'"),
+        ("case=" + "9" * 5000, "case: unknown '9999"),
+    ],
+)  # fmt: skip
+def test_what_an_address_has_wrong_is_told_in_a_line_and_the_default_taken(
+    words: str, told: str
+) -> None:
+    body = """const { state, problems } = S.stateFrom(data, given);
+      return [S.fragmentOf(data, state), problems];"""
+    fragment, problems = ask(body, words)
+    assert len(problems) == 1
+    assert problems[0].startswith(told)
+    assert "\n" not in problems[0]
+    assert len(problems[0]) < 200
+    program = "two-term" if "two-term" in words else "runge-kutta"
+    kept = [word for word in ("no-stop", "fix=stage-base") if word in words.split("&")[:-1]]
+    assert fragment == "&".join([f"case=2&program={program}&listing=original", *kept])
+
+
+def _motions() -> list[Scene]:
+    """Return the cases over 300 steps, and other starts, steps, bodies and torques."""
+    found = [replace(case_scene(number), steps=300) for number in case_numbers()]
+    source = random.Random(1982)
+    for _ in range(15):
+        omega = tuple(source.gauss(0.0, 1.0) * 10.0 ** source.uniform(-1.0, 1.0) for _ in range(3))
+        step = 10.0 ** source.uniform(-4.0, -1.0)
+        scene = case_scene(source.choice(case_numbers()))
+        found.append(replace(scene, omega=omega, step_size=step, steps=30))
+    drawn = (draw("laboratory", number).scene for number in range(0, 40, 2))
+    return found + [replace(scene, steps=min(scene.steps, 30)) for scene in drawn]
+
+
+def test_the_reference_is_the_decimal_one_to_rounding() -> None:
+    scenes = _motions()
+    given = [{"scene": asked_scene(scene), "times": scene.times()} for scene in scenes]
+    body = "return given.map(({ scene, times }) => R.reference(scene, times));"
+    for scene, rows in zip(scenes, ask(body, given), strict=True):
+        truth = reference(scene, scene.times()).omega
+        largest = max(np.abs(truth).max(), *map(abs, scene.omega))
+        growth = solve(scene, scene.times(), "taylor").growth or 1.0
+        error = float(np.abs(np.array(rows) - truth).max() / largest)
+        assert error < 1e-15 * max(1.0, growth), (scene, error)
+
+
+def test_a_reference_that_would_take_too_long_or_leaves_every_bound_ends() -> None:
+    scenes = [
+        replace(case_scene(4), omega=(1e7, 1e7, 1e7)),
+        replace(case_scene(4), omega=(1e200, 1e200, 1e200)),
+        replace(case_scene(4), omega=(0.0, 0.0, 0.0)),
+    ]
+    given = [{"scene": asked_scene(scene), "times": scene.times()} for scene in scenes]
+    body = "return given.map(({ scene, times }) => R.reference(scene, times));"
+    fast, without_bound, rest = ask(body, given)
+    assert len(fast) < 100
+    assert without_bound == []
+    assert rest == [[0.0, 0.0, 0.0]] * 100
+
+
+def test_case_2_stops_at_step_25_and_not_with_stage_base_fixed() -> None:
+    body = """return given.map((words) => {
+      const found = E.experiment(data, S.stateFrom(data, words).state);
+      return [found.run.stop, E.ending(found), E.largestError(found)];
+    });"""
+    (stop, told, error), (other, _, _) = ask(body, ["", "fix=stage-base"])
+    assert (stop["step"], stop["variable"]) == (25, "V2")
+    assert told.startswith("Stopped at step 25 of 100, at 0.25 s, by V2, the velocity along axis 2")
+    assert 0.2 < error < 0.3
+    assert (other["step"], other["variable"]) != (25, "V2")
+
+
+def test_endings_are_told() -> None:
+    body = "return given.map((w) => E.ending(E.experiment(data, S.stateFrom(data, w).state)));"
+    overflow, complete, norm, at_rest = ask(
+        body,
+        [
+            "case=6&program=two-term", "program=two-term&steps=1",
+            "case=6&listing=corrected&lipschitz=1", "case=1&lipschitz=1e-9&steps=3&omega0=0,0,0",
+        ],
+    )  # fmt: skip
+    assert overflow == "Overflow in step 57 of 100: omega is not finite any more."
+    assert complete == "Complete: 1 step."
+    assert "by U, the angular velocity: " in norm
+    assert "Stopped" in at_rest
+
+
+def test_the_page_without_script_has_the_default_state() -> None:
+    first = context()["first"]
+    assert first["ending"].startswith("Stopped at step 25 by V2")
+    assert [row[0] for row in first["rows"]] == ["1", "2", "3", "23", "24", "25"]
+    twin = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert float(first["rows"][-1][2]) == twin.omega[-1, 0]
+    assert first["page"] == page(case_scene(2), "runge-kutta", twin)
+    assert first["command"] == "pyharness run --case 2 --program runge-kutta --listing original"
+
+
+def test_data_are_json_and_know_every_switch() -> None:
+    given = json.loads(json.dumps(data(), allow_nan=False))
+    assert [scene["case"] for scene in given["scenes"]] == list(case_numbers())
+    for program in PROGRAMS:
+        names = {each["id"] for each in given["flags"] if program in each["programs"]}
+        kinds = ("defect", "reading", "conjecture")
+        assert names == {name for kind in kinds for name in names_of(kind, program)}
+
+
+def test_files_are_small() -> None:
+    """What is to be read is in pieces that can be."""
+    for file in LABORATORY.glob("*.js"):
+        assert len(file.read_text().splitlines()) < 300, file.name

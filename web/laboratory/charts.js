@@ -1,0 +1,222 @@
+// Two charts by uPlot, a classic script that the page loads before this one.
+//
+// Colours are the page's own: drawn anew when it turns dark or light. What has a legend, and which
+// components are shown, is the page's too, for who has no mouse.
+
+const COMPONENTS = ["U1", "U2", "U3"];
+const HEIGHT = { omega: 300, error: 220 };
+// A run that leaves the solution is shown as far beyond it as the solution's own size; its error as
+// far as this many times that.
+const FARTHEST_ERROR = 100;
+const MOST_LABELS = 6;
+
+export class Charts {
+  // `omega` and `error` are the elements that the charts go into, `readout` that of the numbers at
+  // the pointer; `isShown` tells of a component, from 0, whether it is to be drawn.
+  constructor(omega, error, readout, isShown) {
+    this.places = { omega, error };
+    this.readout = readout;
+    this.isShown = isShown;
+    this.drawn = {};
+    this.shown = null;
+    new ResizeObserver(() => this.resize()).observe(omega);
+  }
+
+  // Show an experiment.
+  show(found) {
+    this.shown = found;
+    const data = { omega: omegaData(found), error: errorData(found) };
+    for (const name of ["omega", "error"]) {
+      if (this.drawn[name]) this.drawn[name].setData(data[name]);
+      else this.drawn[name] = this.made(name, data[name]);
+    }
+  }
+
+  // Draw the components that are to be drawn now.
+  choose() {
+    for (const chart of Object.values(this.drawn)) {
+      chart.batch(() => {
+        for (let n = 1; n < chart.series.length; n++) {
+          chart.setSeries(n, { show: this.isShown((n - 1) % COMPONENTS.length) });
+        }
+      });
+    }
+  }
+
+  // Draw with the colours that hold now.
+  recolour() {
+    for (const name of Object.keys(this.drawn)) this.drawn[name].destroy();
+    this.drawn = {};
+    if (this.shown) this.show(this.shown);
+  }
+
+  resize() {
+    for (const [name, chart] of Object.entries(this.drawn)) {
+      const width = this.places[name].clientWidth;
+      if (width > 0 && width !== chart.width) chart.setSize({ width, height: HEIGHT[name] });
+    }
+  }
+
+  made(name, data) {
+    const place = this.places[name];
+    const options = {
+      width: place.clientWidth,
+      height: HEIGHT[name],
+      scales: { x: { time: false }, y: this.scale(name) },
+      axes: [axis(), name === "error" ? logarithmic(axis()) : { ...axis(), size: 56, values: labels }],
+      series: [{}, ...this.series(name)],
+      hooks: { draw: [(chart) => this.markEnd(chart)], setCursor: [(chart) => this.tell(chart)] },
+      legend: { show: false },
+      cursor: { drag: { x: true, y: false } },
+    };
+    return new uPlot(options, data, place);
+  }
+
+  series(name) {
+    const line = (axis, more) => ({
+      stroke: colour(`--c${axis + 1}`),
+      show: this.isShown(axis),
+      points: { show: false },
+      ...more,
+    });
+    const run = COMPONENTS.map((_, axis) => line(axis, { width: 2 }));
+    if (name === "error") return run;
+    return [...run, ...COMPONENTS.map((_, axis) => line(axis, { width: 1.25, dash: [6, 4] }))];
+  }
+
+  // The numbers at the pointer.
+  tell(chart) {
+    const n = chart.cursor.idx;
+    const [time, ...columns] = omegaData(this.shown);
+    if (n === null || n === undefined || n >= time.length) {
+      this.readout.textContent = "";
+      return;
+    }
+    const told = COMPONENTS.map((name, axis) => {
+      const [run, truth] = [columns[axis][n], columns[axis + COMPONENTS.length][n]];
+      return `${name} ${number(run)} (solution ${number(truth)})`;
+    });
+    this.readout.textContent = `${number(time[n])} s: ${told.join(", ")}`;
+  }
+
+  scale(name) {
+    const range = name === "error" ? "errorRange" : "omegaRange";
+    return { distr: name === "error" ? 3 : 1, range: (_, low, high) => this[range](low, high) };
+  }
+
+  // The least and the greatest of the solution.
+  extent() {
+    const values = [...this.shown.truth.flat(), ...this.shown.scene.initial.omega];
+    const least = values.reduce((x, y) => Math.min(x, y), Infinity);
+    const most = values.reduce((x, y) => Math.max(x, y), -Infinity);
+    return { least, most, size: Math.max(Math.abs(least), Math.abs(most), 1e-300) };
+  }
+
+  omegaRange(low, high) {
+    const { least, most, size } = this.extent();
+    const from = Math.max(low ?? 0, least - size);
+    const to = Math.min(high ?? 0, most + size);
+    const margin = 0.06 * (to - from) || 0.5 * size;
+    return [from - margin, to + margin];
+  }
+
+  // From one power of ten to another.
+  errorRange(low, high) {
+    if (!(low > 0)) return [1e-17, 1];
+    const from = Math.max(Math.floor(Math.log10(low)), -300);
+    const farthest = Math.max(FARTHEST_ERROR * this.extent().size, 10 * low);
+    const to = Math.ceil(Math.log10(Math.min(high, farthest)));
+    return [10 ** from, 10 ** Math.max(to, from + 1)];
+  }
+
+  // A line where the run ended before all steps were done.
+  markEnd(chart) {
+    const { run } = this.shown;
+    if (run.ended === "complete") return;
+    const time = this.shown.times[Math.max(run.rows.length - 1, 0)];
+    const { ctx } = chart;
+    const { left, top, width, height } = chart.bbox;
+    const x = Math.round(chart.valToPos(time, "x", true));
+    if (x < left || x > left + width) return;
+    ctx.save();
+    ctx.setLineDash([]);
+    ctx.strokeStyle = colour("--bad");
+    ctx.lineWidth = 2 * uPlot.pxRatio;
+    ctx.beginPath();
+    ctx.moveTo(x, top);
+    ctx.lineTo(x, top + height);
+    ctx.stroke();
+    const words = run.stop ? `step ${run.stop.step}: ${run.stop.variable}` : "overflow";
+    const size = 13 * uPlot.pxRatio;
+    ctx.font = `${size}px sans-serif`;
+    const length = ctx.measureText(words).width;
+    const from = x > left + width / 2 ? x - length - size / 2 : x + size / 2;
+    ctx.fillStyle = colour("--paper");
+    ctx.fillRect(from, top + size / 2, length, 1.3 * size);
+    ctx.fillStyle = colour("--bad");
+    ctx.textAlign = "left";
+    ctx.fillText(words, from, top + 1.5 * size);
+    ctx.restore();
+  }
+}
+
+function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+function number(value) {
+  return value === null || value === undefined ? "-" : String(Number(value.toPrecision(5)));
+}
+
+function axis() {
+  const line = { stroke: colour("--line"), width: 1 };
+  return { stroke: colour("--muted"), grid: line, ticks: line, font: "12px sans-serif" };
+}
+
+// Powers of ten alone, and not too many.
+function logarithmic(plain) {
+  const all = (_, ticks) => ticks;
+  const splits = (chart, _, low, high) => {
+    const [from, to] = [Math.round(Math.log10(low)), Math.round(Math.log10(high))];
+    const apart = Math.ceil((to - from) / MOST_LABELS);
+    return Array.from({ length: Math.floor((to - from) / apart) + 1 }, (_, n) => 10 ** (from + n * apart));
+  };
+  return {
+    ...plain,
+    size: 56,
+    splits,
+    filter: all,
+    grid: { ...plain.grid, filter: all },
+    ticks: { ...plain.ticks, filter: all },
+    values: (_, ticks) => ticks.map((tick) => tick.toExponential(0).replace("+", "")),
+  };
+}
+
+// Numbers of few letters.
+function labels(_, ticks) {
+  return ticks.map((tick) => {
+    const size = Math.abs(tick);
+    const long = tick !== 0 && (size < 1e-3 || size >= 1e5);
+    return long ? tick.toExponential().replace("+", "") : String(tick);
+  });
+}
+
+// Times with the start before them; rows and solution where there are any.
+function omegaData({ scene, run, times, truth }) {
+  const start = scene.initial.omega;
+  const column = (rows, first, at) => [
+    first,
+    ...times.map((_, n) => (n < rows.length ? rows[n][at] : null)),
+  ];
+  return [
+    [0, ...times],
+    ...start.map((first, axis) => column(run.rows, first, axis + 1)),
+    ...start.map((first, axis) => column(truth, first, axis)),
+  ];
+}
+
+// No error at all has no place on a scale of powers of ten.
+function errorData({ times, errors }) {
+  const column = (axis) => times.map((_, n) => errors[n]?.[axis] || null);
+  return [[0, ...times], ...COMPONENTS.map((_, axis) => [null, ...column(axis)])];
+}

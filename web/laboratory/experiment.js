@@ -1,0 +1,72 @@
+// A state in, a run and what there is to say of it out. No page is needed.
+import * as fourTerm from "../programs/four-term.js";
+import * as rungeKutta from "../programs/runge-kutta.js";
+import * as twoTerm from "../programs/two-term.js";
+import { reference } from "./reference.js";
+import { sceneOfCase } from "./state.js";
+
+const PROGRAMS = { "two-term": twoTerm, "four-term": fourTerm, "runge-kutta": rungeKutta };
+
+// The scene of a state, as a port of the programs reads it.
+export function sceneOf(data, state) {
+  const scene = sceneOfCase(data, state.case);
+  return {
+    ...scene,
+    initial: { omega: state.omega0 ?? scene.initial.omega },
+    run: { step_size: state.stepSize, steps: state.steps },
+  };
+}
+
+// Of a state: `scene`, what the program returned (`run`), the true `times` of all steps (s), the
+// solution there (`truth`, rad/s) and the `errors` of each row, component by component; null where
+// there is no truth.
+export function experiment(data, state) {
+  const scene = sceneOf(data, state);
+  const active = new Set(state.active);
+  const run = PROGRAMS[state.program].run(scene, active, state.lipschitz, state.stops);
+  const times = Array.from({ length: state.steps }, (_, n) => (n + 1) * state.stepSize);
+  const truth = reference(scene, times);
+  const errors = run.rows.map((row, n) =>
+    n < truth.length ? truth[n].map((value, axis) => Math.abs(row[axis + 1] - value)) : null,
+  );
+  return { state, scene, run, times, truth, errors };
+}
+
+// The largest error of any component so far (rad/s); null where nothing is known.
+export function largestError({ errors }) {
+  const known = errors.flatMap((row) => row ?? []);
+  return known.length > 0 ? known.reduce((most, each) => Math.max(most, each), 0) : null;
+}
+
+// How far the run came, and why no farther, in a sentence.
+export function ending({ state, scene, run }) {
+  const { steps } = scene.run;
+  if (run.ended === "overflow") {
+    const next = run.rows.length + 1;
+    return `Overflow in step ${next} of ${steps}: omega is not finite any more.`;
+  }
+  if (run.ended === "complete") return `Complete: ${counted(steps, "step")}.`;
+  const { step, variable, quotient } = run.stop;
+  const time = brief(step * state.stepSize);
+  const found = Number.isFinite(quotient)
+    ? `its slope changed by ${brief(quotient)} times its own change`
+    : "its slope changed and it did not";
+  const limit = `the limit is ${brief(state.lipschitz)} (1/s)`;
+  return `Stopped at step ${step} of ${steps}, at ${time} s, by ${variable}, ${told(variable)}: ${found}; ${limit}.`;
+}
+
+function told(variable) {
+  if (variable === "U") return "the angular velocity";
+  if (variable === "UV") return "angular velocity and velocity together";
+  const what = variable.startsWith("U") ? "omega about" : "the velocity along";
+  return `${what} axis ${variable[1]}`;
+}
+
+export function counted(number, what) {
+  return `${number} ${what}${number === 1 ? "" : "s"}`;
+}
+
+// A number to three digits, for reading.
+export function brief(value) {
+  return String(Number(value.toPrecision(3)));
+}

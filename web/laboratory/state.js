@@ -1,0 +1,252 @@
+// The state of the laboratory, and its words: those of the command line, in the page's address.
+//
+// A state is { case, program, base, active, omega0, stepSize, steps, lipschitz, stops }: `base` is
+// the listing that was chosen, `active` the names of what is switched on, `omega0` null where it is
+// that of the case. `data` is what the page brings along: cases, programs, flags, limits.
+
+const LISTINGS = ["original", "corrected"];
+const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
+
+// What a page shows whose address says nothing.
+export function defaultState(data) {
+  const { case: number, program, listing } = data.defaults;
+  return stateOf(data, number, program, listing);
+}
+
+function stateOf(data, number, program, base) {
+  return {
+    case: number,
+    program,
+    base,
+    active: activeIn(data, program, base),
+    omega0: null,
+    stepSize: sceneOfCase(data, number).run.step_size,
+    steps: sceneOfCase(data, number).run.steps,
+    lipschitz: data.lipschitz,
+    stops: true,
+  };
+}
+
+export function sceneOfCase(data, number) {
+  return data.scenes.find((scene) => scene.case === number);
+}
+
+// The names of a kind (defect, reading, conjecture) that a program has.
+export function namesOf(data, program, kind) {
+  return data.flags
+    .filter((flag) => flag.kind === kind && flag.programs.includes(program))
+    .map((flag) => flag.id);
+}
+
+// What is active in the listing `base` of a program.
+export function activeIn(data, program, base) {
+  if (base === "corrected") return [];
+  return data.flags
+    .filter((flag) => flag.in_original && flag.programs.includes(program))
+    .map((flag) => flag.id);
+}
+
+// A state with another program: switches that both have stay where they are.
+export function withProgram(data, state, program) {
+  const usual = activeIn(data, program, state.base);
+  const active = data.flags
+    .filter((flag) => flag.programs.includes(program))
+    .filter((flag) => (flag.programs.includes(state.program) ? state.active : usual).includes(flag.id))
+    .map((flag) => flag.id);
+  return { ...state, program, active };
+}
+
+// The words of a state, a name and its value each; a switch has the value null. Only what differs
+// from the defaults, but for case, program and listing.
+export function wordsOf(data, state) {
+  const { program, base, active, stops } = state;
+  const usual = stateOf(data, state.case, program, base);
+  const chosen = (kind) => namesOf(data, program, kind).filter((name) => active.includes(name));
+  const words = [["case", String(state.case)], ["program", program], ["listing", base]];
+  const add = (word, names) => names.length > 0 && words.push([word, names.join(",")]);
+
+  const defects = namesOf(data, program, "defect");
+  if (base === "original") add("fix", defects.filter((name) => !active.includes(name)));
+  else add("keep", chosen("defect"));
+  add("reading", chosen("reading"));
+  const conjectures = chosen("conjecture");
+  const assumed = namesOf(data, program, "conjecture").filter((name) => usual.active.includes(name));
+  if (conjectures.join() !== assumed.join()) {
+    add("conjecture", conjectures.length > 0 ? conjectures : ["none"]);
+  }
+  if (state.omega0 !== null) add("omega0", state.omega0.map(written));
+  if (state.stepSize !== usual.stepSize) add("step-size", [state.stepSize]);
+  if (state.steps !== usual.steps) add("steps", [state.steps]);
+  if (hasStopTest(program)) {
+    if (!stops) words.push(["no-stop", null]);
+    else if (state.lipschitz !== usual.lipschitz) add("lipschitz", [state.lipschitz]);
+  }
+  return words;
+}
+
+// The shortest text that gives a number back, the sign of zero too.
+export function written(value) {
+  return Object.is(value, -0) ? "-0" : String(value);
+}
+
+export function hasStopTest(program) {
+  return program === "runge-kutta";
+}
+
+export function fragmentOf(data, state) {
+  return wordsOf(data, state)
+    .map(([word, value]) => (value === null ? word : `${word}=${value}`))
+    .join("&");
+}
+
+export function commandOf(data, state) {
+  const options = wordsOf(data, state).map(([word, value]) =>
+    value === null ? `--${word}` : `--${word} ${value}`,
+  );
+  return ["pyharness run", ...options].join(" ");
+}
+
+// The state that an address tells, and a line for each word of it that can't be taken; there the
+// default stands.
+export function stateFrom(data, fragment) {
+  const problems = [];
+  const given = wordsIn(fragment, problems);
+  const read = (word, reader, otherwise) => {
+    if (!given.has(word)) return otherwise;
+    try {
+      return reader(given.get(word), word);
+    } catch (error) {
+      if (!(error instanceof StateError)) throw error;
+      problems.push(error.message);
+      return otherwise;
+    }
+  };
+  const { case: number, program: usual } = data.defaults;
+
+  const cases = data.scenes.map((scene) => String(scene.case));
+  const chosen = Number(read("case", (text) => oneOf("case", text, cases), number));
+  const program = read("program", (text) => oneOf("program", text, data.programs), usual);
+  const list = (kind) => (text, word) => namesIn(text, word, kind, namesOf(data, program, kind));
+  const fix = read("fix", list("defect"), []);
+  let keep = read("keep", list("defect"), []);
+  const both = keep.filter((name) => fix.includes(name));
+  if (both.length > 0) {
+    problems.push(`'${both[0]}' is given to both fix and keep; give it to one`);
+    keep = [];
+  }
+  // As the command line has it: `keep` alone corrects all others.
+  const unsaid = keep.length > 0 && fix.length === 0 ? "corrected" : data.defaults.listing;
+  const base = read("listing", (text) => oneOf("listing", text, LISTINGS), unsaid);
+  const state = stateOf(data, chosen, program, base);
+
+  const defects = namesOf(data, program, "defect");
+  const assumed = state.active.filter((name) => !defects.includes(name));
+  const noneOr = (text, word) => (text === "none" ? [] : list("conjecture")(text, word));
+  const active = new Set([
+    ...state.active.filter((name) => defects.includes(name) && !fix.includes(name)),
+    ...keep,
+    ...read("reading", list("reading"), []),
+    ...read("conjecture", noneOr, assumed),
+  ]);
+  state.active = data.flags.map((flag) => flag.id).filter((name) => active.has(name));
+  state.omega0 = read("omega0", omegaFrom, null);
+  state.stepSize = read("step-size", positiveFrom, state.stepSize);
+  state.steps = read("steps", stepsFrom(data), state.steps);
+  for (const word of ["lipschitz", "no-stop"]) {
+    if (given.has(word) && !hasStopTest(program)) {
+      problems.push(`${word} has no meaning with program=${program}`);
+      given.delete(word);
+    }
+  }
+  state.stops = read("no-stop", noValue, true);
+  if (given.has("lipschitz") && !state.stops) {
+    problems.push("lipschitz has no meaning with no-stop");
+    given.delete("lipschitz");
+  }
+  state.lipschitz = read("lipschitz", positiveFrom, state.lipschitz);
+  return { state, problems };
+}
+
+const WORDS =
+  "case program listing fix keep reading conjecture omega0 step-size steps lipschitz no-stop";
+
+// What is wrong with a value, in a line.
+export class StateError extends Error {}
+
+function wordsIn(fragment, problems) {
+  const given = new Map();
+  for (const part of fragment.replace(/^#/, "").split("&").filter((each) => each !== "")) {
+    const [word, ...values] = decoded(part).split("=");
+    if (WORDS.split(" ").includes(word)) given.set(word, values.length ? values.join("=") : null);
+    else problems.push(`unknown word '${shown(word)}'; allowed: ${WORDS.split(" ").join(", ")}`);
+  }
+  return given;
+}
+
+// A percent sign that begins no character stands for itself.
+function decoded(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
+// No more of what was typed than a line has room for.
+function shown(text) {
+  return [...(text ?? "")].slice(0, 40).join("");
+}
+
+function oneOf(word, text, allowed) {
+  if (allowed.includes(text)) return text;
+  throw new StateError(`${word}: unknown '${shown(text)}'; allowed: ${allowed.join(", ")}`);
+}
+
+function namesIn(text, word, kind, allowed) {
+  const names = (text ?? "").split(",").map((name) => name.trim());
+  for (const name of names) {
+    if (!allowed.includes(name)) {
+      const known = allowed.join(", ") || "none";
+      throw new StateError(`${word}: unknown ${kind} '${shown(name)}'; allowed: ${known}`);
+    }
+  }
+  return names;
+}
+
+// A finite number, as the command line takes it.
+function numberFrom(text, word) {
+  const trimmed = (text ?? "").trim();
+  if (!NUMBER.test(trimmed)) throw new StateError(`${word}: '${shown(text)}' where a number belongs`);
+  const value = Number(trimmed);
+  if (Number.isFinite(value)) return value;
+  throw new StateError(`${word}: '${shown(text)}' is not finite; allowed: finite numbers`);
+}
+
+export function omegaFrom(text, word = "omega0") {
+  const parts = (text ?? "").split(",");
+  if (parts.length !== 3) {
+    throw new StateError(`${word}: ${parts.length} numbers; allowed: three, as in 0,1,10`);
+  }
+  return parts.map((part) => numberFrom(part, word));
+}
+
+export function positiveFrom(text, word) {
+  const value = numberFrom(text, word);
+  if (value > 0) return value;
+  throw new StateError(`${word}: ${shown(text)}; allowed: a number above 0`);
+}
+
+// A reader of numbers of steps: as many as a page draws at once.
+export function stepsFrom(data) {
+  return (text, word) => {
+    const value = /^[-+]?\d+$/.test((text ?? "").trim()) ? Number(text) : NaN;
+    if (value >= 1 && value <= data.most_steps) return value;
+    const allowed = `a whole number from 1 to ${data.most_steps}`;
+    throw new StateError(`${word}: '${shown(text)}'; allowed: ${allowed}`);
+  };
+}
+
+function noValue(text, word) {
+  if (text === null) return false;
+  throw new StateError(`${word}: '${shown(text)}' where no value belongs`);
+}

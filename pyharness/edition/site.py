@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.edition import api, decks, documents, figures, laboratory, ledger
 from pyharness.edition.bundle import bundle
-from pyharness.edition.markdown import formula, inline
+from pyharness.edition.markdown import formula
+from pyharness.history.claims.report import written
 from pyharness.history.tei import tei_document
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
@@ -216,6 +217,6 @@ def _templates() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    templates.filters["inline"] = inline
+    templates.filters["number"] = written
     templates.globals["formula"] = formula
     return templates

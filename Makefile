@@ -1,4 +1,5 @@
-# make compare [CASE=5] [ARGS="--listing corrected"], make test, make wheel: all set up what they need.
+# make compare [CASE=5] [ARGS="--listing corrected"], make test, make wheel, make edition [OUT=DIR]: all
+# set up what they need.
 # PYTHON= and FC= choose the interpreter and the Fortran compiler; INSTALL=no forbids apt, dnf, brew.
 
 PYTHON ?= python3
@@ -9,13 +10,14 @@ INSTALL ?= yes
 export INSTALL
 CASE ?= 3
 ARGS ?=
+OUT ?= build/edition
 
 BIN := .venv/bin
 FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
 # What fypp wrote: the tools for Fortran do not read its input.
 WRITTEN := build/cp*/*_binary*.f90 build/cp*/words.f90
 
-.PHONY: compare test mutate cross-check wheel lint format clean FORCE
+.PHONY: compare test mutate cross-check wheel edition lint format clean FORCE
 
 compare: .venv/ready
 	@$(BIN)/python -m pyharness compare --case $(CASE) $(ARGS)
@@ -33,6 +35,9 @@ wheel: .venv/ready
 	@PATH="$(CURDIR)/$(BIN):$$PATH" FC=$(FC) $(BIN)/python -m pip wheel --quiet \
 	  --disable-pip-version-check --no-build-isolation --no-deps --wheel-dir dist .
 	@ls dist/*.whl
+
+edition: .venv/ready-to-test
+	@$(BIN)/python -m pyharness edition --out $(OUT) $(ARGS)
 
 lint: .venv/ready-to-test
 	@$(BIN)/ruff format --check --quiet

@@ -103,7 +103,8 @@ def test_what_the_package_shows() -> None:
 
 def test_lower_bounds_are_what_the_landing_script_installs() -> None:
     """Each dependency has one bound, and `.ci/run` makes of it the version that it tests."""
-    bounds = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["plots"]]
+    extras = PROJECT["optional-dependencies"]
+    bounds = list(dict.fromkeys([*PROJECT["dependencies"], *extras["plots"], *extras["edition"]]))
     script = (ROOT / ".ci/run").read_text()
     lowest = script[script.index("lowest() {") : script.index("# run_wheel")]
     python = sys.executable if sys.version_info[:2] == (3, 11) else "python3.11"
@@ -114,7 +115,7 @@ def test_lower_bounds_are_what_the_landing_script_installs() -> None:
         cwd=ROOT, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert done.stdout.split() == [each.replace(">=", "==") for each in bounds]
-    assert all(re.fullmatch(r"\w+==[\d.]+", each) for each in done.stdout.split())
+    assert all(re.fullmatch(r"[\w-]+==[\d.]+", each) for each in done.stdout.split())
     assert not re.search(r"(numpy|scipy|mpmath|matplotlib)[=><]", script)
 
 

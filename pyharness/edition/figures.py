@@ -3,7 +3,12 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from pyharness.history.figures import FigureFinding, figure_picture, findings, together_picture
+from pyharness.history.figures import (
+    FigureFinding,
+    figure_picture,
+    findings,
+    together_picture,
+)
 from pyharness.views.pictures import saved
 
 

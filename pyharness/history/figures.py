@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SETS = {"original": original, "corrected": corrected}
 ENDINGS = ("svg", "png", "csv")
+_NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
 # Told apart without colour: by dash, width and marker, and by where the markers stand.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
@@ -33,6 +34,7 @@ _STYLES = {
 }
 _STYLE = ("color", "linestyle", "linewidth", "marker", "markevery")
 _MARKERS: dict[str, Any] = {"markersize": 5.5, "markerfacecolor": "white", "markeredgewidth": 1.1}
+_CORRECTED: dict[str, Any] = {"color": "#b06000", "marker": "v", "markevery": (4, 15)}
 _END: dict[str, Any] = {
     "color": "black", "marker": "X", "markersize": 9, "markeredgecolor": "white",
     "linestyle": "none", "zorder": 5, "clip_on": False,
@@ -187,7 +189,7 @@ def curve_numbers(finding: FigureFinding) -> Table:
             [*map(_from_zero, (run.time, run.recorded_time)), _from_zero(run.omega, start)]
         )
         rows += [[*name, *row] for row in table.tolist()]
-    return numbers("curve listing time recorded_time omega1 omega2 omega3", rows)
+    return numbers(_NUMBERS, rows)
 
 
 def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
@@ -229,35 +231,35 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
 
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
-    """Draw omega1 of a figure, original and corrected, over the reference and the limit.
+    """Draw omega1 of a figure that has a limit, original and corrected, over the reference.
 
-    Where the original ends, its limit says where it would have gone.
+    Where the original ends, its limit says where it would have gone. Of the corrected programs
+    the last is drawn: the others would draw the same line again.
     """
     from matplotlib.figure import Figure
 
+    second = replace(second, curves=second.curves[-1:])
+    assert first.limit is not None
     figure = Figure(figsize=(7.2, 4.2), dpi=110, layout="constrained")
     axes = figure.subplots()
     truth, start = first.reference, np.array(first.scene.omega)
     time = _from_zero(truth.time)
-    axes.plot(time, _from_zero(truth.omega, start)[:, 0], label="reference", **_REFERENCE)
-    if first.limit is not None:
-        name, omega = first.limit
-        axes.plot(time, _from_zero(omega, start)[:, 0], label=name, **_LIMIT)
+    for (label, omega), style in (
+        (("reference", truth.omega), _REFERENCE), (first.limit, _LIMIT),
+    ):  # fmt: skip
+        axes.plot(time, _from_zero(omega, start)[:, 0], label=label, **style)
     bottom, top = _frame(first, 0)
-    for finding in (first, second):
-        # Corrected, the programs that were right before would draw the same line again.
-        curves = finding.curves if finding is first else finding.curves[-1:]
-        for curve in curves:
-            _draw(axes, curve, start, 0, bottom, top)
+    for finding, other in ((first, {}), (second, _CORRECTED)):
+        for curve in finding.curves:
+            _draw(axes, curve, start, 0, bottom, top, **other)
             line = axes.lines[-2 if curve.ending else -1]
             line.set_label(f"{curve.label}, {finding.plan.set}")
-            if finding is not first:
-                line.set(color="#b06000", marker="v", markevery=(4, 15))
     axes.set(ylim=(bottom, top), xlim=(0.0, time[-1]), xlabel="time (s)")
     axes.set_ylabel("$\\omega_1$ (rad/s)")
     axes.grid(visible=True, linewidth=0.3)
     figure.legend(loc="outside lower center", ncols=2, handlelength=5.0, frameon=False)
-    return Picture(figure, curve_numbers(first))
+    own = [row for row in curve_numbers(second).rows if row[1]]
+    return Picture(figure, numbers(_NUMBERS, [*curve_numbers(first).rows, *own]))
 
 
 def _heading(finding: FigureFinding) -> str:
@@ -269,14 +271,16 @@ def _heading(finding: FigureFinding) -> str:
     return "\n".join([title, *textwrap.wrap(plan.caption, 98), note])
 
 
-def _draw(axes: "Axes", curve: Curve, start: Array, row: int, bottom: float, top: float) -> None:
+def _draw(
+    axes: "Axes", curve: Curve, start: Array, row: int, bottom: float, top: float, **other: Any
+) -> None:
     run = curve.trajectory
     time, omega = _from_zero(run.time), _from_zero(run.omega, start)
     style: dict[str, Any] = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
     height = top - bottom
     # Far outside the frame a renderer loses its way: there the curve may be anywhere.
     shown = np.clip(omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
-    axes.plot(time, shown, label=curve.label, zorder=3, **style, **_MARKERS)
+    axes.plot(time, shown, label=curve.label, zorder=3, **style | _MARKERS | other)
     if curve.ending and len(run.time):
         axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
 

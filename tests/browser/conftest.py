@@ -1,5 +1,6 @@
 """A browser, and the site as files: no network, no server."""
 
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,15 +14,26 @@ _SWITCHES = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 )  # fmt: skip
 
+# On the PATH, or where GitHub's machines have them.
+_BROWSERS = (
+    "chromium", "google-chrome", "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+)  # fmt: skip
+_DRIVERS = ("chromedriver", os.path.join(os.environ.get("CHROMEWEBDRIVER", ""), "chromedriver"))
+
+
+def _first(names: tuple[str, ...]) -> str | None:
+    return next((found for name in names if (found := shutil.which(name))), None)
+
 
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
-    """Return Chromium without a window; tests are skipped where there is none."""
-    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    """Return Chromium without a window; tests are skipped where there is none, and fail in CI."""
+    chromium, driver = _first(_BROWSERS), _first(_DRIVERS)
     if chromium is None or driver is None:
-        pytest.skip(
-            "no chromium and chromedriver on the PATH: the pages are not tried in a browser"
-        )
+        told = "no chromium and chromedriver on the PATH: the pages are not tried in a browser"
+        if os.environ.get("PYHARNESS_BROWSER") == "required":
+            pytest.fail(told)
+        pytest.skip(told)
     options = ChromeOptions()
     options.binary_location = chromium
     profile = tmp_path_factory.mktemp("profile")

@@ -25,10 +25,10 @@ export class Charts {
   // Show an experiment.
   show(found) {
     this.shown = found;
-    const data = { omega: omegaData(found), error: errorData(found) };
+    this.data = { omega: omegaData(found), error: errorData(found) };
     for (const name of ["omega", "error"]) {
-      if (this.drawn[name]) this.drawn[name].setData(data[name]);
-      else this.drawn[name] = this.made(name, data[name]);
+      if (this.drawn[name]) this.drawn[name].setData(this.data[name]);
+      else this.drawn[name] = this.made(name);
     }
   }
 
@@ -57,7 +57,7 @@ export class Charts {
     }
   }
 
-  made(name, data) {
+  made(name) {
     const place = this.places[name];
     const options = {
       width: place.clientWidth,
@@ -69,7 +69,7 @@ export class Charts {
       legend: { show: false },
       cursor: { drag: { x: true, y: false } },
     };
-    return new uPlot(options, data, place);
+    return new uPlot(options, this.data[name], place);
   }
 
   series(name) {
@@ -87,7 +87,7 @@ export class Charts {
   // The numbers at the pointer.
   tell(chart) {
     const n = chart.cursor.idx;
-    const [time, ...columns] = omegaData(this.shown);
+    const [time, ...columns] = this.data.omega;
     if (n === null || n === undefined || n >= time.length) {
       this.readout.textContent = "";
       return;

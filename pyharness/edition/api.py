@@ -5,8 +5,10 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from markupsafe import Markup
+
 import pyharness
-from pyharness.edition.markdown import Markup, inline
+from pyharness.edition.markdown import inline
 
 
 class Item(NamedTuple):
@@ -40,19 +42,17 @@ def _entry(name: str, of: Any, of_class: str = "") -> Entry:
 
     told = parse(inspect.getdoc(of) or "", DocstringStyle.NUMPYDOC)
     groups: dict[str, list[Item]] = {}
-    for each in told.params:
-        title = {"attribute": "Attributes"}.get(each.args[0], "Parameters")
-        groups.setdefault(title, []).append(
-            Item(each.arg_name, each.type_name or "", _line(each.description))
-        )
-    for each in told.many_returns:
-        groups.setdefault("Returns", []).append(
-            Item(each.return_name or "", each.type_name or "", _line(each.description))
-        )
-    for each in told.raises:
-        groups.setdefault("Raises", []).append(
-            Item("", each.type_name or "", _line(each.description))
-        )
+
+    def add(title: str, name: str | None, type: str | None, text: str | None) -> None:
+        groups.setdefault(title, []).append(Item(name or "", type or "", _line(text)))
+
+    for param in told.params:
+        title = "Attributes" if param.args[0] == "attribute" else "Parameters"
+        add(title, param.arg_name, param.type_name, param.description)
+    for result in told.many_returns:
+        add("Returns", result.return_name, result.type_name, result.description)
+    for error in told.raises:
+        add("Raises", None, error.type_name, error.description)
     return Entry(
         name,
         f"{of_class}.{name}" if of_class else name,

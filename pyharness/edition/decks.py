@@ -1,4 +1,4 @@
-"""The listing card by card, for its pages: scan, card, port, twin, and the apparatus beside them."""
+"""The listing card by card, for its pages: scan, card, port, twin, and the apparatus beside."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -59,7 +59,7 @@ def card_views(program: str) -> list[CardView]:
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
     """Return the number of cards by kind of their entries, those with a say first."""
-    counts = {kind: 0 for kind in _ORDER}
+    counts = dict.fromkeys(_ORDER, 0)
     for view in views:
         for kind in view.kinds:
             counts[kind] += 1

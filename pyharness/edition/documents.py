@@ -2,6 +2,7 @@
 
 import posixpath
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from pyharness.edition.markdown import Document, document
@@ -17,7 +18,7 @@ def documents() -> Iterator[tuple[str, Document]]:
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         text = file.read_text(encoding="utf-8")
-        yield page_of(name), document(text, lambda target, name=name: _link(name, target))
+        yield page_of(name), document(text, partial(_link, name))
 
 
 def page_of(name: str) -> str:
@@ -48,6 +49,8 @@ def _link(name: str, target: str) -> str | None:
 
 def _exists(name: str) -> bool:
     file = Path(name)
-    return file.suffix in (".md", *_PICTURES) and not name.startswith("..") and (
-        shipped("docs") / file
-    ).exists()
+    return (
+        file.suffix in (".md", *_PICTURES)
+        and not name.startswith("..")
+        and (shipped("docs") / file).exists()
+    )

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from markupsafe import Markup, escape
@@ -47,6 +48,8 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     _anchor(tokens)
     title = tokens[1].content
     html = _parser().renderer.render(tokens[3:], _parser().options, {})
+    # An empty corner is no head of a column.
+    html = html.replace("<th></th>", "<td></td>")
     return Document(_plain(title), Markup(html), list(_parts(tokens)))
 
 
@@ -62,13 +65,6 @@ def formula(tex: str, display: bool = False) -> Markup:
     return Markup(convert(tex, display="block" if display else "inline"))
 
 
-def scrolling(html: str, label: str) -> Markup:
-    """Wrap what may be wider than the page; it scrolls by keyboard too."""
-    return Markup('<div class="wide" role="region" tabindex="0" aria-label="{}">{}</div>').format(
-        label, Markup(html)
-    )
-
-
 @cache
 def _parser() -> "MarkdownIt":
     from markdown_it import MarkdownIt
@@ -81,8 +77,10 @@ def _parser() -> "MarkdownIt":
         allow_space=False,
         renderer=lambda tex, options: formula(tex, options["display_mode"]),
     )
-    rules: Any = parser.renderer.rules
-    rules["table_open"] = lambda *_: _OPEN.format("table") + "<table>\n"
+    renderer: Any = parser.renderer
+    rules = renderer.rules
+    # What may be wider than the page scrolls by itself, by keyboard too.
+    rules["table_open"] = lambda *_: f"{_OPEN}<table>\n"
     rules["table_close"] = lambda *_: "</table></div>\n"
     rules["math_block"] = _block
     for kind in ("fence", "code_block"):
@@ -90,7 +88,7 @@ def _parser() -> "MarkdownIt":
     return parser
 
 
-_OPEN = '<div class="wide" role="region" tabindex="0" aria-label="{}">'
+_OPEN = '<div class="wide" role="group" tabindex="0" aria-label="table">'
 
 
 def _block(tokens: Sequence["Token"], index: int, *_: Any) -> str:
@@ -102,7 +100,7 @@ def _code(tokens: Sequence["Token"], index: int, *_: Any) -> str:
     language = escape(token.info or "text")
     text = escape(token.content)
     return (
-        f'<pre class="code language-{language}" role="region" tabindex="0" '
+        f'<pre class="code language-{language}" role="group" tabindex="0" '
         f'aria-label="{language}"><code>{text}</code></pre>\n'
     )
 
@@ -116,7 +114,7 @@ def _all(tokens: Sequence["Token"]) -> Iterator["Token"]:
 def _anchor(tokens: Sequence["Token"]) -> None:
     """Name headings as GitHub does: links between documents hold here too."""
     seen: dict[str, int] = {}
-    for opening, content in zip(tokens, tokens[1:], strict=False):
+    for opening, content in pairwise(tokens):
         if opening.type == "heading_open":
             name = slug(_plain(content.content))
             count = seen[name] = seen.get(name, -1) + 1
@@ -134,7 +132,8 @@ def _plain(text: str) -> str:
 
 
 def _parts(tokens: Sequence["Token"]) -> Iterator[Part]:
-    anchor, title, text = "", "", []
+    anchor, title = "", ""
+    text: list[str] = []
     for index, token in enumerate(tokens):
         if token.type == "heading_open":
             if title:

@@ -5,7 +5,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from pyharness.model.records import build_record
-from pyharness.model.report import Column, Report, Table, digits, words
+from pyharness.model.report import Column, Report, Section, Table, digits, words
 
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
@@ -22,5 +22,5 @@ def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
         files = {name: len(each) for name, each in content.items()}
         return {"folder": folder, "files": files, "build": build_record()}
 
-    text = [[Table(_KINDS, rows)], [f"Open {folder}/index.html in a browser."]]
+    text: list[Section] = [[Table(_KINDS, rows)], [f"Open {folder}/index.html in a browser."]]
     return Report("edition", text, record)

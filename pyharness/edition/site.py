@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.edition import api, decks, documents, figures, laboratory, ledger
 from pyharness.edition.bundle import bundle
-from pyharness.edition.markdown import formula, inline
+from pyharness.edition.markdown import formula
+from pyharness.history.claims.report import written
 from pyharness.history.tei import tei_document
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
@@ -93,9 +94,7 @@ def check_libraries() -> None:
         import matplotlib  # noqa: F401
         import mdit_py_plugins  # noqa: F401
     except ImportError as error:
-        raise InputError(
-            f"edition needs {error.name}: 'pip install pyharness[edition]'"
-        ) from None
+        raise InputError(f"edition needs {error.name}: 'pip install pyharness[edition]'") from None
 
 
 def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) -> Iterator[Page]:
@@ -156,8 +155,7 @@ def _documents() -> Iterator[Page]:
     listed = []
     for path, each in documents.documents():
         found = [
-            Found(f"{path}#{part.anchor}", part.title, "document", part.text)
-            for part in each.parts
+            Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
         ]
         listed.append((path, each.title, len(each.parts)))
         yield Page(path, each.title, "document.html", {"document": each}, found,
@@ -219,6 +217,6 @@ def _templates() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    templates.filters["inline"] = inline
+    templates.filters["number"] = written
     templates.globals["formula"] = formula
     return templates

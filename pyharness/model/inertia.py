@@ -45,7 +45,7 @@ def principal_axes(inertia: Matrix | tuple[()]) -> tuple[Triple, Array]:
     """
     matrix = np.array(inertia)
     # A power of two, so that no digit changes and nothing leaves the range of numbers.
-    unit = math.ldexp(1.0, math.frexp(np.abs(matrix).max())[1])
+    unit = math.ldexp(1.0, math.frexp(np.abs(matrix).max())[1] - 1)
     moments, axes = np.linalg.eigh(matrix / unit)
     order: list[int] = []
     for row in np.abs(axes):
@@ -54,5 +54,5 @@ def principal_axes(inertia: Matrix | tuple[()]) -> tuple[Triple, Array]:
     axes *= np.where(np.diag(axes) < 0.0, -1.0, 1.0)
     if np.linalg.det(axes) < 0.0:
         axes[:, np.argmin(np.abs(np.diag(axes)))] *= -1.0
-    first, second, third = (float(x) for x in moments[order] * unit)
+    first, second, third = (float(x) * unit for x in moments[order])
     return (first, second, third), axes

@@ -23,7 +23,7 @@ def table(given: Table, label: str = "table", links: Mapping[str, str] | None = 
     """
     (head, *rows), columns = given.written(), given.columns
     lines = [
-        f'<div class="wide" role="region" tabindex="0" aria-label="{escape(label)}">',
+        f'<div class="wide" role="group" tabindex="0" aria-label="{escape(label)}">',
         '<table class="numbers">',
         "<thead><tr>",
         *(_cell("th", text, each.left) for text, each in zip(head, columns, strict=True)),

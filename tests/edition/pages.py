@@ -31,6 +31,7 @@ class Read(HTMLParser):
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keep an element."""
         found = dict(attrs)
         self.elements.append((tag, found))
         if found.get("id") is not None:
@@ -40,14 +41,13 @@ class Read(HTMLParser):
             self.targets.append(Target(tag, unquote(path), unquote(anchor)))
 
     def handle_data(self, data: str) -> None:
+        """Keep a text."""
         self.text.append(data)
 
 
 def pages(site: dict[str, bytes]) -> dict[str, Read]:
     """Read every page of a site."""
-    return {
-        name: Read(each.decode()) for name, each in site.items() if name.endswith(".html")
-    }
+    return {name: Read(each.decode()) for name, each in site.items() if name.endswith(".html")}
 
 
 def dead(site: dict[str, bytes]) -> Iterator[str]:
@@ -62,6 +62,10 @@ def dead(site: dict[str, bytes]) -> Iterator[str]:
             if target not in site:
                 yield f"{name}: {element} {path}"
             # The laboratory's anchor is a state.
-            elif anchor and target in read and target != "laboratory.html":
-                if anchor not in read[target].anchors:
-                    yield f"{name}: {element} {path}#{anchor}"
+            elif (
+                anchor
+                and target in read
+                and target != "laboratory.html"
+                and anchor not in read[target].anchors
+            ):
+                yield f"{name}: {element} {path}#{anchor}"

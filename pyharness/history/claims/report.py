@@ -58,7 +58,7 @@ def explanation(judgement: Judgement) -> Report:
     for title, outcome in (("original", judgement.original), ("corrected", judgement.corrected)):
         width = max(map(len, outcome.numbers), default=0)
         numbers = outcome.numbers.items()
-        lines = [Line(f"  {name.ljust(width)}  {_number(x)}") for name, x in numbers]
+        lines = [Line(f"  {name.ljust(width)}  {written(x)}") for name, x in numbers]
         text.append([Line(f"{title}: {outcome.verdict}"), *lines])
     if judgement.survivals:
         lines = [Line("without its assumptions (original, corrected):")]
@@ -122,7 +122,8 @@ def _hangs_on(judgement: Judgement) -> list[str]:
     return list(dict.fromkeys("omega(0)" if x.startswith("omega") else x for x in turning))
 
 
-def _number(x: float) -> str:
+def written(x: float) -> str:
+    """Return a number of a claim as people read it."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

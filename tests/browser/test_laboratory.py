@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from selenium.webdriver import Chrome, Keys
+from selenium.webdriver import ActionChains, Chrome, Keys
 from selenium.webdriver.common.by import By
 
 from pyharness import case_scene, run_program
@@ -111,6 +111,32 @@ def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> Non
         time.sleep(0.02)
     assert "Stopped at step 25" in _text(browser, "status")
     assert browser.find_element(By.ID, "stop-test").is_displayed()
+
+
+def test_the_link_that_skips_the_menu_leaves_the_state(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=5&program=two-term&listing=corrected")
+    told = _text(browser, "status")
+    _click(browser, "a.skip")
+    assert browser.current_url.endswith("#main")
+    time.sleep(0.1)
+    assert _text(browser, "status") == told
+    assert _text(browser, "problems") == ""
+
+
+def test_components_can_be_hidden_and_the_pointer_tells_numbers(
+    browser: Chrome, laboratory: Open
+) -> None:
+    laboratory("")
+    draw = "return document.querySelector('canvas').toDataURL()"
+    before = browser.execute_script(draw)
+    _click(browser, "input[name=component]:nth-of-type(1)")
+    assert browser.execute_async_script(
+        "const done = arguments[0]; requestAnimationFrame(() => done(true))"
+    )
+    assert browser.execute_script(draw) != before
+    over = browser.find_element(By.CSS_SELECTOR, "#omega-chart .u-over")
+    ActionChains(browser).move_to_element(over).perform()
+    assert re.match(r"0\.\d+ s: U1 .*\(solution ", _text(browser, "readout"))
 
 
 def test_controls_make_the_address_that_restores_them(browser: Chrome, laboratory: Open) -> None:

@@ -4,7 +4,9 @@
 // components are shown, is the page's too, for who has no mouse.
 
 const COMPONENTS = ["U1", "U2", "U3"];
-const HEIGHT = { omega: 300, error: 220 };
+// In pixels, where a chart is narrow and where it is wide.
+const HEIGHTS = { omega: [280, 360], error: [200, 250] };
+const WIDE = 600;
 // A run that leaves the solution is shown as far beyond it as the solution's own size; its error as
 // far as this many times that.
 const FARTHEST_ERROR = 100;
@@ -25,10 +27,10 @@ export class Charts {
   // Show an experiment.
   show(found) {
     this.shown = found;
-    const data = { omega: omegaData(found), error: errorData(found) };
+    this.data = { omega: omegaData(found), error: errorData(found) };
     for (const name of ["omega", "error"]) {
-      if (this.drawn[name]) this.drawn[name].setData(data[name]);
-      else this.drawn[name] = this.made(name, data[name]);
+      if (this.drawn[name]) this.drawn[name].setData(this.data[name]);
+      else this.drawn[name] = this.made(name);
     }
   }
 
@@ -52,16 +54,19 @@ export class Charts {
 
   resize() {
     for (const [name, chart] of Object.entries(this.drawn)) {
-      const width = this.places[name].clientWidth;
-      if (width > 0 && width !== chart.width) chart.setSize({ width, height: HEIGHT[name] });
+      const size = this.sizeOf(name);
+      if (size.width > 0 && size.width !== chart.width) chart.setSize(size);
     }
   }
 
-  made(name, data) {
-    const place = this.places[name];
+  sizeOf(name) {
+    const width = this.places[name].clientWidth;
+    return { width, height: HEIGHTS[name][width < WIDE ? 0 : 1] };
+  }
+
+  made(name) {
     const options = {
-      width: place.clientWidth,
-      height: HEIGHT[name],
+      ...this.sizeOf(name),
       scales: { x: { time: false }, y: this.scale(name) },
       axes: [axis(), name === "error" ? logarithmic(axis()) : { ...axis(), size: 56, values: labels }],
       series: [{}, ...this.series(name)],
@@ -69,7 +74,7 @@ export class Charts {
       legend: { show: false },
       cursor: { drag: { x: true, y: false } },
     };
-    return new uPlot(options, data, place);
+    return new uPlot(options, this.data[name], this.places[name]);
   }
 
   series(name) {
@@ -87,7 +92,7 @@ export class Charts {
   // The numbers at the pointer.
   tell(chart) {
     const n = chart.cursor.idx;
-    const [time, ...columns] = omegaData(this.shown);
+    const [time, ...columns] = this.data.omega;
     if (n === null || n === undefined || n >= time.length) {
       this.readout.textContent = "";
       return;

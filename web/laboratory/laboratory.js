@@ -47,6 +47,7 @@ function show(next, problems = []) {
     found.run,
   );
   charts.show(found);
+  element("copied").textContent = "";
   element("command").textContent = commandOf(data, state);
   element("address").href = `#${fragmentOf(data, state)}`;
   showRows();
@@ -122,7 +123,9 @@ function onChange(id, taken) {
 }
 
 function fromAddress() {
-  const { state: asked, problems } = stateFrom(data, location.hash);
+  // The link that skips the menu names a place of the page, and no state.
+  const words = location.hash === "#main" ? fragmentOf(data, state) : location.hash;
+  const { state: asked, problems } = stateFrom(data, words);
   show(asked, problems);
 }
 
@@ -157,9 +160,9 @@ for (const button of all("button.copy")) {
   button.addEventListener("click", async () => {
     try {
       await navigator.clipboard.writeText(of.href ?? of.textContent);
-      element("status").textContent = "Copied.";
+      element("copied").textContent = "copied";
     } catch {
-      element("problems").textContent = "the browser allows no copying from here";
+      element("copied").textContent = "the browser allows no copying from here";
     }
   });
 }

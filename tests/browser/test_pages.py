@@ -85,7 +85,7 @@ def test_what_is_wrong_is_found(browser: Chrome, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     page.write_text(
         "<!doctype html><html><title>t</title><body><main><h1>t</h1><input>"
-        "<p style='color:#ccc'>a</p><div style='width:3000px'>b</div>"
+        "<p style='color:#ccc'>a few words</p><div style='width:3000px'>b</div>"
         "<script>nothing()</script></main>"
     )
     errors(browser)

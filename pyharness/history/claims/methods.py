@@ -266,6 +266,24 @@ def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]
     return graded(numbers, all(worse), any(worse), FALSE)
 
 
+def all_succeed(
+    lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float
+) -> Judged:
+    """Measure the error of every weighting over the largest omega."""
+    if lab.is_original:
+        return Judged(NOT_TESTABLE, {})
+    numbers = {
+        f"{weighting}: largest error over the largest omega": max(
+            _error(lab, case, Member(weighting, n)) / largest(lab.truth(case))
+            for case in cases
+            for n in terms
+        )
+        for weighting in WEIGHTINGS
+    }
+    good = [each <= share for each in numbers.values()]
+    return graded(numbers, all(good), any(good), FALSE)
+
+
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Hold the corrected programs against one prediction and one correction of the family."""
     best = Laboratory(False, lab.assumptions)

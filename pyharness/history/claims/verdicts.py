@@ -103,6 +103,13 @@ def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
     return graded(numbers, all(low <= each <= high for each in numbers.values()))
 
 
+def poor(lab: Laboratory, case: int, share: float) -> Judged:
+    """Measure the Runge-Kutta program's largest error as a part of the amplitude."""
+    amplitude = float(ranges(lab.truth(case)).max()) / 2.0
+    found = lab.error("runge-kutta", case) / amplitude
+    return graded({"largest error over the amplitude": found}, found > share)
+
+
 def error_constant(lab: Laboratory, case: int) -> Judged:
     """Hold the error at the end of the run against that at its beginning."""
     truth = lab.truth(case).omega

@@ -176,7 +176,7 @@ def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
 ) -> None:
     laboratory("#case=7&program=two-term&listing=original")
     unnamed = (
-        "return [...document.querySelectorAll('#controls :is(input, select)')]"
+        "return [...document.querySelectorAll('.controls :is(input, select)')]"
         ".filter((x) => x.labels.length === 0).map((x) => x.id)"
     )
     assert browser.execute_script(unnamed) == []

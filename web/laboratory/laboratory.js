@@ -166,11 +166,10 @@ for (const button of all("button.copy")) {
     }
   });
 }
-element("controls").addEventListener("submit", (event) => event.preventDefault());
 element("reset").addEventListener("click", () => change(defaultState(data)));
 element("numbers").addEventListener("toggle", showRows);
 window.addEventListener("hashchange", fromAddress);
 document.addEventListener("themechange", () => charts.recolour());
 
-for (const id of ["controls", "charts"]) element(id).hidden = false;
+for (const block of [...all(".controls"), element("charts")]) block.hidden = false;
 fromAddress();

@@ -203,17 +203,25 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 
 
 def check_tree(path: str, mark: str, option: str) -> None:
-    """Refuse a folder that `write_tree` may not make anew, before anything is computed for it."""
+    """Refuse a folder that `write_tree` may not make anew, before anything is computed for it.
+
+    A folder that is empty, or has the file `mark` in it, may be.
+    """
     check_folder(path, (), option)
-    folder = Path(path)
+    folder = Path(os.path.realpath(path))
     try:
         if folder.is_dir() and not (folder / mark).is_file() and any(folder.iterdir()):
             raise InputError(
-                f"{option} '{path}': is neither empty nor has a '{mark}' of before; "
-                "give a new name, or the folder that was made before"
+                f"{option} '{path}': is neither empty nor made by this verb, which would leave a "
+                f"'{mark}' in it; give a new name"
             )
     except OSError as error:
         raise InputError(f"{option} '{path}': {error.strerror or error}") from None
+    if not os.access(folder.parent, os.W_OK):
+        raise InputError(
+            f"{option} '{path}': can't be written in '{folder.parent}'; "
+            "give a folder in one that can be written"
+        )
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:

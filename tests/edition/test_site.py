@@ -194,3 +194,49 @@ def test_headings_are_named_as_on_github() -> None:
         ("which-one-now-1", "Which one now", "b c d"),
     ]
     assert 'id="which-one-now-1"' in found.html
+
+
+def test_what_data_say_is_text() -> None:
+    page = site._templates().from_string("{{ told }} {{ number | number }}")
+    assert page.render(told="<b> & c", number=0.25) == "&lt;b&gt; &amp; c 0.25"
+
+
+def test_the_api_has_what_docstrings_say() -> None:
+    found = {each.name: each for each in api.entries()}
+    (title, attributes), *_ = found["Trajectory"].groups
+    assert title == "Attributes"
+    assert attributes[0].name == "time"
+    assert [title for title, _ in found["solve"].groups] == ["Parameters", "Returns", "Raises"]
+    assert "times: " in found["solve"].signature
+    assert "numpy" not in found["solve"].signature
+    methods = {each.name: each for each in found["Scene"].methods}
+    assert methods["times"].anchor == "Scene.times"
+    assert (methods["is_impossible"].kind, methods["is_impossible"].signature) == ("property", "")
+
+
+def test_a_page_says_under_which_entry_of_the_menu_it_is(built_site: dict[str, bytes]) -> None:
+    for name, entry in (
+        ("listing/two-term.html", "listing/index.html"),
+        ("docs/words.html", "docs/index.html"),
+        ("docs/findings.html", "docs/findings.html"),
+    ):
+        current = re.findall(r'href="\.\./([^"]*)" aria-current="(\w+)"', built_site[name].decode())
+        assert current == [(entry, "page" if entry == name else "true")]
+
+
+def test_verdicts_are_counted_for_both() -> None:
+    from pyharness.edition.ledger import counts, judgements
+
+    judged = [each for each in judgements() if each.claim["id"].startswith("v2-case-2")]
+    found = counts(judged)
+    assert found["reproduced"] == (5, 3)
+    assert sum(first for first, _ in found.values()) == len(judged)
+    assert sum(second for _, second in found.values()) == len(judged)
+
+
+def test_pictures_and_licences_are_beside_the_pages(built_site: dict[str, bytes]) -> None:
+    assert b"MIT" in built_site["assets/uplot-LICENSE.txt"]
+    assert "docs/atlas/history.png" in built_site
+    assert "docs/atlas/README.html" in built_site
+    # What is not on the site is named, and no link.
+    assert b'href="../../tests' not in built_site["docs/atlas/history.html"]

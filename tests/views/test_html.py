@@ -1,6 +1,6 @@
 """Reports as HTML: nothing of a text is taken for markup, and lines stay together."""
 
-from pyharness.model.report import Column, Field, Line, Report, Table, words
+from pyharness.model.report import Column, Field, Line, Report, Section, Table, words
 from pyharness.views import html
 from pyharness.views.render import render
 
@@ -17,7 +17,7 @@ def test_a_table_has_heads_and_cells_as_people_read_them() -> None:
 
 
 def test_sections_keep_lines_and_fields_together() -> None:
-    text = [
+    text: list[Section] = [
         ["one <i>", Line("  a  b"), Line("c"), "two"],
         [],
         [Field("says  ", "x > y"), Field("rule  ", "z"), TABLE],

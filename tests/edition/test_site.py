@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from pyharness.edition import api, decks, site
+from pyharness.edition import api, decks, documents, site
 from pyharness.edition.markdown import document
 from pyharness.history.ablation import entries
 from pyharness.history.claims.ledger import claims
@@ -240,3 +240,19 @@ def test_pictures_and_licences_are_beside_the_pages(built_site: dict[str, bytes]
     assert "docs/atlas/README.html" in built_site
     # What is not on the site is named, and no link.
     assert b'href="../../tests' not in built_site["docs/atlas/history.html"]
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "found"),
+    [
+        ("atlas/README.md", "../findings.md#what-is-true", "../findings.html#what-is-true"),
+        ("methods.md", "figures/growth.svg", "figures/growth.svg"),
+        ("methods.md", "../README.md", None),
+        ("methods.md", "missing.md", None),
+        ("methods.md", "space-torque.toml", None),
+        ("methods.md", "#which-one", "#which-one"),
+        ("methods.md", "https://example.org/a.md", "https://example.org/a.md"),
+    ],
+)
+def test_links_of_documents(name: str, target: str, found: str | None) -> None:
+    assert documents._link(name, target) == found

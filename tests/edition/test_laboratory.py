@@ -20,6 +20,7 @@ from pyharness.compare.random_scenes import draw
 from pyharness.edition.laboratory import MOST_STEPS, context, data
 from pyharness.methods.solve import solve
 from pyharness.model.listing import PROGRAMS, names_of, subset
+from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.printer import page
@@ -241,6 +242,15 @@ def test_the_reference_is_the_decimal_one_to_rounding() -> None:
         assert error < 1e-15 * max(1.0, growth), (scene, error)
 
 
+def test_rounding_of_the_reference_does_not_add_up() -> None:
+    scenes = [replace(case_scene(number), steps=MOST_STEPS) for number in (2, 3, 4)]
+    given = [{"scene": asked_scene(scene), "times": scene.times()} for scene in scenes]
+    body = "return given.map(({ scene, times }) => R.reference(scene, times));"
+    for scene, rows in zip(scenes, ask(body, given), strict=True):
+        truth = reference(scene, scene.times()).omega
+        assert np.abs(np.array(rows) - truth).max() < 1e-15 * np.abs(truth).max()
+
+
 def test_a_reference_that_would_take_too_long_or_leaves_every_bound_ends() -> None:
     scenes = [
         replace(case_scene(4), omega=(1e7, 1e7, 1e7)),
@@ -282,12 +292,49 @@ def test_endings_are_told() -> None:
     assert "Stopped" in at_rest
 
 
+def test_a_slope_that_changes_alone_has_no_quotient() -> None:
+    body = """const { state } = S.stateFrom(data, "");
+      const stop = { step: 1, variable: "UV", quotient: Infinity };
+      const scene = E.sceneOf(data, state);
+      return E.ending({ state, scene, run: { ended: "stopped", rows: [], stop } });"""
+    told = "by UV, angular velocity and velocity together: its slope changed and it did not;"
+    assert told in ask(body, None)
+
+
+def test_where_the_solution_ends_there_is_no_error() -> None:
+    body = """const { state } = S.stateFrom(data, given);
+      const { truth, errors } = E.experiment(data, state);
+      return [truth.length, errors.map((row) => row !== null)];"""
+    length, known = ask(body, "case=2&program=two-term&omega0=1e-3,0,2e6")
+    assert 0 < length < len(known)
+    assert known == [n < length for n in range(len(known))]
+
+
+def test_another_program_keeps_the_switches_that_both_have() -> None:
+    body = """const { state } = S.stateFrom(data, given);
+      return ["four-term", "runge-kutta"].map((program) =>
+        S.fragmentOf(data, S.withProgram(data, state, program)));"""
+    four, runge = ask(body, "case=2&program=two-term&fix=dt-accumulates&conjecture=none")
+    end = "listing=original&fix=dt-accumulates&conjecture=none"
+    assert four == f"case=2&program=four-term&{end}"
+    assert runge == "case=2&program=runge-kutta&listing=original&conjecture=none"
+
+
+def test_zero_keeps_its_sign_in_the_address() -> None:
+    body = "return S.fragmentOf(data, S.stateFrom(data, given).state);"
+    assert ask(body, "omega0=-0.0,0,1").endswith("&omega0=-0,0,1")
+
+
 def test_the_page_without_script_has_the_default_state() -> None:
     first = context()["first"]
     assert first["ending"].startswith("Stopped at step 25 by V2")
     assert [row[0] for row in first["rows"]] == ["1", "2", "3", "23", "24", "25"]
     twin = run_program(case_scene(2), subset("runge-kutta"), "python")
     assert float(first["rows"][-1][2]) == twin.omega[-1, 0]
+    truth = reference(case_scene(2), case_scene(2).times()).omega
+    for row in first["rows"]:
+        at = int(row[0]) - 1
+        assert row[-1] == short(float(np.abs(twin.omega[at] - truth[at]).max()))
     assert first["page"] == page(case_scene(2), "runge-kutta", twin)
     assert first["command"] == "pyharness run --case 2 --program runge-kutta --listing original"
 

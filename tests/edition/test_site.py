@@ -8,13 +8,14 @@ import tomllib
 import pytest
 
 from pyharness.edition import api, decks, documents, site
+from pyharness.edition.decks import Run
 from pyharness.edition.markdown import document
 from pyharness.history.ablation import entries
 from pyharness.history.claims.ledger import claims
 from pyharness.history.claims.sentences import sentences
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import deck, tight
+from pyharness.original.cards import Difference, deck, tight
 from tests.edition.pages import dead, pages
 
 
@@ -107,6 +108,13 @@ def test_marks_stand_where_the_scan_differs() -> None:
     assert view.kinds[0] == "defect"
 
 
+def test_a_mark_holds_its_blanks_and_kinds_have_an_order() -> None:
+    runs = decks.marked(" A B CD E", [Difference("BC", "X", "why")])
+    assert runs == [Run(" A "), Run("B C", "why"), Run("D E")]
+    found = decks._kinds(["misreading", "dead code", "defect", "reading", "misreading"])
+    assert found == ["defect", "reading", "dead code", "misreading"]
+
+
 def test_every_claim_entry_and_sentence_is_there(built_site: dict[str, bytes]) -> None:
     read = pages(built_site)
     for page, names in (
@@ -178,7 +186,11 @@ def test_documents_link_to_pages() -> None:
 
 
 def test_formulas_are_mathml_and_html_is_text() -> None:
-    found = document("# T\n\nSo $a_1 < b$ and <b>no</b>, `$x$`.\n\n$$c = d$$\n", lambda _: None)
+    text = (
+        "# T\n\nSo $a_1 < b$ and <b>no</b>, `$x$`.\n\n$$c = d$$\n\n| | n |\n|---|---|\n| a | 1 |\n"
+    )
+    found = document(text, lambda _: None)
+    assert "<td></td>\n<th>n</th>" in found.html  # an empty corner is no head
     assert found.html.count("<math") == 2
     assert 'display="block"' in found.html
     assert "&lt;b&gt;no&lt;/b&gt;" in found.html

@@ -111,8 +111,8 @@ def test_marks_stand_where_the_scan_differs() -> None:
 def test_a_mark_holds_its_blanks_and_kinds_have_an_order() -> None:
     runs = decks.marked(" A B CD E", [Difference("BC", "X", "why")])
     assert runs == [Run(" A "), Run("B C", "why"), Run("D E")]
-    found = decks._kinds(["misreading", "dead code", "defect", "reading", "misreading"])
-    assert found == ["defect", "reading", "dead code", "misreading"]
+    found = decks._kinds(["misreading", "dead code", "missing text", "reading", "misreading"])
+    assert found == ["reading", "missing text", "dead code", "misreading"]
 
 
 def test_every_claim_entry_and_sentence_is_there(built_site: dict[str, bytes]) -> None:

@@ -7,6 +7,8 @@ from markupsafe import Markup
 
 from pyharness.history.ablation import effects_of, entries
 from pyharness.history.apparatus_report import entry_report
+from pyharness.history.claims.evidence import evidence
+from pyharness.history.claims.evidence_report import evidence_report
 from pyharness.history.claims.ledger import Judgement, claims, judge
 from pyharness.history.claims.report import claims_report, explanation
 from pyharness.history.claims.sentences import Sentence, sentences
@@ -41,7 +43,7 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:
-    """Return the ledger as a table, and the story of each claim."""
+    """Return the ledger as a table, the story of each claim, and the evidence that they are."""
     table = claims_report(judged).data
     assert table is not None
     links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
@@ -50,7 +52,11 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
         # The first section is the heading, which the page has as one.
         story = explanation(each).text[1:]
         stories.append((each, Markup(html.sections(story))))
-    return {"table": Markup(html.table(table, "all claims", links)), "stories": stories}
+    return {
+        "table": Markup(html.table(table, "all claims", links)),
+        "stories": stories,
+        "evidence": Markup(html.write(evidence_report(list(evidence())))),
+    }
 
 
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:

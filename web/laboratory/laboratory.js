@@ -170,6 +170,8 @@ element("reset").addEventListener("click", () => change(defaultState(data)));
 element("numbers").addEventListener("toggle", showRows);
 window.addEventListener("hashchange", fromAddress);
 document.addEventListener("themechange", () => charts.recolour());
+// Ink on paper, whatever the screen had.
+matchMedia("print").addEventListener("change", () => charts.recolour());
 
 for (const block of [...all(".controls"), element("charts")]) block.hidden = false;
 fromAddress();

@@ -1,5 +1,6 @@
 """Where results go: a file is there whole or not at all."""
 
+import json
 import os
 import shutil
 import signal
@@ -205,23 +206,39 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str) -> None:
     """Refuse a folder that `write_tree` may not make anew, before anything is computed for it.
 
-    A folder that is empty, or has the file `mark` in it, may be.
+    It may be new or empty, or hold nothing but the `files` that the JSON of the file `mark` in it
+    lists, and that file.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
     try:
-        if folder.is_dir() and not (folder / mark).is_file() and any(folder.iterdir()):
-            raise InputError(
-                f"{option} '{path}': is neither empty nor made by this verb, which would leave a "
-                f"'{mark}' in it; give a new name"
-            )
+        reason = _why_not_anew(folder, mark)
     except OSError as error:
-        raise InputError(f"{option} '{path}': {error.strerror or error}") from None
-    if not os.access(folder.parent, os.W_OK):
-        raise InputError(
-            f"{option} '{path}': can't be written in '{folder.parent}'; "
-            "give a folder in one that can be written"
-        )
+        reason = error.strerror or str(error)
+    if reason:
+        raise InputError(f"{option} '{path}': {reason}; give a new name")
+
+
+def _why_not_anew(folder: Path, mark: str) -> str:
+    """Return why a folder may not be made anew; empty where it may."""
+    if Path.cwd().is_relative_to(folder):
+        return "is the folder that you are in, or one above it"
+    if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
+        return f"can't be made anew in '{folder.parent}'"
+    listed = {mark, *_listed(folder / mark)}
+    for file in sorted(folder.rglob("*")):
+        name = file.relative_to(folder).as_posix()
+        if name not in listed and (file.is_symlink() or not file.is_dir()):
+            return f"holds '{name}', which was not made by this verb"
+    return ""
+
+
+def _listed(mark: Path) -> Iterable[str]:
+    try:
+        files = json.loads(mark.read_bytes())["files"]
+    except (OSError, ValueError, TypeError, KeyError):
+        return ()
+    return files if isinstance(files, dict) else ()
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
@@ -241,13 +258,15 @@ def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
                     patience.check()
                 if folder.is_dir():
                     os.rename(folder, old)
-                os.rename(new, folder)
-            except BaseException:
-                if old.is_dir() and not folder.exists():
-                    os.rename(old, folder)
-                raise
+                try:
+                    os.rename(new, folder)
+                except BaseException:
+                    if old.is_dir():
+                        os.rename(old, folder)
+                    raise
             finally:
-                for left in (new, old):
-                    shutil.rmtree(left, ignore_errors=True)
+                shutil.rmtree(new, ignore_errors=True)
+            # Only now: what stood there is safe until the new has its place.
+            shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         raise InputError(f"{option} '{path}': {error.strerror or error}") from None

@@ -76,6 +76,8 @@ def _methods(owner: str, of: type) -> Iterator[Entry]:
 def _signature(of: Any) -> str:
     try:
         told = str(inspect.signature(of))
+        if inspect.isclass(of):
+            told = re.sub(r" -> \w+$", "", told)
     except (TypeError, ValueError):
         return ""
     # The names alone, and arrays as the sources write them.

@@ -20,7 +20,7 @@ from pyharness.verify.port_protocol import asked_scene
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
 """What the page shows whose address says nothing."""
 MOST_STEPS = 3000
-"""What a page draws without a pause; the decks' 300 steps in a tenth of their length."""
+"""What a page draws without a pause: a tenth of the decks' step over the same 3 s."""
 _KINDS = {
     "defect": "Defects left in",
     "reading": "Readings not adopted",

@@ -6,13 +6,12 @@ from typing import Any, NamedTuple
 from markupsafe import Markup
 
 from pyharness.history.ablation import effects_of, entries
-from pyharness.history.apparatus_report import entry_report
+from pyharness.history.apparatus_report import FIELDS, entry_report
 from pyharness.history.claims.evidence import evidence
 from pyharness.history.claims.evidence_report import evidence_report
 from pyharness.history.claims.ledger import Judgement, claims, judge
 from pyharness.history.claims.report import claims_report, explanation
 from pyharness.history.claims.sentences import Sentence, sentences
-from pyharness.model.report import Field
 from pyharness.views import html
 
 
@@ -21,6 +20,12 @@ class Told(NamedTuple):
 
     sentence: Sentence
     judged: list[Judgement]
+    anchor: str
+
+    @property
+    def statements(self) -> str:
+        """What its claims say."""
+        return " ".join(each.claim["statement"] for each in self.judged)
 
 
 def judgements() -> list[Judgement]:
@@ -64,12 +69,9 @@ def apparatus() -> list[tuple[dict[str, Any], Markup]]:
     found = []
     for entry in entries():
         effects = list(effects_of(entry["id"])) if "flag" in entry else []
-        told = [
-            # The page has the cards as links.
-            [each for each in section if not (isinstance(each, Field) and "cards" in each.label)]
-            for section in entry_report(entry, effects).text[1:]
-        ]
-        found.append((entry, Markup(html.sections(told))))
+        # The page has the cards as links.
+        report = entry_report(entry, effects, [name for name in FIELDS if name != "cards"])
+        found.append((entry, Markup(html.sections(report.text[1:]))))
     return found
 
 
@@ -77,7 +79,8 @@ def thesis(judged: Iterable[Judgement]) -> dict[str, list[Told]]:
     """Return the sentences by the section that they stand in, in the thesis's order."""
     by_name = {each.claim["id"]: each for each in judged}
     found: dict[str, list[Told]] = {}
-    for each in sentences():
+    for number, each in enumerate(sentences(), 1):
         section = each.where.partition(",")[0]
-        found.setdefault(section, []).append(Told(each, [by_name[name] for name in each.claims]))
+        judged_by = [by_name[name] for name in each.claims]
+        found.setdefault(section, []).append(Told(each, judged_by, f"sentence-{number}"))
     return found

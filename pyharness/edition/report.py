@@ -7,6 +7,8 @@ from typing import Any
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Report, Section, Table, digits, words
 
+# A folder that has it was made by `edition`; it lists the files that were written.
+MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 

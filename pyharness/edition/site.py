@@ -8,15 +8,16 @@ import json
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.edition import api, decks, documents, figures, laboratory, ledger
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import formula
+from pyharness.edition.report import MARK
 from pyharness.history.claims.report import written
 from pyharness.history.tei import tei_document
-from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.records import build_record
@@ -25,8 +26,6 @@ from pyharness.views.json import json_text
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-# A folder that has it was made by `edition`, and may be made anew.
-MARK = "edition.json"
 # The menu: title and path, in its order.
 MENU = (
     ("Listing", "listing/index.html"),
@@ -84,19 +83,6 @@ def build_site(progress: Callable[[str], None] = lambda _: None) -> dict[str, by
     return content
 
 
-def check_libraries() -> None:
-    """Refuse to build where what writes the pages is missing."""
-    try:
-        import docstring_parser  # noqa: F401
-        import jinja2  # noqa: F401
-        import latex2mathml  # noqa: F401
-        import markdown_it  # noqa: F401
-        import matplotlib  # noqa: F401
-        import mdit_py_plugins  # noqa: F401
-    except ImportError as error:
-        raise InputError(f"edition needs {error.name}: 'pip install pyharness[edition]'") from None
-
-
 def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) -> Iterator[Page]:
     progress("claims")
     judged = ledger.judgements()
@@ -105,8 +91,23 @@ def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) 
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
     sentences = ledger.thesis(judged)
-    yield Page("thesis.html", "The thesis, executable", "thesis.html", {"sections": sentences})
-    yield Page("figures.html", "Figures 6 to 12", "figures.html", {"figures": drawn})
+    yield Page(
+        "thesis.html", "The thesis, executable", "thesis.html", {"sections": sentences},
+        [
+            Found(f"thesis.html#{told.anchor}", told.sentence.where, "sentence",
+                  f"{told.sentence.quote}: {told.sentence.why or told.statements}")
+            for section in sentences.values()
+            for told in section
+        ],
+    )  # fmt: skip
+    yield Page(
+        "figures.html", "Figures 6 to 12", "figures.html", {"figures": drawn},
+        [
+            Found(f"figures.html#{stem}", f"{each.finding.plan.title}, {each.finding.plan.set}",
+                  "figure", each.finding.plan.caption)
+            for stem, each in drawn.items()
+        ],
+    )  # fmt: skip
     yield Page(
         "claims.html", "Claims", "claims.html", ledger.context(judged),
         [
@@ -168,7 +169,7 @@ def _rendered(page: Page) -> bytes:
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": page.menu or page.path,
-         "build": build_record(), **page.context}
+         "build": build_record(), "digest": _digest(), **page.context}
     )  # fmt: skip
     return html.encode()
 
@@ -204,6 +205,12 @@ def vendor() -> list[dict[str, Any]]:
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]
     return packages
+
+
+@cache
+def _digest() -> str:
+    """Return what names the text of the cards and their apparatus, in a citation."""
+    return sha256(tei_document()).hexdigest()[:12]
 
 
 @cache

@@ -24,7 +24,7 @@ from pyharness.model.report import (
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
 
-_FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "why")
+FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "why")
 _ENTRIES = (*words("name kind certainty flag"), Column("what it is", left=True, fit="wrap"))
 _LISTINGS = ("original", "corrected_alone", "kept_alone", "corrected")
 _EFFECTS = words("case")
@@ -48,11 +48,13 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
     return Report("defects", [[Table(_ENTRIES, rows)], [note]], lambda: {"entries": entries})
 
 
-def entry_report(entry: dict[str, Any], effects: Sequence[CaseEffects]) -> Report:
-    """Report one entry whole, with its effect by program and case."""
+def entry_report(
+    entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
+) -> Report:
+    """Report one entry with these of its `FIELDS`, and its effect by program and case."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     values = {**entry, "cards": cards}
-    fields = [Field(f"{name:10s} ", values[name]) for name in _FIELDS if values.get(name)]
+    fields = [Field(f"{name:10s} ", values[name]) for name in names if values.get(name)]
     text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
     if "original" in entry:
         text.append(_beside(entry, "original", "corrected"))

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from selenium.webdriver import ActionChains, Chrome, Keys
 from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
 
 from pyharness import case_scene, run_program
 from pyharness.model.listing import PROGRAMS, subset
@@ -116,11 +117,31 @@ def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> Non
 def test_the_link_that_skips_the_menu_leaves_the_state(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=5&program=two-term&listing=corrected")
     told = _text(browser, "status")
+    address = browser.current_url
     _click(browser, "a.skip")
-    assert browser.current_url.endswith("#main")
     time.sleep(0.1)
+    assert browser.switch_to.active_element.get_dom_attribute("id") == "main"
+    # What the address names can still be cited.
+    assert browser.current_url == address
+    browser.refresh()
     assert _text(browser, "status") == told
     assert _text(browser, "problems") == ""
+
+
+def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=7&program=runge-kutta&listing=original")
+    browser.find_element(By.ID, "case").click()
+    in_sight = (
+        "const r = document.activeElement.getBoundingClientRect();"
+        "return r.bottom > 0 && r.top < innerHeight"
+    )
+    seen = set()
+    for _ in range(60):
+        browser.switch_to.active_element.send_keys(Keys.TAB)
+        # A page may take its time to scroll.
+        WebDriverWait(browser, 3.0).until(lambda _: browser.execute_script(in_sight))
+        seen.add(browser.execute_script("return document.activeElement.id"))
+    assert {"omega0", "lipschitz", "address", "printer-page"} <= seen
 
 
 def test_components_can_be_hidden_and_the_pointer_tells_numbers(

@@ -22,9 +22,11 @@ def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     features = [{"name": "prefers-color-scheme", "value": scheme}]
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-    yield
-    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    try:
+        yield
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
 def addresses(site: Path) -> list[str]:
@@ -65,8 +67,9 @@ def test_no_page_has_an_error_or_is_wider_than_the_screen(
     with screen(browser, width):
         for address in addresses(site):
             browser.get(address)
-            if (beyond := too_wide(browser)) > 0 or (said := errors(browser)):
-                found[address] = [beyond, said if beyond <= 0 else ""]
+            beyond, said = too_wide(browser), errors(browser)
+            if beyond > 0 or said:
+                found[address] = [beyond, said]
     assert found == {}
 
 
@@ -127,9 +130,16 @@ def test_the_search_finds_a_card_and_keeps_its_words_in_the_address(
     assert browser.current_url.endswith("#q=stage-base")
     browser.get("about:blank")
     browser.get((site / "search.html").as_uri() + "#q=DT%3DDT%2B.01")
+    query = browser.find_element(By.ID, "query")
     links = browser.find_elements(By.CSS_SELECTOR, "#results a")
     found = [str(each.get_dom_attribute("href")) for each in links]
     assert "listing/two-term.html#1660" in found
+    # Another number is another card.
+    browser.execute_script("location.hash = '#q=two-term+1660'")
+    WebDriverWait(browser, 5).until(lambda _: query.get_property("value") == "two-term 1660")
+    links = browser.find_elements(By.CSS_SELECTOR, "#results a")
+    cards = [each.text for each in links if each.text.startswith(("two", "four", "runge"))]
+    assert cards == ["two-term 1660"]
     browser.execute_script("location.hash = '#q=Lipschitz'")
     WebDriverWait(browser, 5).until(
         lambda _: "lipschitz-tests-velocity" in browser.find_element(By.ID, "results").text
@@ -148,7 +158,10 @@ def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> Non
     defects = shown()
     assert "1660" in defects < every
     assert "160" not in defects
-    browser.find_element(By.ID, "kind-all").click()
+    # What an address names is shown, whatever the filter.
+    browser.execute_script("location.hash = '#160'")
+    assert shown() == defects | {"160"}
+    browser.execute_script("document.getElementById('kind-all').click()")
     assert shown() == every
 
 

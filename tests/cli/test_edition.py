@@ -1,8 +1,8 @@
 """Where the pages go: a folder of their own, whole or as it was."""
 
-import builtins
 import json
 import os
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,12 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.edition import site
+from pyharness.edition.libraries import LIBRARIES
+from pyharness.edition.report import MARK
 
 Capture = pytest.CaptureFixture[str]
-FILES = {"index.html": b"<p>", "docs/a.html": b"a", site.MARK: b"{}"}
+LISTED = {"files": {"index.html": 3, "docs/a.html": 1, "docs/old.html": 2}}
+FILES = {"index.html": b"<p>", "docs/a.html": b"a", MARK: json.dumps(LISTED).encode()}
 
 
 @pytest.fixture
@@ -33,7 +36,7 @@ def test_a_folder_is_made_and_made_anew(tmp_path: Path, capsys: Capture) -> None
     assert main(["edition", "--out", str(folder)]) == 0
     assert _there(folder) == FILES
     assert f"Open {folder}/index.html" in capsys.readouterr().out
-    (folder / "old.html").write_bytes(b"of before")
+    (folder / "docs/old.html").write_bytes(b"of before")  # listed, and not made any more
     assert main(["edition", "--out", str(folder), "--format", "json"]) == 0
     assert _there(folder) == FILES
     assert json.loads(capsys.readouterr().out)["files"]["docs/a.html"] == 1
@@ -51,11 +54,40 @@ def test_an_empty_folder_and_a_link_to_one_will_do(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("quick")
-def test_a_folder_of_others_is_left_alone(tmp_path: Path, capsys: Capture) -> None:
-    (tmp_path / "thesis.txt").write_bytes(b"mine")
+@pytest.mark.parametrize("mark", [None, b"", b"[]", b'{"mine": 1}', b'{"files": 3}', b"{}"])
+def test_a_folder_of_others_is_left_alone(
+    tmp_path: Path, capsys: Capture, mark: bytes | None
+) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/thesis.txt").write_bytes(b"mine")
+    if mark is not None:
+        (tmp_path / MARK).write_bytes(mark)
+    before = _there(tmp_path)
     assert main(["edition", "--out", str(tmp_path)]) == 2
-    assert "neither empty nor made by this verb" in capsys.readouterr().err
-    assert _there(tmp_path) == {"thesis.txt": b"mine"}
+    told = "holds 'docs/thesis.txt', which was not made by this verb"
+    assert told in capsys.readouterr().err
+    assert _there(tmp_path) == before
+
+
+@pytest.mark.usefixtures("quick")
+def test_what_was_added_to_the_pages_is_left_alone(tmp_path: Path, capsys: Capture) -> None:
+    folder = tmp_path / "site"
+    assert main(["edition", "--out", str(folder)]) == 0
+    (folder / "CNAME").symlink_to("nowhere")
+    assert main(["edition", "--out", str(folder)]) == 2
+    assert "holds 'CNAME'" in capsys.readouterr().err
+    assert (folder / "CNAME").is_symlink()
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("where", [".", ".."])
+def test_the_folder_that_one_is_in_stays(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert main(["edition", "--out", where]) == 2
+    assert "is the folder that you are in, or one above it" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("quick")
@@ -84,19 +116,15 @@ def test_what_fails_leaves_all_as_it_was(
     assert [each.name for each in tmp_path.iterdir()] == ["site"]
 
 
+@pytest.mark.parametrize("name", LIBRARIES)
 def test_what_writes_pages_may_be_missing(
-    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    real = builtins.__import__
-
-    def without(name: str, *rest: Any) -> object:
-        if name == "latex2mathml":
-            raise ImportError(f"No module named {name!r}", name=name)
-        return real(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    for module in [each for each in sys.modules if each.startswith("pyharness.edition")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, name, None)  # an import of it fails
     assert main(["edition", "--out", str(tmp_path / "site")]) == 2
-    assert "'pip install pyharness[edition]'" in capsys.readouterr().err
+    assert f"edition needs {name}: 'pip install pyharness[edition]'" in capsys.readouterr().err
 
 
 def test_the_report_counts_files_by_kind(built_site: Mapping[str, bytes]) -> None:

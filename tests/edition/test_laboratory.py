@@ -297,7 +297,9 @@ def test_a_slope_that_changes_alone_has_no_quotient() -> None:
       const stop = { step: 1, variable: "UV", quotient: Infinity };
       const scene = E.sceneOf(data, state);
       return E.ending({ state, scene, run: { ended: "stopped", rows: [], stop } });"""
-    told = "by UV, angular velocity and velocity together: its slope changed and it did not;"
+    told = (
+        "by UV, angular velocity and velocity together: its slope changed though its value did not;"
+    )
     assert told in ask(body, None)
 
 

@@ -50,7 +50,7 @@ export function ending({ state, scene, run }) {
   const time = brief(step * state.stepSize);
   const found = Number.isFinite(quotient)
     ? `its slope changed by ${brief(quotient)} times its own change`
-    : "its slope changed and it did not";
+    : "its slope changed though its value did not";
   const limit = `the limit is ${brief(state.lipschitz)} (1/s)`;
   return `Stopped at step ${step} of ${steps}, at ${time} s, by ${variable}, ${told(variable)}: ${found}; ${limit}.`;
 }

@@ -123,10 +123,13 @@ function onChange(id, taken) {
 }
 
 function fromAddress() {
-  // The link that skips the menu names a place of the page, and no state.
-  const words = location.hash === "#main" ? fragmentOf(data, state) : location.hash;
-  const { state: asked, problems } = stateFrom(data, words);
+  // The link that skips the menu names a place of the page, and no state: the address keeps its own.
+  const skips = location.hash === "#main";
+  const { state: asked, problems } = stateFrom(data, skips ? fragmentOf(data, state) : location.hash);
   show(asked, problems);
+  if (!skips) return;
+  history.replaceState(null, "", `#${fragmentOf(data, state)}`);
+  element("main").focus();
 }
 
 onChange("case", ({ value }) => ({ ...state, case: Number(value), omega0: null }));

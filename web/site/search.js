@@ -8,7 +8,13 @@
   const places = window.searchData;
   const index = new MiniSearch({
     fields: ["title", "kind", "text"],
-    searchOptions: { boost: { title: 3 }, prefix: true, fuzzy: 0.15, combineWith: "AND" },
+    searchOptions: {
+      boost: { title: 3 },
+      // Another number is another place.
+      prefix: (term) => !/\d/.test(term),
+      fuzzy: (term) => (/\d/.test(term) ? false : 0.15),
+      combineWith: "AND",
+    },
   });
   index.addAll(places.map((place, id) => ({ id, ...place })));
 
@@ -28,7 +34,7 @@
     const found = words ? index.search(words) : [];
     results.replaceChildren(...found.slice(0, MOST).map(({ id }) => entry(places[id])));
     const more = found.length > MOST ? `, the first ${MOST} of them` : "";
-    count.textContent = words ? `${found.length} places${more}` : `${places.length} places are known`;
+    count.textContent = words ? `${found.length} ${found.length === 1 ? "place" : "places"}${more}` : `${places.length} places are known`;
     history.replaceState(null, "", words ? `#q=${encodeURIComponent(words)}` : "#");
   };
   const restore = () => {

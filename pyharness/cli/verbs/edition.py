@@ -15,14 +15,16 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Make all pages, then write them."""
     from pyharness.cli.output import check_tree, write_tree
-    from pyharness.edition.report import edition_report
-    from pyharness.edition.site import MARK, build_site, check_libraries
+    from pyharness.edition.libraries import check_libraries
+    from pyharness.edition.report import MARK, edition_report
     from pyharness.views.render import render
 
     if options.out is None:
         raise InputError("edition: give --out DIR, a folder for the pages")
     check_tree(options.out, MARK, "--out")
     check_libraries()
+    from pyharness.edition.site import build_site
+
     content = build_site(lambda what: shared.progress(f"edition: {what}"))
     shared.progress("")
     write_tree(options.out, content, "--out")

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from selenium.webdriver import ActionChains, Chrome, Keys
 from selenium.webdriver.common.by import By
+from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from pyharness import case_scene, run_program
@@ -190,6 +191,27 @@ def test_mistakes_are_told_and_the_rest_holds(browser: Chrome, laboratory: Open)
     field.send_keys(Keys.BACKSPACE, Keys.TAB)
     assert _text(browser, "problems") == ""
     assert field.get_attribute("aria-invalid") is None
+
+
+def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=2&program=runge-kutta&listing=original&fix=stage-base")
+    field = browser.find_element(By.ID, "steps")
+    field.send_keys("x", Keys.TAB)
+    # Another control shows another run, and leaves the field as it is.
+    program = Select(browser.find_element(By.ID, "program"))
+    program.select_by_visible_text("two-term")
+    assert "steps: '100x'" in _text(browser, "problems")
+    assert field.get_property("value") == "100x"
+    step = browser.find_element(By.ID, "step-size")
+    step.send_keys("y", Keys.TAB)
+    assert "steps: '100x'" in _text(browser, "problems")
+    assert "step-size: '0.01y'" in _text(browser, "problems")
+    # What another program's switches were is not forgotten.
+    program.select_by_visible_text("runge-kutta")
+    assert browser.current_url.endswith("listing=original&fix=stage-base")
+    browser.find_element(By.ID, "reset").click()
+    assert _text(browser, "problems") == ""
+    assert field.get_property("value") == "100"
 
 
 def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(

@@ -315,7 +315,7 @@ def test_where_the_solution_ends_there_is_no_error() -> None:
 def test_another_program_keeps_the_switches_that_both_have() -> None:
     body = """const { state } = S.stateFrom(data, given);
       return ["four-term", "runge-kutta"].map((program) =>
-        S.fragmentOf(data, S.withProgram(data, state, program)));"""
+        S.fragmentOf(data, { ...state, program }));"""
     four, runge = ask(body, "case=2&program=two-term&fix=dt-accumulates&conjecture=none")
     end = "listing=original&fix=dt-accumulates&conjecture=none"
     assert four == f"case=2&program=four-term&{end}"

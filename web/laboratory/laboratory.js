@@ -16,7 +16,6 @@ import {
   sceneOfCase,
   stateFrom,
   stepsFrom,
-  withProgram,
   written,
 } from "./state.js";
 
@@ -31,11 +30,13 @@ const charts = new Charts(
 );
 let state = defaultState(data);
 let found = null;
+// By field: what is wrong with what stands there, until it is mended.
+const wrong = new Map();
 
 // Compute a state and show it, with what was wrong with what asked for it.
 function show(next, problems = []) {
   state = next;
-  element("problems").textContent = problems.join("; ");
+  tell(problems);
   showControls();
   found = experiment(data, state);
   const error = largestError(found);
@@ -51,6 +52,10 @@ function show(next, problems = []) {
   element("command").textContent = commandOf(data, state);
   element("address").href = `#${fragmentOf(data, state)}`;
   showRows();
+}
+
+function tell(problems = []) {
+  element("problems").textContent = [...problems, ...wrong.values()].join("; ");
 }
 
 function withoutTruth() {
@@ -69,6 +74,7 @@ function showControls() {
     lipschitz: written(state.lipschitz),
   };
   for (const [id, value] of Object.entries(values)) {
+    if (wrong.has(id)) continue;
     element(id).value = value;
     element(id).removeAttribute("aria-invalid");
   }
@@ -109,10 +115,13 @@ function change(next) {
 function onNumber(id, read, taken) {
   element(id).addEventListener("change", () => {
     try {
-      change(taken(read(element(id).value, id)));
+      const value = read(element(id).value, id);
+      wrong.delete(id);
+      change(taken(value));
     } catch (error) {
       if (!(error instanceof StateError)) throw error;
-      element("problems").textContent = error.message;
+      wrong.set(id, error.message);
+      tell();
       element(id).setAttribute("aria-invalid", "true");
     }
   });
@@ -125,6 +134,7 @@ function onChange(id, taken) {
 function fromAddress() {
   // The link that skips the menu names a place of the page, and no state: the address keeps its own.
   const skips = location.hash === "#main";
+  wrong.clear();
   const { state: asked, problems } = stateFrom(data, skips ? fragmentOf(data, state) : location.hash);
   show(asked, problems);
   if (!skips) return;
@@ -133,7 +143,7 @@ function fromAddress() {
 }
 
 onChange("case", ({ value }) => ({ ...state, case: Number(value), omega0: null }));
-onChange("program", ({ value }) => withProgram(data, state, value));
+onChange("program", ({ value }) => ({ ...state, program: value }));
 onChange("stops", ({ checked }) => ({ ...state, stops: checked }));
 onNumber("omega0", omegaFrom, (omega) => {
   const own = sceneOfCase(data, state.case).initial.omega;
@@ -145,7 +155,7 @@ onNumber("lipschitz", positiveFrom, (lipschitz) => ({ ...state, lipschitz }));
 for (const radio of all("input[name=listing]")) {
   radio.addEventListener("change", () => {
     const base = radio.value;
-    change({ ...state, base, active: activeIn(data, state.program, base) });
+    change({ ...state, base, active: activeIn(data, base) });
   });
 }
 for (const box of all("input[name=switch]")) {
@@ -169,7 +179,10 @@ for (const button of all("button.copy")) {
     }
   });
 }
-element("reset").addEventListener("click", () => change(defaultState(data)));
+element("reset").addEventListener("click", () => {
+  wrong.clear();
+  change(defaultState(data));
+});
 element("numbers").addEventListener("toggle", showRows);
 window.addEventListener("hashchange", fromAddress);
 document.addEventListener("themechange", () => charts.recolour());

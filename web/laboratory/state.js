@@ -1,8 +1,8 @@
 // The state of the laboratory, and its words: those of the command line, in the page's address.
 //
 // A state is { case, program, base, active, omega0, stepSize, steps, lipschitz, stops }: `base` is
-// the listing that was chosen, `active` the names of what is switched on, `omega0` null where it is
-// that of the case. `data` is what the page brings along: cases, programs, flags, limits.
+// the listing that was chosen, `active` the names of what is switched on, for whichever program has
+// them, `omega0` null where it is that of the case. `data` is what the page brings along: cases, programs, flags, limits.
 
 const LISTINGS = ["original", "corrected"];
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
@@ -18,7 +18,7 @@ function stateOf(data, number, program, base) {
     case: number,
     program,
     base,
-    active: activeIn(data, program, base),
+    active: activeIn(data, base),
     omega0: null,
     stepSize: sceneOfCase(data, number).run.step_size,
     steps: sceneOfCase(data, number).run.steps,
@@ -38,22 +38,9 @@ export function namesOf(data, program, kind) {
     .map((flag) => flag.id);
 }
 
-// What is active in the listing `base` of a program.
-export function activeIn(data, program, base) {
-  if (base === "corrected") return [];
-  return data.flags
-    .filter((flag) => flag.in_original && flag.programs.includes(program))
-    .map((flag) => flag.id);
-}
-
-// A state with another program: switches that both have stay where they are.
-export function withProgram(data, state, program) {
-  const usual = activeIn(data, program, state.base);
-  const active = data.flags
-    .filter((flag) => flag.programs.includes(program))
-    .filter((flag) => (flag.programs.includes(state.program) ? state.active : usual).includes(flag.id))
-    .map((flag) => flag.id);
-  return { ...state, program, active };
+// What is active in the listing `base`, of all programs.
+export function activeIn(data, base) {
+  return data.flags.filter((flag) => flag.in_original && base !== "corrected").map((flag) => flag.id);
 }
 
 // The words of a state, a name and its value each; a switch has the value null. Only what differs
@@ -139,11 +126,11 @@ export function stateFrom(data, fragment) {
   const base = read("listing", (text) => oneOf("listing", text, LISTINGS), unsaid);
   const state = stateOf(data, chosen, program, base);
 
-  const defects = namesOf(data, program, "defect");
-  const assumed = state.active.filter((name) => !defects.includes(name));
+  const conjectures = namesOf(data, program, "conjecture");
+  const assumed = conjectures.filter((name) => state.active.includes(name));
   const noneOr = (text, word) => (text === "none" ? [] : list("conjecture")(text, word));
   const active = new Set([
-    ...state.active.filter((name) => defects.includes(name) && !fix.includes(name)),
+    ...state.active.filter((name) => !fix.includes(name) && !conjectures.includes(name)),
     ...keep,
     ...read("reading", list("reading"), []),
     ...read("conjecture", noneOr, assumed),

@@ -209,7 +209,7 @@ def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Ope
     # What another program's switches were is not forgotten.
     program.select_by_visible_text("runge-kutta")
     assert browser.current_url.endswith("listing=original&fix=stage-base")
-    browser.find_element(By.ID, "reset").click()
+    _click(browser, "#reset")
     assert _text(browser, "problems") == ""
     assert field.get_property("value") == "100"
 

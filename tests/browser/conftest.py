@@ -12,6 +12,8 @@ from selenium.webdriver.chrome.service import Service
 _SWITCHES = (
     "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    # A page that is still scrolling takes no click.
+    "--force-prefers-reduced-motion",
 )  # fmt: skip
 
 # On the PATH, or where GitHub's machines have them.

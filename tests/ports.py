@@ -40,9 +40,14 @@ def documented_command() -> str:
     return shlex.join([sys.executable, "-c", documented()])
 
 
+def engine() -> str:
+    """Return the path of Node; the test is skipped without it."""
+    found = shutil.which("node")
+    if found is None:
+        pytest.skip("no node on the PATH: the JavaScript is not tried")
+    return found
+
+
 def node(web: Path) -> str:
-    """Return the command of the port in a copy of `web`; the test is skipped without Node."""
-    engine = shutil.which("node")
-    if engine is None:
-        pytest.skip("no node on the PATH: the JavaScript is not held against the twins")
-    return shlex.join([engine, str(web / "port.js")])
+    """Return the command of the port in a copy of `web`."""
+    return shlex.join([engine(), str(web / "port.js")])

@@ -1,10 +1,6 @@
 // The programs as a port: a scene with its listing a line in, a run a line out (docs/ports.md).
 import { createInterface } from "node:readline";
-import * as fourTerm from "./programs/four-term.js";
-import * as rungeKutta from "./programs/runge-kutta.js";
-import * as twoTerm from "./programs/two-term.js";
-
-const PROGRAMS = { "two-term": twoTerm, "four-term": fourTerm, "runge-kutta": rungeKutta };
+import { PROGRAMS } from "./programs/programs.js";
 
 // JSON has no -0, no infinity and no NaN: those go as text.
 function exact(key, value) {

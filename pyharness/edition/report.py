@@ -12,6 +12,11 @@ MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
+def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
+    """Return what JSON says of files: their sizes, and what built them."""
+    return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
+
+
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
     """Report the files of a site that stands in a folder."""
     sizes: dict[str, list[int]] = {}
@@ -20,9 +25,5 @@ def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
     rows = [[kind, len(found), sum(found)] for kind, found in sorted(sizes.items())]
     rows.append(["all", len(content), sum(map(len, content.values()))])
 
-    def record() -> dict[str, Any]:
-        files = {name: len(each) for name, each in content.items()}
-        return {"folder": folder, "files": files, "build": build_record()}
-
     text: list[Section] = [[Table(_KINDS, rows)], [f"Open {folder}/index.html in a browser."]]
-    return Report("edition", text, record)
+    return Report("edition", text, lambda: {"folder": folder, **listed(content)})

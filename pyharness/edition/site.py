@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from pyharness.edition import api, decks, documents, figures, laboratory, ledger
 from pyharness.edition.bundle import bundle
 from pyharness.edition.markdown import formula
-from pyharness.edition.report import MARK
+from pyharness.edition.report import MARK, listed
 from pyharness.history.claims.report import written
 from pyharness.history.tei import tei_document
 from pyharness.model.facts import facts, shipped
@@ -77,9 +77,7 @@ def build_site(progress: Callable[[str], None] = lambda _: None) -> dict[str, by
         content[page.path] = _rendered(page)
         places += page.found
     content |= _assets(places)
-    content[MARK] = json_text(
-        {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
-    ).encode()
+    content[MARK] = json_text(listed(content)).encode()
     return content
 
 
@@ -153,15 +151,15 @@ def _listing() -> Iterator[Page]:
 
 
 def _documents() -> Iterator[Page]:
-    listed = []
+    titles = []
     for path, each in documents.documents():
         found = [
             Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
         ]
-        listed.append((path, each.title, len(each.parts)))
+        titles.append((path, each.title))
         yield Page(path, each.title, "document.html", {"document": each}, found,
                    menu=path if path in dict(MENU).values() else "docs/index.html")  # fmt: skip
-    yield Page("docs/index.html", "Documents", "documents.html", {"documents": listed})
+    yield Page("docs/index.html", "Documents", "documents.html", {"documents": titles})
 
 
 def _rendered(page: Page) -> bytes:
@@ -169,7 +167,7 @@ def _rendered(page: Page) -> bytes:
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": page.menu or page.path,
-         "build": build_record(), "digest": _digest(), **page.context}
+         "build": build_record(), "digest": _tei()[1], **page.context}
     )  # fmt: skip
     return html.encode()
 
@@ -190,7 +188,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
     content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
-    content["listing/edition.xml"] = tei_document()
+    content["listing/edition.xml"], _ = _tei()
     return content | documents.files()
 
 
@@ -208,9 +206,10 @@ def vendor() -> list[dict[str, Any]]:
 
 
 @cache
-def _digest() -> str:
-    """Return what names the text of the cards and their apparatus, in a citation."""
-    return sha256(tei_document()).hexdigest()[:12]
+def _tei() -> tuple[bytes, str]:
+    """Return the edition as TEI, and what names its text in a citation."""
+    document = tei_document()
+    return document, sha256(document).hexdigest()[:12]
 
 
 @cache

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as xml
 import pyharness
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import Card, Difference, Place, deck, numbers, parallels
+from pyharness.original.cards import Card, Place, deck, numbers, parallels
 
 TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"
@@ -181,7 +181,7 @@ def _fill(block: xml.Element, card: Card) -> None:
         number.text = str(card.number)
     text = xml.SubElement(block, "seg")
     before: xml.Element | None = None
-    for passage, difference in _passages(card):
+    for passage, difference in card.passages():
         if difference is None:
             if before is None:
                 text.text = passage
@@ -189,22 +189,6 @@ def _fill(block: xml.Element, card: Card) -> None:
                 before.tail = passage
         else:
             before = _app(text, passage, difference.scans, difference.entry)
-
-
-def _passages(card: Card) -> Iterator[tuple[str, Difference | None]]:
-    """Give the text in pieces, each as the scan has it or with the difference that it shows."""
-    # Differences are found in the text without its blanks; these are the places of its characters.
-    places = [n for n, character in enumerate(card.text) if character != " "]
-    tight = "".join(card.text[n] for n in places)
-    done = at = 0
-    for each in card.differences:
-        first = tight.index(each.ours, at)
-        at = first + len(each.ours)
-        begin, end = places[first], places[at - 1] + 1
-        yield card.text[done:begin], None
-        yield card.text[begin:end], each
-        done = end
-    yield card.text[done:], None
 
 
 def _app(parent: xml.Element, ours: str, scans: str, entry: str) -> xml.Element:

@@ -88,7 +88,12 @@ class Card(NamedTuple):
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
-        return f"{number}-{applied(tight(self.text), self.differences)}"
+        shown = (each.scans if each else tight(text) for text, each in self.passages())
+        return f"{number}-{''.join(shown)}"
+
+    def passages(self) -> Iterator[tuple[str, Difference | None]]:
+        """Give the text in pieces: as the scan has it, or with the difference that it shows."""
+        return passages(self.text, self.differences)
 
     @property
     def deviates(self) -> bool:
@@ -266,15 +271,29 @@ def margin(program: str) -> Iterator[tuple[Place, str]]:
             yield Place(file, number, match[1].strip()), match[2]
 
 
-def applied(text: str, differences: Iterable[Difference]) -> str:
-    """Return a text with the scan's characters in place of ours; ValueError where ours are not."""
-    scans, rest = "", text
+def passages(
+    text: str, differences: Iterable[Difference]
+) -> Iterator[tuple[str, Difference | None]]:
+    """Give a text in pieces: as the scan has it, or with the difference that the scan shows there.
+
+    ValueError where our characters do not stand.
+    """
+    # Blanks do not count; these are the places of what does.
+    places = [n for n, letter in enumerate(text) if not letter.isspace()]
+    letters = tight(text)
+    done = at = 0
     for each in differences:
-        before, found, rest = rest.partition(each.ours)
-        if not found:
+        first = letters.find(each.ours, at)
+        if first < 0:
             raise ValueError(f"{each.ours!r} does not stand in {text!r} where it should")
-        scans += before + each.scans
-    return scans + rest
+        at = first + len(each.ours)
+        begin, end = places[first], places[at - 1] + 1
+        if done < begin:
+            yield text[done:begin], None
+        yield text[begin:end], each
+        done = end
+    if text[done:]:
+        yield text[done:], None
 
 
 def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:

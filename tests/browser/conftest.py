@@ -9,6 +9,8 @@ import pytest
 from selenium.webdriver import Chrome, ChromeOptions
 from selenium.webdriver.chrome.service import Service
 
+from pyharness.cli.output import write_tree
+
 _SWITCHES = (
     "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
@@ -51,9 +53,6 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
 @pytest.fixture(scope="session")
 def site(built_site: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a built site."""
-    folder = tmp_path_factory.mktemp("site")
-    for name, content in built_site.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+    folder = tmp_path_factory.mktemp("site") / "site"
+    write_tree(str(folder), built_site, "--out")
     return folder

@@ -4,7 +4,6 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from selenium.webdriver import ActionChains, Chrome, Keys
@@ -15,6 +14,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from pyharness import case_scene, run_program
 from pyharness.model.listing import PROGRAMS, subset
 from pyharness.original.printer import page
+from tests.browser.screen import WIDTHS, errors, screen, too_wide
 
 Open = Callable[[str], None]
 
@@ -28,15 +28,9 @@ def laboratory(browser: Chrome, site: Path) -> Iterator[Open]:
         browser.get("about:blank")
         browser.get(f"{(site / 'laboratory.html').as_uri()}{fragment}")
 
-    _said(browser)
+    errors(browser)
     yield opened
-    assert _said(browser) == []
-
-
-def _said(browser: Chrome) -> list[dict[str, Any]]:
-    """Return what the console has had since it was asked."""
-    said: list[dict[str, Any]] = browser.get_log("browser")  # type: ignore[no-untyped-call]
-    return said
+    assert errors(browser) == []
 
 
 def _text(browser: Chrome, id: str) -> str:
@@ -223,18 +217,11 @@ def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
         ".filter((x) => x.labels.length === 0).map((x) => x.id)"
     )
     assert browser.execute_script(unnamed) == []
-    try:
-        for width in (360, 800, 1440):
-            size: dict[str, Any] = {"width": width, "height": 900, "deviceScaleFactor": 1}
-            metrics = {**size, "mobile": False}
-            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    for width in WIDTHS:
+        with screen(browser, width):
             laboratory("#case=7&program=two-term&listing=original")
             _rows(browser)
-            root = "return document.documentElement"
-            wide = browser.execute_script(f"{root}.scrollWidth")
-            assert wide == browser.execute_script(f"{root}.clientWidth"), width
-    finally:
-        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+            assert too_wide(browser) <= 0, width
 
 
 def test_colours_change_with_the_theme(browser: Chrome, laboratory: Open) -> None:

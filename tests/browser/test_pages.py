@@ -1,8 +1,6 @@
 """Every page in a browser: no error, nothing wider than the screen, no barrier."""
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -12,37 +10,11 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
-WIDTHS = (360, 800, 1440)
-
-
-@contextmanager
-def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]:
-    """Give the browser a width (pixels) and a preference."""
-    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    features = [{"name": "prefers-color-scheme", "value": scheme}]
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-    try:
-        yield
-    finally:
-        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+from tests.browser.screen import WIDTHS, errors, screen, too_wide
 
 
 def addresses(site: Path) -> list[str]:
     return [each.as_uri() for each in sorted(site.rglob("*.html"))]
-
-
-def errors(browser: Chrome) -> list[str]:
-    """Return what the console says, and forget it."""
-    return [each["message"] for each in browser.get_log("browser")]  # type: ignore[no-untyped-call]
-
-
-def too_wide(browser: Chrome) -> int:
-    """Return by how many pixels a page is wider than the screen."""
-    script = "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
-    found: int = browser.execute_script(script)
-    return found
 
 
 def barriers(browser: Chrome) -> list[dict[str, Any]]:

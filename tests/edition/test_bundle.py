@@ -12,14 +12,11 @@ from pyharness import case_scene, run_program
 from pyharness.edition.bundle import bundle
 from pyharness.model.listing import PROGRAMS, original
 from pyharness.verify.port_protocol import asked_scene
-from tests.ports import WEB
+from tests.ports import WEB, engine
 
 
 def _run(script: str, **known: object) -> str:
     """Return what a classic script leaves in `said`; it knows what is given, and no module."""
-    engine = shutil.which("node")
-    if engine is None:
-        pytest.skip("no node on the PATH: the bundled scripts are not run")
     run = (
         "const vm = require('node:vm');"
         "const { script, known } = JSON.parse(require('node:fs').readFileSync(0));"
@@ -28,7 +25,7 @@ def _run(script: str, **known: object) -> str:
     )
     given = json.dumps({"script": script, "known": known})
     done = subprocess.run(
-        [engine, "--eval", run], input=given, capture_output=True, text=True, check=False
+        [engine(), "--eval", run], input=given, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr[-500:]
     return done.stdout

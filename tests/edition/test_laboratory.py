@@ -6,7 +6,6 @@ import json
 import math
 import random
 import re
-import shutil
 import subprocess
 from dataclasses import replace
 from typing import Any
@@ -26,16 +25,13 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.original.printer import page
 from pyharness.truth.reference import reference
 from pyharness.verify.port_protocol import asked_scene
-from tests.ports import WEB
+from tests.ports import WEB, engine
 
 LABORATORY = WEB / "laboratory"
 
 
 def ask(body: str, given: Any) -> Any:
     """Return what JavaScript makes of `given`; `body` returns it, and may import our modules."""
-    engine = shutil.which("node")
-    if engine is None:
-        pytest.skip("no node on the PATH: the laboratory's JavaScript is not tried")
     names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P"}
     imports = [
         f"import * as {name} from {json.dumps(str(LABORATORY / f'{file}.js'))};"
@@ -47,7 +43,7 @@ def ask(body: str, given: Any) -> Any:
         f"console.log(JSON.stringify((() => {{ {body} }})()));"
     )
     done = subprocess.run(
-        [engine, "--input-type=module", "--eval", script],
+        [engine(), "--input-type=module", "--eval", script],
         input=json.dumps({"data": data(), "given": given}),
         capture_output=True,
         text=True,

@@ -8,14 +8,13 @@ import tomllib
 import pytest
 
 from pyharness.edition import api, decks, documents, site
-from pyharness.edition.decks import Run
 from pyharness.edition.markdown import document
 from pyharness.history.ablation import entries
 from pyharness.history.claims.ledger import claims
 from pyharness.history.claims.sentences import sentences
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import Difference, deck, tight
+from pyharness.original.cards import Difference, deck, passages, tight
 from tests.edition.pages import dead, pages
 
 
@@ -109,8 +108,9 @@ def test_marks_stand_where_the_scan_differs() -> None:
 
 
 def test_a_mark_holds_its_blanks_and_kinds_have_an_order() -> None:
-    runs = decks.marked(" A B CD E", [Difference("BC", "X", "why")])
-    assert runs == [Run(" A "), Run("B C", "why"), Run("D E")]
+    why = Difference("BC", "X", "why")
+    pieces = [(" A ", None), ("B C", why), ("D E", None)]
+    assert list(passages(" A B CD E", [why])) == pieces
     found = decks._kinds(["misreading", "dead code", "missing text", "reading", "misreading"])
     assert found == ["reading", "missing text", "dead code", "misreading"]
 

@@ -165,8 +165,14 @@ export class Charts {
   }
 }
 
+// What a colour of the style is now; it may hang on the scheme, which only an element's own tells.
 function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const probe = document.createElement("span");
+  probe.style.color = `var(${name})`;
+  document.body.append(probe);
+  const found = getComputedStyle(probe).color;
+  probe.remove();
+  return found;
 }
 
 function number(value) {

@@ -1,11 +1,7 @@
 // A state in, a run and what there is to say of it out. No page is needed.
-import * as fourTerm from "../programs/four-term.js";
-import * as rungeKutta from "../programs/runge-kutta.js";
-import * as twoTerm from "../programs/two-term.js";
+import { PROGRAMS } from "../programs/programs.js";
 import { reference } from "./reference.js";
 import { sceneOfCase } from "./state.js";
-
-const PROGRAMS = { "two-term": twoTerm, "four-term": fourTerm, "runge-kutta": rungeKutta };
 
 // The scene of a state, as a port of the programs reads it.
 export function sceneOf(data, state) {

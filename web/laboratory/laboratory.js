@@ -132,14 +132,9 @@ function onChange(id, taken) {
 }
 
 function fromAddress() {
-  // The link that skips the menu names a place of the page, and no state: the address keeps its own.
-  const skips = location.hash === "#main";
   wrong.clear();
-  const { state: asked, problems } = stateFrom(data, skips ? fragmentOf(data, state) : location.hash);
+  const { state: asked, problems } = stateFrom(data, location.hash);
   show(asked, problems);
-  if (!skips) return;
-  history.replaceState(null, "", `#${fragmentOf(data, state)}`);
-  element("main").focus();
 }
 
 onChange("case", ({ value }) => ({ ...state, case: Number(value), omega0: null }));

@@ -1,4 +1,5 @@
-// Dark or light: as the system has it, until the reader chooses. In the head, so that no page
+// What all pages do: the link to the content leaves the address alone, which may name more than a
+// place. Dark or light: as the system has it, until the reader chooses. In the head, so that no page
 // flashes in the other.
 (() => {
   const root = document.documentElement;
@@ -27,6 +28,10 @@
       button.textContent = isDark() ? "light" : "dark";
       document.dispatchEvent(new Event("themechange"));
     };
+    document.querySelector(".skip").addEventListener("click", (event) => {
+      event.preventDefault();
+      document.getElementById("main").focus();
+    });
     button.hidden = false;
     button.addEventListener("click", () => {
       root.dataset.theme = isDark() ? "light" : "dark";

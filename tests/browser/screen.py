@@ -1,0 +1,34 @@
+"""What tests in a browser share: a screen, what the console says, what is too wide."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from selenium.webdriver import Chrome
+
+WIDTHS = (360, 800, 1440)
+
+
+@contextmanager
+def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]:
+    """Give the browser a width (pixels) and a preference."""
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    try:
+        yield
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def errors(browser: Chrome) -> list[str]:
+    """Return what the console says, and forget it."""
+    return [each["message"] for each in browser.get_log("browser")]  # type: ignore[no-untyped-call]
+
+
+def too_wide(browser: Chrome) -> int:
+    """Return by how many pixels a page is wider than the screen."""
+    script = "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    found: int = browser.execute_script(script)
+    return found

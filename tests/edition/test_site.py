@@ -14,7 +14,7 @@ from pyharness.history.claims.ledger import claims
 from pyharness.history.claims.sentences import sentences
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import Difference, deck, passages, tight
+from pyharness.original.cards import deck, tight
 from tests.edition.pages import dead, pages
 
 
@@ -107,10 +107,7 @@ def test_marks_stand_where_the_scan_differs() -> None:
     assert view.kinds[0] == "defect"
 
 
-def test_a_mark_holds_its_blanks_and_kinds_have_an_order() -> None:
-    why = Difference("BC", "X", "why")
-    pieces = [(" A ", None), ("B C", why), ("D E", None)]
-    assert list(passages(" A B CD E", [why])) == pieces
+def test_kinds_have_an_order() -> None:
     found = decks._kinds(["misreading", "dead code", "missing text", "reading", "misreading"])
     assert found == ["reading", "missing text", "dead code", "misreading"]
 

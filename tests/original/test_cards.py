@@ -11,7 +11,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.original import collation
-from pyharness.original.cards import chosen, deck, numbers
+from pyharness.original.cards import Difference, chosen, deck, numbers, passages
 from pyharness.original.collation import HEADING, expected_lines, undeclared, unexplained
 
 SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
@@ -216,3 +216,12 @@ def test_record_of_a_card(capsys: pytest.CaptureFixture[str]) -> None:
     assert second["parallels"] == ["four-term:2250"]
     assert main(["defects", "two-term:1660"]) == 0
     assert "dt-accumulates: DT grows" in capsys.readouterr().out
+
+
+def test_pieces_of_a_text_hold_their_blanks() -> None:
+    why = Difference("BC", "X", "why")
+    pieces = [(" A ", None), ("B C", why), ("D E", None)]
+    assert list(passages(" A B CD E", [why])) == pieces
+    # Each stands behind the one before it.
+    with pytest.raises(ValueError, match="'BC' does not stand in ' A B CD E'"):
+        list(passages(" A B CD E", [why, why]))

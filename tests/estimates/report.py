@@ -43,16 +43,21 @@ def _entrances(found: Sequence[Answer]) -> Section:
                 len(due),
                 sum(each.is_silent for each in some),
                 sum(each.is_false_alarm for each in some),
+                sum(each.is_unfinished for each in some),
+                sum(each.is_low for each in some),
+                sum(each.is_blind for each in some),
                 100.0 * sum(run > 1 for run in runs) / len(runs) if runs else None,
             ]
         )
     columns = [Column("entrance", left=True), Column("answers"), Column("K < 1e6")]
     columns += [Column("exceed"), Column("worst", short), Column("due"), Column("silent")]
-    columns += [Column("false alarms"), Column("second runs, %", digits(".2f"))]
+    columns += [Column("alarms"), Column("no end"), Column("low"), Column("blind")]
+    columns += [Column("2nd, %", digits(".1f"))]
     return [
         "exceed: error above tolerance + 4e-15 K at K < 1e6, worst: over that; due: rounding times "
-        "K above 3 tolerances, silent: not `sensitive` there; false alarm: `sensitive` below 1/30; "
-        "second runs at K < 1e3",
+        "K above 3 tolerances, silent: not `sensitive` there; alarms: `sensitive` below 1/30; no end: "
+        "neither complete nor sensitive at K < 1e6; low, blind: reported error below a tenth, a "
+        "hundredth of the true one; 2nd: second runs at K < 1e3",
         Table(columns, rows),
     ]
 
@@ -63,6 +68,8 @@ def _worst(found: Iterable[Answer]) -> Section:
         ("exceeds", lambda each: each.exceeds, lambda each: each.error / each.limit),
         ("silent", lambda each: each.is_silent, lambda each: each.lost),
         ("false alarm", lambda each: each.is_false_alarm, lambda each: 1.0 / each.lost),
+        ("unfinished", lambda each: each.is_unfinished, lambda each: each.draw.truth.turns),
+        ("low", lambda each: each.is_low, lambda each: 1.0 / max(each.seen or 0.0, 1e-300)),
     ]
     rows = []
     for name, applies, size in faults:

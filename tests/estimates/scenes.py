@@ -1,4 +1,8 @@
-"""Scenes for the campaign: calm and wild, by kind; a seed and a number say which."""
+"""Scenes for the campaign: calm and wild, by kind; a seed and a number say which.
+
+Every draw has a kind of torque, of body and of motion. Independently of these it may have an
+attitude, a full inertia matrix, a torque about the axes of space, and times before the last.
+"""
 
 import math
 from collections.abc import Callable
@@ -9,7 +13,7 @@ import numpy as np
 
 from pyharness.bench.random_loads import _BODIES, _SPEEDS, _WAVES, LAWS, _drawn
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
 from pyharness.model.turned_scenes import turned
 from tests.estimates.truth import Truth, truth_of
 from tests.random_scenes import NASTY, triple
@@ -20,10 +24,15 @@ COARSEST, FINEST = 1e-3, 1e-13
 # What no unit of time or moment changes, in bodies that there are.
 _ROUGH = tuple(name for name in NASTY if name not in ("no body", "other units"))
 # In turn; those as they are drawn come twice.
-_WAYS = ("plain", "near the middle axis", "plain", "strong torque", "rough")
+_WAYS = (
+    "plain", "near the middle axis", "plain", "strong torque", "rough", "steady", "cancelling",
+    "slow",
+)  # fmt: skip
+ATTITUDE, INERTIA, IN_SPACE, SEVERAL = "attitude", "full inertia", "torque in space", "several times"
 KINDS = (
-    "all", *LAWS, *_SPEEDS, *_BODIES, "plain", "near the middle axis", "strong torque",
-    *(f"rough: {name}" for name in _ROUGH), "forward", "backward",
+    "all", *LAWS, *_SPEEDS, *_BODIES, *dict.fromkeys(_WAYS[:4] + _WAYS[5:]),
+    *(f"rough: {name}" for name in _ROUGH), ATTITUDE, INERTIA, IN_SPACE, SEVERAL,
+    "forward", "backward",
 )  # fmt: skip
 
 
@@ -33,10 +42,20 @@ class Draw:
 
     number: int
     scene: Scene
-    time: float  # s, on either side of 0
+    times: tuple[float, ...]  # s, away from 0 on either side
     tolerance: float
     kinds: tuple[str, ...]  # of `KINDS`
     truth: Truth
+
+    @property
+    def attitude(self) -> bool:
+        """Whether the attitude is wanted."""
+        return ATTITUDE in self.kinds
+
+    @property
+    def time(self) -> float:
+        """The last time, s."""
+        return self.times[-1]
 
 
 def drawn(seed: str, number: int, tolerances: tuple[float, ...] = ()) -> Draw:
@@ -50,8 +69,12 @@ def drawn(seed: str, number: int, tolerances: tuple[float, ...] = ()) -> Draw:
     way = _WAYS[place % len(_WAYS)]
     while True:
         scene, time, kinds = _rough(source) if way == "rough" else _by_kind(source, law, way)
+        scene, more = _dressed(source, scene)
+        times = _times(source, time)
+        if len(times) > 1:
+            more.append(SEVERAL)
         try:
-            truth = truth_of(scene, time)
+            truth = truth_of(scene, times, attitude=ATTITUDE in more)
         except InputError:
             continue
         if truth.turns <= _MOST_TURNS:
@@ -60,8 +83,46 @@ def drawn(seed: str, number: int, tolerances: tuple[float, ...] = ()) -> Draw:
     tolerance = COARSEST * (FINEST / COARSEST) ** of_its_own.random()
     if tolerances:
         tolerance = of_its_own.choice(tolerances)
-    kinds = ("all", *kinds, "backward" if time < 0.0 else "forward")
-    return Draw(number, replace(scene, name=str(number)), time, tolerance, kinds, truth)
+    kinds = ("all", *kinds, *more, "backward" if time < 0.0 else "forward")
+    return Draw(number, replace(scene, name=str(number)), times, tolerance, kinds, truth)
+
+
+def _dressed(source: Random, scene: Scene) -> tuple[Scene, list[str]]:
+    """Return a scene that may have an attitude and no principal axes, and its kinds."""
+    kinds = []
+    if source.random() < 0.5:
+        kinds.append(ATTITUDE)
+        scene = replace(scene, attitude=[source.gauss(0.0, 1.0) for _ in range(4)])
+        if scene.moments and not scene.torque.is_zero and source.random() < 0.4:
+            kinds.append(IN_SPACE)
+            scene = replace(scene, torque=replace(scene.torque, frame="space"))
+    if scene.moments and source.random() < 0.25:
+        kinds.append(INERTIA)
+        scene = _about_other_axes(source, scene)
+    return scene, kinds
+
+
+def _about_other_axes(source: Random, scene: Scene) -> Scene:
+    """Return a scene about axes that are not the principal ones, rounded as it comes."""
+    a, b, c = np.linalg.qr(np.array([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)]))[0]
+    axes = np.array([a, b, np.cross(a, b)])
+
+    def turn(vector: Triple) -> Triple:
+        return triple(axes @ np.array(vector))
+
+    matrix = axes @ np.diag(scene.moments or ()) @ axes.T
+    bare = replace(scene, moments=None, inertia=(0.5 * (matrix + matrix.T)).tolist())
+    if scene.torque.frame == "space":
+        return replace(bare, omega=turn(scene.omega))
+    return turned(bare, turn, body=False)
+
+
+def _times(source: Random, end: float) -> tuple[float, ...]:
+    """Return one to four times, whole units in the last place of the last."""
+    unit = math.ulp(end)
+    parts = [source.random() for _ in range(source.choice((0, 0, 0, 1, 3)))]
+    before = {math.floor(part * abs(end) / unit) * unit for part in parts} - {0.0}
+    return (*(math.copysign(t, end) for t in sorted(before)), end)
 
 
 def _by_kind(source: Random, law: str, way: str) -> tuple[Scene, float, tuple[str, ...]]:
@@ -80,11 +141,67 @@ def _by_kind(source: Random, law: str, way: str) -> tuple[Scene, float, tuple[st
     elif way == "strong torque" and law != "no torque":
         factor = 10.0 ** source.uniform(0.0, 2.0)
         scene, time = _pushed(scene, factor), time * factor ** -source.random()
+    elif way == "steady":
+        scene = _steady(source, scene)
+    elif way == "cancelling":
+        scene = _cancelling(source, scene)
+    elif way == "slow":
+        time *= 10.0 ** -source.uniform(1.0, 6.0)
     if source.random() < _SHORT:
         time *= 10.0 ** -source.uniform(0.0, 2.0)
     if source.random() < 0.5:
         time = -time
     return scene, time, tuple(filter(None, (law, speed, body, way)))
+
+
+def _steady(source: Random, scene: Scene) -> Scene:
+    """Return a steady rotation but for rounding: about a principal axis, or held by a torque.
+
+    Half of those about an axis keep the torque of the scene along that axis.
+    """
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    if source.random() < 0.4:
+        x, y, z = scene.omega
+        i1, i2, i3 = moments
+        held = ((i3 - i2) * y * z, (i1 - i3) * z * x, (i2 - i1) * x * y)
+        return replace(scene, torque=TorqueLaw(held))
+    axis = source.randrange(3)
+
+    def along(vector: Triple) -> Triple:
+        return triple(np.where(np.arange(3) == axis, np.array(vector), 0.0))
+
+    if source.random() < 0.5:
+        scene = replace(scene, torque=TorqueLaw())
+    return turned(scene, along, body=False)
+
+
+def _cancelling(source: Random, scene: Scene) -> Scene:
+    """Return a scene with two torques more, which cancel but for a small part."""
+    speed = math.hypot(*scene.omega)
+    moments = np.array(scene.moments)
+    large = 10.0 ** source.uniform(0.0, 4.0) * speed * speed
+    amplitude = moments * large * np.array([source.uniform(-1.0, 1.0) for _ in range(3)])
+    rest = 1.0 + 10.0 ** -source.uniform(6.0, 14.0) * source.choice((-1.0, 1.0))
+    frequency = speed * 10.0 ** source.uniform(-1.0, 0.5)
+    law, one, other = scene.torque, triple(amplitude), triple(-amplitude * rest)
+    if source.random() < 0.3:
+        # The two alone, from rest or from what they can give.
+        law = TorqueLaw()
+        small = large / speed * abs(rest - 1.0) * source.choice((0.0, 1.0))
+        scene = replace(scene, omega=triple(small * np.array(scene.omega) / speed))
+    pair: list[Wave]
+    kind = source.choice(("sines", "cosines", "constant", "frequencies"))
+    if kind == "constant":
+        slow = speed * abs(rest - 1.0)
+        constant = triple(np.array(law.constant) + amplitude)
+        return replace(
+            scene, torque=replace(law, constant=constant, cosines=(*law.cosines, (other, slow)))
+        )
+    if kind == "frequencies":
+        kind, pair = "sines", [(one, frequency), (triple(-amplitude), frequency * rest)]
+    else:
+        pair = [(one, frequency), (other, frequency)]
+    return replace(scene, torque=replace(law, **{kind: (*getattr(law, kind), *pair)}))
 
 
 def _pushed(scene: Scene, factor: float) -> Scene:

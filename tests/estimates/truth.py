@@ -1,84 +1,161 @@
-"""The truth of the campaign: omega at the end in some 31 digits, and the growth K, in milliseconds.
+"""The truth of the campaign: omega and attitude in some 31 digits, and the error amplification K.
 
-`pairs.c` beside this file, compiled when it is first asked for. It is held to `truth/reference.py`
-in `test_estimates.py`.
+`pairs.c` beside this file, compiled when it is first needed. It is compared with
+`truth/reference.py` and `truth/free_attitude.py` in `test_estimates.py`.
 """
 
 import ctypes
 import functools
+import math
 import os
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.integer_series import exact_body
 
 MOST_STEPS = 40_000
-DIGITS_LOST = 1e-29  # of the pairs, over their many steps, before the motion multiplies it
+DIGITS_LOST = 1e-29  # of the pairs, over their many steps, before the motion amplifies it
 COMPILER = os.environ.get("CC", "cc")
 _WHY = (
     "", "takes too many steps", "leaves every bound", "needs too much memory",
 )  # fmt: skip
+_COEFFICIENTS, _INERTIA = 0, 1
+_ROW = 15
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What is so at the end, and on the way to it."""
+    """The solution at the times requested, and measures of the motion until the last of them."""
 
-    omega: Array  # shape (3,); rounded to binary64 (rad/s)
-    remainder: Array  # shape (3,); what rounding took (rad/s)
-    largest: float  # largest abs of any component of omega on the way (rad/s)
+    omega: Array  # shape (n, 3); rounded to binary64 (rad/s)
+    remainder: Array  # shape (n, 3); what rounding took (rad/s)
+    attitude: Array | None  # shape (n, 4); rounded to binary64
+    attitude_remainder: Array | None
+    largest: float  # largest abs of any component of omega until the last time (rad/s)
     turns: float
-    # largest norm of the derivative of omega at the end by omega at any time before; infinite
-    # beyond 1e300
+    # Largest norm of the derivative of a row by the state at any time before it; infinite beyond
+    # 1e300. With the attitude the state has a small rotation too, and omega in units of `largest`.
     growth: float
     steps: int
 
+    def at_the_end(self) -> "Truth":
+        """Return the last row alone."""
+        rows = (self.omega, self.remainder, self.attitude, self.attitude_remainder)
+        last = [None if each is None else each[-1:] for each in rows]
+        names = ("omega", "remainder", "attitude", "attitude_remainder")
+        return replace(self, **dict(zip(names, last, strict=True)))
+
     def error(self, omega: Array) -> float:
-        """Return the largest error of any component over the largest omega on the way."""
+        """Return the largest error of any component over the largest omega."""
         return float(np.abs(omega - self.omega - self.remainder).max()) / self.largest
+
+    def angle(self, attitude: Array) -> float:
+        """Return the largest angle (rad) between attitudes, shape (n, 4), and the true ones."""
+        assert self.attitude is not None
+        assert self.attitude_remainder is not None
+        w, v = self.attitude[:, :1], self.attitude[:, 1:]
+        # Of attitude times the conjugate of the truth; the difference before the products.
+        sign = np.sign(np.einsum("ij,ij->i", attitude, self.attitude))[:, None]
+        difference = sign * attitude - self.attitude - self.attitude_remainder
+        a, b = difference[:, :1], difference[:, 1:]
+        vector = b * w - a * v - np.cross(b, v)
+        return 2.0 * float(np.sqrt((vector * vector).sum(axis=1)).max())
 
     @property
     def doubt(self) -> float:
-        """What the truth itself may be wrong by, over the largest omega on the way."""
+        """What the truth itself may be wrong by, over the largest omega."""
         return DIGITS_LOST * self.growth
 
 
-def truth_of(scene: Scene, time: float, most_steps: int = MOST_STEPS) -> Truth:
-    """Return the truth of a scene at `time` (s), on either side of 0.
+def truth_of(
+    scene: Scene,
+    times: float | Sequence[float],
+    most_steps: int = MOST_STEPS,
+    attitude: bool = False,
+) -> Truth:
+    """Return the truth of a scene at `times` (s), in order away from 0 on one side.
 
-    InputError where omega leaves every bound before, or more steps would be needed.
+    Times are whole multiples of the unit in the last place of the last of them. InputError where
+    omega leaves every bound before, or more steps would be needed.
     """
+    until = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    unit = math.ulp(until[-1])
+    assert all(Fraction(t) % Fraction(unit) == 0 for t in until.tolist())
     law = scene.torque
-    moments, products = exact_body(scene)
-
-    def over_moments(vector: Sequence[float]) -> list[float]:
-        return _pairs([Fraction(x) / moment for x, moment in zip(vector, moments, strict=True)])
-
+    body, torque_over = _body(scene)
     waves: list[float] = []
     for cosine, some in ((0.0, law.sines), (1.0, law.cosines)):
         for amplitude, frequency in some:
-            waves += [*over_moments(amplitude), frequency, cosine]
-    inputs = (_pairs(products), over_moments(law.constant), over_moments(law.rate))
-    found, steps = (ctypes.c_double * 9)(), ctypes.c_int()
+            waves += [*torque_over(amplitude), frequency, cosine]
+    rows, found = np.empty((len(until), _ROW)), (ctypes.c_double * 2)()
+    steps = ctypes.c_int()
+    with_attitude = attitude or law.in_space
     status = _library().pairs_truth(
-        *(_array(each) for each in inputs), len(waves) // 8, _array(waves), _array(scene.omega),
-        ctypes.c_double(time), most_steps, found, ctypes.byref(steps),
+        _COEFFICIENTS if scene.coefficients is not None else _INERTIA, _array(body),
+        _array(torque_over(law.constant)), _array(torque_over(law.rate)),
+        len(waves) // 8, _array(waves), int(with_attitude), int(law.in_space),
+        _array(scene.omega), _array(_unit(scene.attitude or IDENTITY)),
+        len(until), _array(until.tolist()), most_steps,
+        rows.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), found, ctypes.byref(steps),
     )  # fmt: skip
     if status:
         raise InputError(f"pairs: the solution {_WHY[status]}")
-    omega, remainder = np.array(found[:3]), np.array(found[3:6])
-    largest, angle, growth = found[6:]
-    return Truth(omega, remainder, largest, angle / (2.0 * np.pi), growth, steps.value)
+    largest, angle = found
+    return Truth(
+        rows[:, :3],
+        rows[:, 3:6],
+        rows[:, 6:10] if with_attitude else None,
+        rows[:, 10:14] if with_attitude else None,
+        largest,
+        angle / (2.0 * np.pi),
+        float(rows[:, 14].max()),
+        steps.value,
+    )
+
+
+def _body(scene: Scene):  # noqa: ANN202
+    """Return a body's numbers in pairs, and what makes pairs of a torque."""
+    if scene.coefficients is not None:
+        return _pairs(exact_body(scene)[1]), lambda torque: _pairs([Fraction(x) for x in torque])
+    if scene.inertia is not None:
+        matrix = [[Fraction(x) for x in row] for row in scene.inertia]
+    else:
+        matrix = [[Fraction(0)] * 3 for _ in range(3)]
+        for axis, moment in enumerate(scene.moments or ()):
+            matrix[axis][axis] = Fraction(moment)
+    (a, b, c), (_, d, e), (_, _, f) = matrix
+    adjugate = [
+        [d * f - e * e, c * e - b * f, b * e - c * d],
+        [c * e - b * f, a * f - c * c, b * c - a * e],
+        [b * e - c * d, b * c - a * e, a * d - b * b],
+    ]
+    determinant = a * adjugate[0][0] + b * adjugate[0][1] + c * adjugate[0][2]
+    inverse = [[x / determinant for x in row] for row in adjugate]
+    numbers: list[float] = []
+    for row in (*matrix, *inverse):
+        numbers += _pairs(row)
+    return numbers, lambda torque: _pairs([Fraction(x) for x in torque])
+
+
+def _unit(values: Sequence[float]) -> list[float]:
+    """Return a quaternion over its length, in pairs."""
+    exact = [Fraction(x) for x in values]
+    square = sum(x * x for x in exact)
+    # The root to 40 digits, from whole numbers.
+    scale = 10**40
+    root = Fraction(math.isqrt(int(square * scale * scale)), scale)
+    return _pairs([x / root for x in exact])
 
 
 def _pairs(values: Sequence[Fraction]) -> list[float]:

@@ -1,9 +1,10 @@
 """Errors and what is said of them: `python -m tests.estimates --scenes 20000 --seed 1`.
 
-Every scene is drawn anew from the seed and its number, solved to its tolerance, and held to a truth
-of 31 digits (`tests.estimates.truth`). One alone again: `--seed 1 --only 123`. Exit status 1 where an
-error exceeds the tolerance, where an answer says wrongly whether any digit is left, where a reported
-error is below a hundredth of the true one, or below a tenth more often than once in a thousand.
+Every scene is drawn anew from the seed and its number, solved to its tolerance, and compared with
+a truth of 31 digits (`tests.estimates.truth`). One scene again: `--seed 1 --only 123`. The exit
+status is 1 where an error exceeds the tolerance, where an answer reports wrongly whether any digit
+is left, where a reported error is below a hundredth of the true one, or below a tenth in more than
+one answer of a thousand.
 """
 
 import argparse
@@ -129,15 +130,15 @@ def _solved(method: str) -> Callable[[Draw], Answer]:
 
 def _prepared(method: str) -> Callable[[Draw], Answer]:
     def prepared(of: Draw) -> Answer:
-        solver = prepare(of.scene, method, of.tolerance, attitude=of.attitude)
-        start = np.array(of.scene.omega)
+        name, start = f"prepare {method}", np.array(of.scene.omega)
         if of.attitude:
-            omega, attitude = solver(start, of.time, of.scene.attitude)
-        else:
-            omega, attitude = solver(start, of.time), None
-        name = f"prepare {method}"
-        error = _error(of, omega, attitude)
-        return _answer(of, name, getattr(solver, "method", ""), solver.status, error, solver)
+            joint = prepare(of.scene, method, of.tolerance, attitude=True)
+            omega, attitude = joint(start, of.time, np.array(of.scene.attitude))
+            error = _error(of, omega, attitude)
+            return _answer(of, name, joint.plan.method, joint.status, error, joint)
+        solver = prepare(of.scene, method, of.tolerance)
+        error = _error(of, solver(start, of.time), None)
+        return _answer(of, name, solver.method, solver.status, error, solver)
 
     return prepared
 

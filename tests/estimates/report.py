@@ -55,9 +55,9 @@ def _entrances(found: Sequence[Answer]) -> Section:
     columns += [Column("2nd, %", digits(".1f"))]
     return [
         "exceed: error above tolerance + 4e-15 K at K < 1e6, worst: over that; due: rounding times "
-        "K above 3 tolerances, silent: not `sensitive` there; alarms: `sensitive` below 1/30; no end: "
-        "neither complete nor sensitive at K < 1e6; low, blind: reported error below a tenth, a "
-        "hundredth of the true one; 2nd: second runs at K < 1e3",
+        "K above 3 tolerances, silent: not `sensitive` there; alarms: `sensitive` below 1/30; no "
+        "end: neither complete nor sensitive at K < 1e6; low, blind: reported error below a tenth, "
+        "a hundredth of the true one; 2nd: second runs at K < 1e3",
         Table(columns, rows),
     ]
 

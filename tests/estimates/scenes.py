@@ -28,7 +28,12 @@ _WAYS = (
     "plain", "near the middle axis", "plain", "strong torque", "rough", "steady", "cancelling",
     "slow",
 )  # fmt: skip
-ATTITUDE, INERTIA, IN_SPACE, SEVERAL = "attitude", "full inertia", "torque in space", "several times"
+ATTITUDE, INERTIA, IN_SPACE, SEVERAL = (
+    "attitude",
+    "full inertia",
+    "torque in space",
+    "several times",
+)
 KINDS = (
     "all", *LAWS, *_SPEEDS, *_BODIES, *dict.fromkeys(_WAYS[:4] + _WAYS[5:]),
     *(f"rough: {name}" for name in _ROUGH), ATTITUDE, INERTIA, IN_SPACE, SEVERAL,
@@ -58,19 +63,24 @@ class Draw:
         return self.times[-1]
 
 
-def drawn(seed: str, number: int, tolerances: tuple[float, ...] = ()) -> Draw:
+def drawn(seed: str, number: int, tolerances: tuple[float, ...] = (), dressed: bool = True) -> Draw:
     """Return what `number`, from 0 on, of a seed stands for.
 
     Its tolerance is one of those given, by default any from `COARSEST` to `FINEST`. Drawn again
-    where the body turns more than some 300 times, or the truth would take too many steps.
+    where the body turns more than some 300 times, or the truth would take too many steps. Without
+    `dressed` it has principal axes, no attitude and one time, and no kind of motion after "rough".
     """
     source = Random(f"estimates/{seed}/{number}")
     law, place = LAWS[number % len(LAWS)], number // len(LAWS)
-    way = _WAYS[place % len(_WAYS)]
+    ways = _WAYS if dressed else _WAYS[: _WAYS.index("rough") + 1]
+    way = ways[place % len(ways)]
     while True:
         scene, time, kinds = _rough(source) if way == "rough" else _by_kind(source, law, way)
-        scene, more = _dressed(source, scene)
-        times = _times(source, time)
+        times: tuple[float, ...] = (time,)
+        more: list[str] = []
+        if dressed:
+            scene, more = _dressed(source, scene)
+            times = _times(source, time)
         if len(times) > 1:
             more.append(SEVERAL)
         try:
@@ -92,7 +102,8 @@ def _dressed(source: Random, scene: Scene) -> tuple[Scene, list[str]]:
     kinds = []
     if source.random() < 0.5:
         kinds.append(ATTITUDE)
-        scene = replace(scene, attitude=[source.gauss(0.0, 1.0) for _ in range(4)])
+        w, x, y, z = (source.gauss(0.0, 1.0) for _ in range(4))
+        scene = replace(scene, attitude=(w, x, y, z))
         if scene.moments and not scene.torque.is_zero and source.random() < 0.4:
             kinds.append(IN_SPACE)
             scene = replace(scene, torque=replace(scene.torque, frame="space"))
@@ -104,7 +115,7 @@ def _dressed(source: Random, scene: Scene) -> tuple[Scene, list[str]]:
 
 def _about_other_axes(source: Random, scene: Scene) -> Scene:
     """Return a scene about axes that are not the principal ones, rounded as it comes."""
-    a, b, c = np.linalg.qr(np.array([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)]))[0]
+    a, b, _ = np.linalg.qr([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)])[0]
     axes = np.array([a, b, np.cross(a, b)])
 
     def turn(vector: Triple) -> Triple:
@@ -201,7 +212,9 @@ def _cancelling(source: Random, scene: Scene) -> Scene:
         kind, pair = "sines", [(one, frequency), (triple(-amplitude), frequency * rest)]
     else:
         pair = [(one, frequency), (other, frequency)]
-    return replace(scene, torque=replace(law, **{kind: (*getattr(law, kind), *pair)}))
+    if kind == "sines":
+        return replace(scene, torque=replace(law, sines=(*law.sines, *pair)))
+    return replace(scene, torque=replace(law, cosines=(*law.cosines, *pair)))
 
 
 def _pushed(scene: Scene, factor: float) -> Scene:

@@ -22,7 +22,6 @@ from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.truth.integer_series import exact_body
 
 MOST_STEPS = 40_000
 DIGITS_LOST = 1e-29  # of the pairs, over their many steps, before the motion amplifies it
@@ -51,10 +50,11 @@ class Truth:
 
     def at_the_end(self) -> "Truth":
         """Return the last row alone."""
-        rows = (self.omega, self.remainder, self.attitude, self.attitude_remainder)
-        last = [None if each is None else each[-1:] for each in rows]
-        names = ("omega", "remainder", "attitude", "attitude_remainder")
-        return replace(self, **dict(zip(names, last, strict=True)))
+        found = replace(self, omega=self.omega[-1:], remainder=self.remainder[-1:])
+        if self.attitude is None or self.attitude_remainder is None:
+            return found
+        attitude, remainder = self.attitude[-1:], self.attitude_remainder[-1:]
+        return replace(found, attitude=attitude, attitude_remainder=remainder)
 
     def error(self, omega: Array) -> float:
         """Return the largest error of any component over the largest omega."""
@@ -93,17 +93,17 @@ def truth_of(
     unit = math.ulp(until[-1])
     assert all(Fraction(t) % Fraction(unit) == 0 for t in until.tolist())
     law = scene.torque
-    body, torque_over = _body(scene)
+    body = _body(scene)
     waves: list[float] = []
     for cosine, some in ((0.0, law.sines), (1.0, law.cosines)):
         for amplitude, frequency in some:
-            waves += [*torque_over(amplitude), frequency, cosine]
+            waves += [*_pairs_of(amplitude), frequency, cosine]
     rows, found = np.empty((len(until), _ROW)), (ctypes.c_double * 2)()
     steps = ctypes.c_int()
     with_attitude = attitude or law.in_space
     status = _library().pairs_truth(
         _COEFFICIENTS if scene.coefficients is not None else _INERTIA, _array(body),
-        _array(torque_over(law.constant)), _array(torque_over(law.rate)),
+        _array(_pairs_of(law.constant)), _array(_pairs_of(law.rate)),
         len(waves) // 8, _array(waves), int(with_attitude), int(law.in_space),
         _array(scene.omega), _array(_unit(scene.attitude or IDENTITY)),
         len(until), _array(until.tolist()), most_steps,
@@ -124,10 +124,10 @@ def truth_of(
     )
 
 
-def _body(scene: Scene):  # noqa: ANN202
-    """Return a body's numbers in pairs, and what makes pairs of a torque."""
+def _body(scene: Scene) -> list[float]:
+    """Return A, B, C in pairs, or the inertia matrix and its inverse."""
     if scene.coefficients is not None:
-        return _pairs(exact_body(scene)[1]), lambda torque: _pairs([Fraction(x) for x in torque])
+        return _pairs_of(scene.coefficients)
     if scene.inertia is not None:
         matrix = [[Fraction(x) for x in row] for row in scene.inertia]
     else:
@@ -145,7 +145,7 @@ def _body(scene: Scene):  # noqa: ANN202
     numbers: list[float] = []
     for row in (*matrix, *inverse):
         numbers += _pairs(row)
-    return numbers, lambda torque: _pairs([Fraction(x) for x in torque])
+    return numbers
 
 
 def _unit(values: Sequence[float]) -> list[float]:
@@ -156,6 +156,10 @@ def _unit(values: Sequence[float]) -> list[float]:
     scale = 10**40
     root = Fraction(math.isqrt(int(square * scale * scale)), scale)
     return _pairs([x / root for x in exact])
+
+
+def _pairs_of(values: Sequence[float]) -> list[float]:
+    return _pairs([Fraction(x) for x in values])
 
 
 def _pairs(values: Sequence[Fraction]) -> list[float]:

@@ -38,7 +38,10 @@ def untaken(tmp_path_factory: pytest.TempPathFactory) -> as_written.Solve:
 
 @cache
 def _draws() -> list[tuple[Draw, Trajectory]]:
-    draws = [drawn("error", number, (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)) for number in range(200)]
+    draws = [
+        drawn("error", number, (1e-3, 1e-5, 1e-7, 1e-9, 1e-11), dressed=False)
+        for number in range(200)
+    ]
     return [(each, solve(each.scene, [each.time], "taylor", each.tolerance)) for each in draws]
 
 
@@ -98,7 +101,7 @@ def test_is_made_again_where_much_grows_and_hardly_else() -> None:
 def test_says_where_no_digit_is_left() -> None:
     lost = []
     for number in range(200):
-        of = drawn("lost", number, (1e-9, 1e-11, 1e-13))
+        of = drawn("lost", number, (1e-9, 1e-11, 1e-13), dressed=False)
         if of.truth.growth < 100.0:
             continue
         ended = solve(of.scene, [of.time], "taylor", of.tolerance).ended

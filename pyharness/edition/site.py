@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.edition import api, decks, documents, figures, laboratory, ledger
 from pyharness.edition.bundle import bundle
-from pyharness.edition.markdown import formula
+from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
 from pyharness.history.claims.report import written
 from pyharness.history.tei import tei_document
@@ -224,5 +224,5 @@ def _templates() -> "Environment":
         lstrip_blocks=True,
     )
     templates.filters["number"] = written
-    templates.globals["formula"] = formula
+    templates.globals["inline"] = inline
     return templates

@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from selenium.webdriver import Chrome
 
 WIDTHS = (360, 800, 1440)
+# Wider than any font that a reader may have: every letter takes an em more.
+WIDEST_FONT = "* { letter-spacing: 1em !important; }"
 
 
 @contextmanager
@@ -25,6 +27,15 @@ def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]
 def errors(browser: Chrome) -> list[str]:
     """Return what the console says, and forget it."""
     return [each["message"] for each in browser.get_log("browser")]  # type: ignore[no-untyped-call]
+
+
+def add_style(browser: Chrome, style: str) -> None:
+    """Add a style to the page that the browser shows."""
+    script = (
+        "const style = document.createElement('style');"
+        "style.textContent = arguments[0]; document.head.append(style);"
+    )
+    browser.execute_script(script, style)
 
 
 def too_wide(browser: Chrome) -> int:

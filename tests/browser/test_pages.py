@@ -10,7 +10,7 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser.screen import WIDTHS, errors, screen, too_wide
+from tests.browser.screen import WIDEST_FONT, WIDTHS, add_style, errors, screen, too_wide
 
 
 def addresses(site: Path) -> list[str]:
@@ -43,6 +43,39 @@ def test_no_page_has_an_error_or_is_wider_than_the_screen(
             if beyond > 0 or said:
                 found[address] = [beyond, said]
     assert found == {}
+
+
+@pytest.mark.parametrize("width", [320, *WIDTHS])
+def test_no_page_is_wider_than_the_screen_with_a_font_twice_as_wide(
+    browser: Chrome, site: Path, width: int
+) -> None:
+    found = {}
+    with screen(browser, width):
+        for address in addresses(site):
+            browser.get(address)
+            add_style(browser, WIDEST_FONT)
+            if (beyond := too_wide(browser)) > 0:
+                found[address] = beyond
+    assert found == {}
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "<p style='white-space: nowrap'>reproduced in part</p>",
+        f"<p><math>{'<mi>F</mi>' * 12}</math></p>",
+        "<p>denominator</p>",
+    ],
+)
+def test_what_a_font_makes_too_wide_is_found(browser: Chrome, tmp_path: Path, body: str) -> None:
+    page = tmp_path / "page.html"
+    phone = "<meta name=viewport content='width=device-width'>"
+    page.write_text(f"<!doctype html><html lang=en>{phone}<title>t</title><body>{body}")
+    with screen(browser, 200):
+        browser.get(page.as_uri())
+        assert too_wide(browser) == 0
+        add_style(browser, WIDEST_FONT)
+        assert too_wide(browser) > 0
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

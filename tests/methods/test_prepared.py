@@ -106,7 +106,7 @@ _NO_STARTS = (
 )  # fmt: skip
 _NO_TIMES = (
     np.array([1.0, 2.0]), np.array([1.0]), [1.0], "1.0", None, 1j, np.complex64(1.0), 10**400,
-    10**5000, True, np.array("1.0"), np.timedelta64(1),
+    10**5000, True, np.array("1.0"), np.timedelta64(1, "s"),
 )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """The build: what the binary needs, what f2py may not guess, and what the set-up says."""
 
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -49,6 +50,50 @@ def test_kind_that_f2py_would_guess_fails_the_build(tmp_path: Path) -> None:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == code, done.stderr
         assert ("is mapped to C" in done.stderr) == bool(code)
+
+
+def _hook(*folders: Path) -> subprocess.CompletedProcess[str]:
+    """Ask the build backend what an editable install needs, with these folders on the path."""
+    code = "import build_backend as b; print(b.get_requires_for_build_editable())"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, folders))}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_an_editable_install_in_build_isolation_is_refused(tmp_path: Path) -> None:
+    """Pip puts the build tools into a folder, on the path of the build alone, and removes it."""
+    backend = ROOT / ".ci"
+    kept = _hook(backend)
+    assert kept.returncode == 0, kept.stderr
+    assert kept.stdout.startswith("[")
+    spec = importlib.util.find_spec("mesonpy")
+    assert spec is not None
+    (tmp_path / "mesonpy").symlink_to(Path(spec.origin or "").parent)
+    refused = _hook(backend, tmp_path)
+    assert refused.returncode == 1
+    assert refused.stderr == ""
+    (line,) = refused.stdout.splitlines()
+    assert "'make .venv/ready'" in line
+    assert "pip install --no-build-isolation --editable ." in line
+
+
+@pytest.mark.external
+def test_a_build_without_a_fortran_compiler_says_so_in_one_line(tmp_path: Path) -> None:
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    for tool in ("sh", "env", "cc", "gcc", "clang", "ld", "as", "ar", "uname"):
+        if found := shutil.which(tool):
+            (tools / tool).symlink_to(found)
+    here = Path(sys.executable).parent
+    environment = {"PATH": f"{here}{os.pathsep}{tools}", "HOME": os.environ.get("HOME", "/")}
+    command = ["meson", "setup", str(tmp_path / "build"), str(ROOT)]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    (line,) = (each for each in done.stdout.splitlines() if "ERROR" in each)
+    assert "no Fortran compiler is found: install one" in line
+    assert "apt-get install gfortran" in line
 
 
 @pytest.mark.external

@@ -71,9 +71,9 @@ if not TYPE_CHECKING:
             if name in names:
                 return getattr(import_module(f"pyharness.{room}"), name)
         if name == "__version__":
-            from importlib.metadata import version
+            from pyharness.model.distribution import version
 
-            return version("pyharness")
+            return version()
         raise AttributeError(f"module 'pyharness' has no attribute '{name}'")
 
 

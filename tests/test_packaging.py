@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 import pyharness
+from pyharness.model.distribution import DISTRIBUTION
 
 ROOT = Path(__file__).parent.parent
 SCRIPT = ROOT / "tests/user_script.py"
@@ -117,6 +118,20 @@ def test_lower_bounds_are_what_the_landing_script_installs() -> None:
     assert done.stdout.split() == [each.replace(">=", "==") for each in bounds]
     assert all(re.fullmatch(r"[\w-]+==[\d.]+", each) for each in done.stdout.split())
     assert not re.search(r"(numpy|scipy|mpmath|matplotlib)[=><]", script)
+
+
+def test_nothing_tells_users_to_install_the_package_of_others() -> None:
+    """The index has a package by the name of the import; ours has another name."""
+    assert PROJECT["name"] == DISTRIBUTION != "pyharness"
+    other = re.compile(r"pip install\b[^\n]*?['\" ]pyharness\b(?![-/._])|\bpyharness\[")
+    assert other.search("pip install 'pyharness[sweep]'")
+    assert other.search("pip install pyharness")
+    folders = ("docs", "pyharness", ".ci", ".github", "web/laboratory")
+    files = [each for folder in folders for each in (ROOT / folder).rglob("*") if each.is_file()]
+    texts = (".md", ".py", ".yml", ".js", ".html", "")
+    for file in [ROOT / "README.md", *(each for each in files if each.suffix in texts)]:
+        found = other.search(file.read_text())
+        assert found is None, f"{file}: {found and found[0]}"
 
 
 def test_the_citation_is_that_of_the_project() -> None:

@@ -2,6 +2,7 @@
 
 from importlib import import_module
 
+from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
 
 LIBRARIES = (
@@ -16,4 +17,4 @@ def check_libraries() -> None:
         try:
             import_module(name)
         except ImportError:
-            raise InputError(f"edition needs {name}: 'pip install pyharness[edition]'") from None
+            raise InputError(f"edition needs {name}: {install_command('edition')}") from None

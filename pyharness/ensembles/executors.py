@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from pyharness.ensembles.sweep import Arrays, Sweep, solve_chunk
+from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
 
 EXECUTORS = ("here", "processes", "dask")
@@ -111,7 +112,7 @@ def check_dask() -> None:
     try:
         import distributed  # noqa: F401
     except ImportError:
-        raise InputError("--executor dask needs dask: pip install 'pyharness[sweep]'") from None
+        raise InputError(f"--executor dask needs dask: {install_command('sweep')}") from None
 
 
 @contextlib.contextmanager

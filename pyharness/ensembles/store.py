@@ -11,7 +11,6 @@ import os
 import shutil
 import warnings
 from collections.abc import Iterator
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ import numpy as np
 from pyharness.ensembles.fields import units_of
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import Arrays, Sweep
+from pyharness.model.distribution import install_command, version
 from pyharness.model.errors import InputError
 
 _SCHEMA = 1
@@ -32,7 +32,7 @@ def check_zarr() -> None:
     try:
         import zarr  # noqa: F401
     except ImportError:
-        raise InputError("sweep needs zarr: pip install 'pyharness[sweep]'") from None
+        raise InputError(f"sweep needs zarr: {install_command('sweep')}") from None
 
 
 class Store:
@@ -136,10 +136,10 @@ def check_store(sweep: Sweep, path: str) -> bool:
             f"--out '{path}': is the store of another sweep file (SHA-256 {made_by[0]:.12}, and "
             f"this one's is {sweep.fingerprint:.12}); {_SAME_SWEEP}"
         )
-    if made_by[1] != version("pyharness"):
+    if made_by[1] != version():
         raise InputError(
             f"--out '{path}': was made by pyharness {made_by[1]}, and this is "
-            f"{version('pyharness')}, whose results may differ; {_SAME_SWEEP}"
+            f"{version()}, whose results may differ; {_SAME_SWEEP}"
         )
     return True
 
@@ -161,7 +161,7 @@ def _fill(sweep: Sweep, folder: Path) -> None:
     attributes: dict[str, Any] = {
         "schema": _SCHEMA,
         "title": sweep.name,
-        "pyharness_version": version("pyharness"),
+        "pyharness_version": version(),
         "sweep": sweep.text,
         "sweep_sha256": sweep.fingerprint,
     }

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
+from pyharness.model.distribution import DISTRIBUTION
 from pyharness.model.report import Line, Report
 
 OPTIONAL = {
@@ -41,7 +42,7 @@ def build() -> Build:
     except ImportError:
         pass
     return Build(
-        version=_version("pyharness") or "not installed",
+        version=_version(DISTRIBUTION) or "not installed",
         compiler=compiler,
         flags=flags,
         extension=extension,

@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
 from pyharness.model.report import Picture
 from pyharness.views.csv import csv_text
@@ -34,7 +35,7 @@ def check_matplotlib(what: str) -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise InputError(f"{what} needs matplotlib: 'pip install matplotlib'") from None
+        raise InputError(f"{what} needs matplotlib: {install_command('plots')}") from None
 
 
 def numbers_beside(path: str) -> str:

@@ -124,7 +124,10 @@ def test_what_writes_pages_may_be_missing(
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, name, None)  # an import of it fails
     assert main(["edition", "--out", str(tmp_path / "site")]) == 2
-    assert f"edition needs {name}: 'pip install pyharness[edition]'" in capsys.readouterr().err
+    assert (
+        f"edition needs {name}: pip install 'rigid-body-harness[edition]'"
+        in capsys.readouterr().err
+    )
 
 
 def test_the_report_counts_files_by_kind(built_site: Mapping[str, bytes]) -> None:

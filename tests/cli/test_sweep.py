@@ -111,4 +111,4 @@ def test_missing_package_is_named(
     monkeypatch.setitem(sys.modules, package, None)
     more = ["--executor", options] if options else []
     assert main([*["sweep", "sweep.toml", "--out", "store"], *more]) == 2
-    assert "pip install 'pyharness[sweep]'" in capsys.readouterr().err
+    assert "pip install 'rigid-body-harness[sweep]'" in capsys.readouterr().err

@@ -220,5 +220,5 @@ def test_matplotlib_that_is_missing_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert main(["figures", "--out", str(tmp_path / "new")]) == 2
-    assert "pip install matplotlib" in capsys.readouterr().err
+    assert "pip install 'rigid-body-harness[plots]'" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -13,6 +13,7 @@ from pyharness.bench.peers import installed, peers
 from pyharness.bench.random_loads import random_load
 from pyharness.cli import options as shared
 from pyharness.compare.random_scenes import weekly_seed
+from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene_file import case_numbers
 
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     if missing and options.peers is not None:
         raise InputError(
             f"--peers: {missing[0].name} needs {missing[0].package}, which is not installed: "
-            "pip install 'pyharness[peers]'"
+            + install_command("peers")
         )
     contenders = methods + [each for each in others if each not in missing]
     if not contenders:
@@ -80,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
     if not found.rows:
         told = "; ".join(reports.not_measured(found))
         raise InputError(f"bench: nothing could be measured: {told}")
-    absent = "not installed: pip install 'pyharness[peers]'"
+    absent = f"not installed: {install_command('peers')}"
     found.refused.extend(
         Refusal(load, each.name, None, absent) for each in missing for load in loads
     )

@@ -63,7 +63,7 @@ def refuse_rounding(solver: str, setting: float) -> None:
 def _prepared(name: str, scene: Scene) -> Maker:
     candidate = called if scene.attitude is None else turning
     # A closed form has no setting.
-    return lambda horizon, setting: candidate(name, setting or 1e-12).ready(scene, horizon)
+    return lambda horizon, setting: candidate(name, setting or None).ready(scene, horizon)
 
 
 def _in_steps(candidate: Candidate, scene: Scene) -> Maker:

@@ -98,7 +98,7 @@ def own_ensembles() -> list[EnsembleContender]:
 def _own(method: str) -> EnsembleMaker:
     def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
         # Results go where those of the call before went.
-        tolerance = setting if method == "taylor" else 1e-12
+        tolerance = setting if method == "taylor" else None
         step = HORIZON / setting if method == "rk4" else None
         kept = None
 

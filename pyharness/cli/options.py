@@ -105,6 +105,13 @@ def chosen_effort(options: argparse.Namespace) -> float:
     return positive(options.effort, "--effort", 1.0)
 
 
+def chosen_tolerance(options: argparse.Namespace) -> float | None:
+    """Return the requested tolerance; None where none is given, which is the method's default."""
+    if options.tolerance is None:
+        return None
+    return positive(options.tolerance, "--tolerance", 1.0)
+
+
 def chosen_seed(options: argparse.Namespace) -> str | None:
     """Return the seed of random draws; InputError for one that no line could repeat."""
     if options.seed is not None and not options.seed.isprintable():

@@ -82,7 +82,7 @@ def solved(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
     return Candidate(name, ready, rows)
 
 
-def called(name: str, tolerance: float, primed: bool = False) -> Candidate:
+def called(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
     """Return a prepared solver; `primed` by a call from another start, of which nothing may stay.
 
     A method with a fixed step, and Gauss collocation, go in the scene's steps.
@@ -97,7 +97,7 @@ def called(name: str, tolerance: float, primed: bool = False) -> Candidate:
     return Candidate(name, ready, _no_rows)
 
 
-def turning(name: str, tolerance: float) -> Candidate:
+def turning(name: str, tolerance: float | None) -> Candidate:
     """Return a prepared solver with attitude."""
 
     def ready(scene: Scene, time: float) -> Ready:

@@ -16,7 +16,7 @@ from pyharness.compare.candidates import listed, solved
 from pyharness.compare.orders import Order, measured_order
 from pyharness.compare.timing import seconds as timed
 from pyharness.methods.from_rows import attitude_from_rows
-from pyharness.methods.registry import SCIPY_METHODS
+from pyharness.methods.registry import SCIPY_METHODS, requested_tolerance
 from pyharness.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
@@ -77,7 +77,6 @@ class Comparison:
     reference: Reference
     programs: tuple[ProgramFinding, ...]
     methods: tuple[MethodFinding, ...]
-    tolerance: float  # of the methods
     growth: float | None  # of a small difference on the way, where it is known
     word: str = BINARY64  # of the programs
 
@@ -85,6 +84,11 @@ class Comparison:
     def digits(self) -> float | None:
         """Decimal digits that the motion leaves of rounding, whoever solves it."""
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
+
+    @property
+    def tolerance(self) -> float:
+        """The finest tolerance of the methods."""
+        return min(each.tolerance for each in self.methods)
 
     @property
     def is_sensitive(self) -> bool:
@@ -119,7 +123,7 @@ def compare_programs(
     listings: Sequence[Listing] | None = None,
     lipschitz: float = 500.0,
     may_stop: bool = True,
-    tolerance: float = 1e-8,
+    tolerance: float | None = None,
     effort: float = 1.0,
     attitude: bool = False,
     word: str = BINARY64,
@@ -137,8 +141,9 @@ def compare_programs(
         Constant of the stop test (1/s).
     may_stop : bool
         Whether the stop test may end a run.
-    tolerance : float
-        What `solve_ivp` is asked for, relative to the largest component of omega.
+    tolerance : float, optional
+        The tolerance of each method of `solve_ivp`, relative to the largest component of omega; by
+        default the method's own, as in `solve`.
     effort : float
         Factor on the work of each of them after which it gives up.
     attitude : bool
@@ -189,12 +194,13 @@ def compare_programs(
         programs.append(ProgramFinding(listing, run, good, ulp, found, order, per_step))
     import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
-    methods = [_method(scene, name, tolerance, effort, truth) for name in SCIPY_METHODS]
+    methods = [
+        _method(scene, name, requested_tolerance(name, tolerance), effort, truth)
+        for name in SCIPY_METHODS
+    ]
     growth = motion_growth(scene, scene.times()[-1])
     judged_programs, judged_methods = tuple(programs), tuple(methods)
-    return Comparison(
-        scene, lipschitz, truth, judged_programs, judged_methods, tolerance, growth, word
-    )
+    return Comparison(scene, lipschitz, truth, judged_programs, judged_methods, growth, word)
 
 
 def listings_for(

@@ -11,7 +11,7 @@ from pyharness.ensembles.loads import Load
 from pyharness.ensembles.one_by_one import Ends, ProgramRows, run_each, solve_each
 from pyharness.methods.many import Ensemble, solve_many
 from pyharness.methods.prepared import PREPARED
-from pyharness.methods.registry import REGISTRY
+from pyharness.methods.registry import REGISTRY, requested_tolerance
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
@@ -104,14 +104,14 @@ class Solved:
     def _solve(self, t_end: Array) -> Ends:
         solver = self.load.solver
         assert solver.method is not None
-        return many_ends(self.load, solver.method, solver.tolerance, t_end, self.omega0)
+        tolerance = requested_tolerance(solver.method, solver.tolerance)
+        return many_ends(self.load, solver.method, tolerance, t_end, self.omega0)
 
     def _turned(self, t_end: Array) -> Array:
         solver = self.load.solver
         assert solver.method is not None
-        found = _many(
-            self.load, solver.method, solver.tolerance, t_end, self.omega0, attitude0=IDENTITY
-        )
+        tolerance = requested_tolerance(solver.method, solver.tolerance)
+        found = _many(self.load, solver.method, tolerance, t_end, self.omega0, attitude0=IDENTITY)
         assert found.attitude is not None
         return found.attitude
 

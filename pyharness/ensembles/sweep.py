@@ -24,7 +24,7 @@ class Solver:
 
     method: str | None = "auto"
     program: str | None = None
-    tolerance: float = 1e-12
+    tolerance: float | None = None  # by default the method's own
     t_end: float | None = None
     listing: str = "original"
     reading: str = "adopted"

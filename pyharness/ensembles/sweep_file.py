@@ -16,7 +16,7 @@ from pyharness.ensembles.loads import listing_of
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import Solver, Sweep
 from pyharness.methods.prepared import PREPARED
-from pyharness.methods.registry import REGISTRY
+from pyharness.methods.registry import REGISTRY, requested_tolerance
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene
@@ -134,7 +134,9 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
                 raise InputError(f"{key} has no meaning without a program; give [solve] program")
         return Solver(
             method=given.get("method", "auto"),
-            tolerance=number("[solve] tolerance", given.get("tolerance", 1e-12)),
+            tolerance=number("[solve] tolerance", given["tolerance"])
+            if "tolerance" in given
+            else None,
             t_end=finite("[solve] t_end", given["t_end"]) if "t_end" in given else None,
         )
     for key in ("method", "tolerance", "t_end"):
@@ -254,9 +256,10 @@ def _check_solvers(sweep: Sweep) -> None:
         if method not in REGISTRY:
             raise unknown("method", method, REGISTRY)
         finest = REGISTRY[method].finest
-        given = [float(varied[0].coordinates().min())] if varied else [solver.tolerance]
-        if not REGISTRY[method].is_fixed_step and not all(finest <= each <= 1.0 for each in given):
-            raise InputError(f"tolerance is {given[0]:g}; allowed for {method}: {finest:.2g} to 1")
+        least = float(varied[0].coordinates().min()) if varied else solver.tolerance
+        asked = requested_tolerance(method, least)
+        if not REGISTRY[method].is_fixed_step and not finest <= asked <= 1.0:
+            raise InputError(f"tolerance is {asked:g}; allowed for {method}: {finest:.2g} to 1")
     if solver.t_end == 0.0 or any(
         axis.field == "t_end" and not axis.coordinates().all() for axis in sweep.axes
     ):

@@ -63,7 +63,7 @@ def check_animation(path: str, scene: Scene) -> None:
         raise InputError("--animate: no brick has these moments, one exceeds the sum of the others")
 
 
-def animation(scene: Scene, method: str, tolerance: float, end: float, path: str) -> bytes:
+def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
     """Return a brick of these moments that turns until `end` (s), as GIF or as a page of its own.
 
     In true time where that takes 2 to 10 s; else the title says how much slower or faster.

@@ -21,14 +21,14 @@ from pyharness.methods.many_starts import (
 )
 from pyharness.methods.plan import FINEST
 from pyharness.methods.prepared import CODES, PREPARED
-from pyharness.methods.registry import REGISTRY, check_attitude
+from pyharness.methods.registry import REGISTRY, check_attitude, requested_tolerance
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import ENDS, extension
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array
-from pyharness.model.values import Number, finite, tolerance_of
+from pyharness.model.values import Number, finite
 
 _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 
@@ -76,7 +76,7 @@ def solve_many(
     cosines: Any = None,
     attitude0: Any = None,
     method: str = "auto",
-    tolerance: Number = 1e-12,
+    tolerance: Number | None = None,
     step: Number | None = None,
     effort: float = 1.0,
     threads: int = 1,
@@ -100,7 +100,8 @@ def solve_many(
     method : str
         A name in `PREPARED`; `auto` is the closed form where no body has torque, else the series.
     tolerance : float
-        As in `prepare`: largest error at the end, relative to the largest omega on the way.
+        As in `prepare`: largest error at the end, relative to the largest omega on the way; by
+        default the method's own.
     step : float, optional
         Of the methods with a fixed step, s; by default the scene's.
     effort : float
@@ -150,8 +151,8 @@ def solve_many(
     }  # fmt: skip
     given.update({name: value for name, value in arrays.items() if value is not None})
     given["step"] = finite("step", given["step"] if step is None else step)
-    code = _code(method, tolerance)
-    bodies = _Bodies(given, t_end, code, tolerance_of(tolerance, FINEST), checked_effort(effort))
+    code, tolerance = _chosen(method, tolerance)
+    bodies = _Bodies(given, t_end, code, tolerance, checked_effort(effort))
     if bodies.attitude.size:
         check_attitude(method)
     return bodies.solve(threads_of(threads), out)
@@ -279,14 +280,15 @@ def _from_scenes(scenes: Iterable[Scene]) -> dict[str, Any]:
     return found
 
 
-def _code(method: str, tolerance: Number) -> int:
+def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
+    """Return the number by which the kernel knows a method, and the tolerance."""
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)
-    asked = tolerance_of(tolerance, finest)
+    asked = requested_tolerance(method, tolerance)
     if not finest <= asked <= 1.0:
         raise InputError(f"tolerance is {asked:g}; allowed: {finest:g} to 1")
-    return Methods.CLOSED_FORM_OR_TAYLOR if method == "auto" else CODES[method]
+    return (Methods.CLOSED_FORM_OR_TAYLOR if method == "auto" else CODES[method]), asked
 
 
 def _units(values: Any) -> Array:

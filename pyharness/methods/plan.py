@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from pyharness.methods.registry import REGISTRY, check_torque
+from pyharness.methods.registry import REGISTRY, check_torque, requested_tolerance
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 
@@ -49,14 +49,16 @@ class Plan:
 def plan(
     scene: Scene,
     method: str = "auto",
-    tolerance: float = 1e-12,
+    tolerance: float | None = None,
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
     """Decide what a scene needs; `rows` are results between the beginning and the end.
 
-    InputError where the method can't take the scene, or the tolerance is out of range.
+    Without a tolerance the plan is for the method's default. InputError where the method can't take
+    the scene, or the tolerance is out of range.
     """
+    tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST
     if not finest <= tolerance <= 1.0:
         place = " for quick" if method == "quick" else ""

@@ -14,8 +14,8 @@ import numpy as np
 from pyharness.methods.last_call import LastCall
 from pyharness.methods.many_starts import many_starts
 from pyharness.methods.packed import packed_scene
-from pyharness.methods.plan import EITHER, FINEST, Plan, plan
-from pyharness.methods.registry import check_torque
+from pyharness.methods.plan import EITHER, Plan, plan
+from pyharness.methods.registry import check_torque, requested_tolerance
 from pyharness.model.codes import Methods, Places
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
@@ -29,7 +29,6 @@ from pyharness.model.values import (
     number,
     three,
     three_floats,
-    tolerance_of,
 )
 
 if TYPE_CHECKING:
@@ -146,7 +145,7 @@ class Solver(LastCall, BoundKernel):
 def prepare(
     scene: Scene,
     method: str = ...,
-    tolerance: Number = ...,
+    tolerance: Number | None = ...,
     effort: float = ...,
     attitude: Literal[False] = ...,
 ) -> Solver: ...
@@ -154,7 +153,7 @@ def prepare(
 def prepare(
     scene: Scene,
     method: str = ...,
-    tolerance: Number = ...,
+    tolerance: Number | None = ...,
     effort: float = ...,
     *,
     attitude: Literal[True],
@@ -162,7 +161,7 @@ def prepare(
 def prepare(
     scene: Scene,
     method: str = "auto",
-    tolerance: Number = 1e-12,
+    tolerance: Number | None = None,
     effort: float = 1.0,
     attitude: bool = False,
 ) -> "Solver | AttitudeSolver":
@@ -175,9 +174,9 @@ def prepare(
     method : str
         A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
     tolerance : float
-        Largest error of any component at the end, relative to the largest on the way; methods with
-        a fixed step do not look at it. Where small differences grow by a factor K on the way, no
-        method keeps less than some 1e-15 K.
+        Largest error of any component at the end, relative to the largest on the way; by default
+        the method's own, as in `solve`. Methods with a fixed step do not look at it. Where small
+        differences grow by a factor K on the way, no method keeps less than some 1e-15 K.
     effort : float
         Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
     attitude : bool
@@ -202,7 +201,7 @@ def prepare(
     checked_scene(scene, any_torque=True)
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
-    tolerance = tolerance_of(tolerance, FINEST)
+    tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
     check_torque(scene, method, attitude)
     if attitude:

@@ -11,9 +11,15 @@ from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import Number, tolerance_of
 
 # Of 1 to 8 stages: low orders would need more steps than anyone waits for.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
+_GAUSS_DEFAULT = (1e-6, 1e-10, *6 * (1e-12,))
+# Of SciPy's methods. With attitude, over a hundred radians or where a perturbation grows a
+# thousandfold, none of them meets a tighter one; and Radau takes too long.
+_SCIPY_DEFAULT = 1e-8
+_DEFAULT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -24,6 +30,9 @@ class Method:
     title: str
     source: str
     finest: float  # the smallest tolerance that it claims to meet; 1 where it takes none
+    # The tolerance where none is requested: the finest that it meets in ordinary scenes within
+    # a fraction of its work limit, but no finer than 1e-12; 1 where it takes none.
+    default: float
     solve: Integrator  # called with checked times, of one side, that run away from 0
     gives_rows: bool = True  # else omega at the end alone, as a prepared solver
     # The power of the step size with which its global error falls, where one can be given; and
@@ -70,7 +79,14 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
 def _scipy(scipy: str, title: str, source: str) -> Method:
     source = f"scipy.integrate.solve_ivp; {source}"
     return Method(
-        scipy.lower(), title, source, FINEST[scipy], scipy_method(scipy), attitude=True, scipy=scipy
+        scipy.lower(),
+        title,
+        source,
+        FINEST[scipy],
+        _SCIPY_DEFAULT,
+        scipy_method(scipy),
+        attitude=True,
+        scipy=scipy,
     )
 
 
@@ -80,6 +96,7 @@ def _gauss(stages: int) -> Method:
         f"Gauss collocation of order {2 * stages}, steps halved until two agree",
         "fortran/modern/gauss_collocation.f90; Hairer, McLachlan and Razakarivony 2008",
         _GAUSS_FINEST[stages - 1],
+        _GAUSS_DEFAULT[stages - 1],
         _from("gauss", "gauss", stages),
         order=2 * stages,
     )
@@ -88,7 +105,7 @@ def _gauss(stages: int) -> Method:
 def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
     title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
     solve = _from("fixed_step", "fixed_step", name)
-    return Method(name, title, source, 1.0, solve, order=order, evaluations=evaluations)
+    return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
 
 
 REGISTRY = {
@@ -99,6 +116,7 @@ REGISTRY = {
             "closed form where there is one, else Taylor series",
             "pyharness.methods.plan",
             1e-15,
+            _DEFAULT,
             _from("solve", "by_plan"),
             attitude=True,
             space_torque=True,
@@ -112,6 +130,7 @@ REGISTRY = {
             "Taylor series by recurrence, step and order adapted",
             "ours; Jorba and Zou 2005, Experimental Mathematics 14",
             1e-15,
+            _DEFAULT,
             _from("taylor", "taylor"),
             attitude=True,
             space_torque=True,
@@ -121,6 +140,7 @@ REGISTRY = {
             "known solution, or Taylor series in decimal arithmetic",
             "pyharness.truth.reference",
             2.0**-52,
+            _DEFAULT,
             _reference,
             any_scale=True,
             attitude=True,
@@ -130,6 +150,7 @@ REGISTRY = {
             "known solution: sphere, or any body without torque by elliptic functions",
             "fortran/modern/torque_free.f90, sphere.f90; Jacobi 1849",
             1e-14,
+            _DEFAULT,
             _from("closed_form", "known_solution"),
             any_scale=True,
             attitude=True,
@@ -144,6 +165,7 @@ REGISTRY = {
             "fortran/modern/scaled_runge_kutta.f90",
             # Below it the rounding of its many steps would count, which it does not see.
             1e-12,
+            _DEFAULT,
             _no_rows,
             gives_rows=False,
         ),
@@ -155,6 +177,15 @@ FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
 # With the names that SciPy has for them.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
+
+
+def requested_tolerance(method: str, tolerance: Number | None) -> float:
+    """Return the requested tolerance as a float, or the method's default where it is None.
+
+    InputError for a tolerance that is no number; its range is not checked.
+    """
+    chosen = REGISTRY[method]
+    return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
 
 def check_attitude(method: str) -> None:

@@ -77,6 +77,7 @@ def trajectory_report(
         return {
             "scene": records.scene_record(scene),
             "method": method,
+            "tolerance": trajectory.tolerance,
             "listing": None if listing is None else records.listing_record(listing),
             **({} if word is None else {"word": word}),
             "trajectory": {

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from pyharness.methods.plan import plan
-from pyharness.methods.registry import METHODS, SCIPY_METHODS, Method, check_attitude, check_torque
+from pyharness.methods.registry import (
+    METHODS,
+    SCIPY_METHODS,
+    Method,
+    check_attitude,
+    check_torque,
+    requested_tolerance,
+)
 from pyharness.methods.scipy_ivp import finest_tolerance
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
@@ -18,7 +25,7 @@ from pyharness.model.principal import given_back, principal
 from pyharness.model.same_motion import factor_near_one, is_ordinary, scaled, unscaled
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, Numbers, number, several, tolerance_of
+from pyharness.model.values import Number, Numbers, number, several
 
 _ROWS = ("time", "recorded_time", "omega")
 _WORST_FIRST = ("overflow", "sensitive", "complete")
@@ -28,7 +35,7 @@ def solve(
     scene: Scene,
     times: Number | Numbers,
     method: str = "auto",
-    tolerance: Number = 1e-12,
+    tolerance: Number | None = None,
     effort: float = 1.0,
     attitude: bool = False,
 ) -> Trajectory:
@@ -45,7 +52,8 @@ def solve(
         A name in `pyharness.methods.registry.METHODS`.
     tolerance : float
         Largest error of any component at `times`, relative to the largest from 0 to the last of
-        them.
+        them. By default it is the method's own (`Method.default` in the registry), 1e-12 for
+        `auto`; the trajectory's `tolerance` reports it. A fixed-step method takes none.
     effort : float
         Factor on the work after which the method gives up: 1 is some ten seconds.
     attitude : bool
@@ -78,7 +86,7 @@ def solve(
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
     chosen = METHODS[method]
-    tolerance = tolerance_of(tolerance, chosen.finest)
+    tolerance = requested_tolerance(method, tolerance)
     if chosen.is_fixed_step and tolerance != 1.0:
         raise InputError(
             f"tolerance is {tolerance:g}; {method} takes none: it goes in the scene's steps, "
@@ -106,7 +114,8 @@ def solve(
     if below:
         marches[0] = _reversed(marches[0])
     found = marches[0] if len(marches) == 1 else _joined(*marches)
-    found = replace(found, moments=scene.moments)
+    reported = None if chosen.is_fixed_step else tolerance
+    found = replace(found, moments=scene.moments, tolerance=reported)
     if is_full:
         found = given_back(found, axes)
     return _reversed(found) if turned else found

@@ -67,6 +67,9 @@ class Trajectory:
     error : float or None
         Estimated error of any component at the times asked for, over the largest of omega on the
         way; None where the method estimates none, and after an overflow.
+    tolerance : float or None
+        The tolerance to which a method solved the scene; None for a program and for a method with
+        a fixed step, which take none.
     growth : float or None
         Largest norm of the derivative of omega at the end by omega at any time before; None where
         it is unknown.
@@ -97,6 +100,7 @@ class Trajectory:
     moments: tuple[float, float, float] | None = None
     axes: Array | None = None
     exact: NDArray[np.object_] | None = None
+    tolerance: float | None = None
 
     def rotation(self) -> "Rotation":
         """Return the attitudes as rotations of SciPy, which turn vectors from body to space.

@@ -260,9 +260,7 @@ def test_times_that_are_none_are_refused(times: Any) -> None:
         prepare(PLAIN).trajectory((1.0, 2.0, 3.0), times)
 
 
-@pytest.mark.parametrize(
-    "bad", ["1e-9", None, 1j, [1e-9], np.full(1, 1e-9), True, TOO_LARGE, _Evil()]
-)
+@pytest.mark.parametrize("bad", ["1e-9", 1j, [1e-9], np.full(1, 1e-9), True, TOO_LARGE, _Evil()])
 def test_tolerance_that_is_no_number_is_refused(bad: Any) -> None:
     for call in (lambda: solve(PLAIN, 1.0, "auto", bad), lambda: prepare(PLAIN, "auto", bad)):
         with pytest.raises(

@@ -17,7 +17,7 @@ OPTIONS = {
     **shared.LISTING,
     "--program P": "this program only",
     "--word W": f"arithmetic of the programs: {', '.join(WORD_NAMES)}",
-    "--tolerance E": "asked of solve_ivp (default 1e-8)",
+    "--tolerance E": "of each method of solve_ivp (default: the method's own)",
     "--attitude": "the attitude too: its error as an angle",
     "--ablate": "every subset of the defects, sorted by effect",
     **shared.STRICT,
@@ -32,9 +32,9 @@ def run(options: argparse.Namespace) -> int:
     programs = shared.chosen_programs(options)
     shared.check_known("word", options.word, WORD_NAMES)
     shared.check_known("listing", options.listing, ("original", "corrected"))
-    tolerance = shared.positive(options.tolerance, "--tolerance", 1e-8)
+    tolerance = shared.chosen_tolerance(options)
     finest = max(METHODS[name].finest for name in SCIPY_METHODS)
-    if not finest <= tolerance <= 1.0:
+    if tolerance is not None and not finest <= tolerance <= 1.0:
         raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:.2g} to 1")
     if options.ablate:
         return _ablate(options, scene, programs)

@@ -10,7 +10,7 @@ from pyharness.methods.report import plan_report
 OPTIONS = {
     **shared.SCENE,
     "--method M": "auto (default), or a name",
-    "--tolerance E": "relative (default 1e-12)",
+    "--tolerance E": "relative (default: the method's own, 1e-12 for auto)",
     "--velocity": "the velocity is wanted too",
     "--rows": "results on the way are wanted too, as in run",
     **shared.outputs(plot=""),
@@ -22,7 +22,7 @@ def run(options: argparse.Namespace) -> int:
     scene = shared.chosen_scene(options, any_torque=True)
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))
-    tolerance = shared.positive(options.tolerance, "--tolerance", 1e-12)
+    tolerance = shared.chosen_tolerance(options)
     shared.check_outputs(options)
     found = plan(scene, method, tolerance, options.velocity, options.rows)
     shared.show(plan_report(scene, found), options)

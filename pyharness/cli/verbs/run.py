@@ -34,7 +34,8 @@ OPTIONS = {
     "--times T1,T2,...": "where results are wanted, s (methods)",
     "--attitude FORM": f"the attitude too: {', '.join(FORMS)}",
     "--animate FILE": "a turning brick, as .gif or .html (methods; with --attitude)",
-    "--tolerance E": "error at these times over the largest |omega| (methods)",
+    "--tolerance E": "error at these times over the largest |omega| (methods; default: the "
+    "method's own, 1e-12 for auto)",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(FORMATS),
@@ -145,8 +146,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     shared.refuse(options, "--method", (*listing_options, "no_stop"))
     name = options.method
     shared.check_known("method", name, tuple(METHODS))
-    default = max(1e-9, METHODS[name].finest)
-    tolerance = shared.positive(options.tolerance, "--tolerance", default)
+    tolerance = shared.chosen_tolerance(options)
     times = scene.times()
     if options.times is not None:
         times = shared.numbers(options.times, "--times")
@@ -161,7 +161,9 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
 
         moving = animation(scene, name, tolerance, max(times, key=abs), options.animate)
         write_files({options.animate: moving}, "--animate")
-    title = f"method {name}: {METHODS[name].title}, tolerance {tolerance:g}"
+    title = f"method {name}: {METHODS[name].title}"
+    if trajectory.tolerance is not None:
+        title += f", tolerance {trajectory.tolerance:g}"
     return name, title, trajectory
 
 

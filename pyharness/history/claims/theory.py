@@ -148,7 +148,7 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 def _stepped(scene: Scene, method: str) -> Array:
     """Return omega at the end of a scene by a method of fixed steps, which takes no tolerance."""
-    omega: Array = solve(scene, scene.times(), method, tolerance=1.0).omega[-1]
+    omega: Array = solve(scene, scene.times(), method).omega[-1]
     return omega
 
 

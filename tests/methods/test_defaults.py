@@ -1,0 +1,120 @@
+"""Default arguments: every method solves ordinary scenes with its own default tolerance."""
+
+import inspect
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
+from pyharness.cli.main import main
+from pyharness.compare.random_scenes import draw
+from pyharness.ensembles.sweep import Solver
+from pyharness.methods.plan import plan
+from pyharness.methods.prepared import PREPARED
+from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
+from pyharness.model.listing import original
+from tests.conftest import Printed
+
+# Even numbers are bodies that exist, with a torque of any kind, that turn a few radians a second.
+_NUMBERS = (0, 2, 4, 6, 8)
+_CASES = [(name, number) for name in REGISTRY for number in _NUMBERS]
+
+
+def _scene(method: str, number: int) -> tuple[Scene, float]:
+    """Return a random scene that a method can take, and its last time (s)."""
+    drawn = draw("defaults", number)
+    scene = drawn.scene
+    if method == "closed-form":
+        scene = replace(scene, torque=TorqueLaw())
+    return scene, drawn.time
+
+
+@pytest.mark.parametrize(("method", "number"), [case for case in _CASES if case[0] in METHODS])
+def test_method_solves_random_scenes_with_its_default_arguments(method: str, number: int) -> None:
+    scene, time = _scene(method, number)
+    found = solve(scene, [0.5 * time, time], method)
+    assert found.ended == "complete"
+    if REGISTRY[method].is_fixed_step:
+        assert found.tolerance is None
+        return
+    assert found.tolerance == REGISTRY[method].default
+    truth = solve(scene, [0.5 * time, time], "taylor", 1e-15).omega
+    largest = max(np.abs(truth).max(), np.abs(scene.omega).max())
+    assert np.abs(found.omega - truth).max() <= (found.tolerance + 4e-15) * largest
+
+
+@pytest.mark.parametrize("number", _NUMBERS)
+@pytest.mark.parametrize("method", [name for name, each in METHODS.items() if each.attitude])
+def test_method_with_attitude_does_too(method: str, number: int) -> None:
+    scene, time = _scene(method, number)
+    found = solve(scene, time, method, attitude=True)
+    assert (found.ended, found.tolerance) == ("complete", REGISTRY[method].default)
+
+
+@pytest.mark.parametrize(("method", "number"), [case for case in _CASES if case[0] in PREPARED])
+def test_prepared_and_many_take_the_same_default(method: str, number: int) -> None:
+    scene, time = _scene(method, number)
+    solver, default = prepare(scene, method), REGISTRY[method].default
+    omega = solver(np.array(scene.omega), time)
+    assert solver.status == "complete"
+    np.testing.assert_array_equal(omega, prepare(scene, method, default)(scene.omega, time))
+    for given in (None, default):
+        many = solve_many(scene, time, method=method, tolerance=given)
+        assert many.ended.tolist() == ["complete"]
+    np.testing.assert_array_equal(many.omega, solve_many(scene, time, method=method).omega)
+
+
+@pytest.mark.parametrize("call", [solve, prepare, solve_many, plan, compare_programs, Solver])
+def test_no_entry_point_has_a_default_of_its_own(call: Callable[..., object]) -> None:
+    assert inspect.signature(call).parameters["tolerance"].default is None
+
+
+def test_default_is_one_that_its_method_can_meet() -> None:
+    for name, method in REGISTRY.items():
+        assert max(method.finest, 1e-12) <= method.default <= 1.0
+        assert (method.default == 1.0) == method.is_fixed_step
+        assert requested_tolerance(name, None) == method.default
+        assert requested_tolerance(name, 0.5) == 0.5
+    assert REGISTRY["auto"].default == 1e-12
+
+
+def test_command_line_takes_the_default_of_the_method(printed: Printed) -> None:
+    for method, words in (("auto", ", tolerance 1e-12\n"), ("gauss-1", ", tolerance 1e-06\n")):
+        assert words in printed(f"run --case 5 --method {method} --times 1")
+    assert "tolerance" not in printed("run --case 5 --method rk4 --times 1")
+    record = printed("run --case 5 --method lsoda --times 1 --format json")
+    assert f'"tolerance": {REGISTRY["lsoda"].default}' in record
+
+
+def test_comparison_takes_the_defaults_of_its_methods() -> None:
+    found = compare_programs(draw("defaults", 0).scene, [original("two-term")])
+    taken = {each.method: each.tolerance for each in found.methods}
+    assert taken == {name: REGISTRY[name].default for name in SCIPY_METHODS}
+    assert found.tolerance == min(taken.values())
+
+
+def test_plan_is_of_the_default(printed: Printed) -> None:
+    assert printed("plan --case 5") == printed("plan --case 5 --tolerance 1e-12")
+    with pytest.raises(InputError):
+        plan(draw("defaults", 0).scene, "quick", 1e-13)
+
+
+def test_document_has_the_default_of_every_method() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "methods.md").read_text()
+    table = text.partition("## Default tolerances")[2].partition("\n## ")[0]
+    rows = dict(re.findall(r"^\| `(\S+)` \| (\S+) \|", table, re.MULTILINE))
+    assert rows == {
+        name: "none" if method.is_fixed_step else f"{method.default:.0e}"
+        for name, method in REGISTRY.items()
+    }
+
+
+def test_help_names_the_default(capsys: pytest.CaptureFixture[str]) -> None:
+    for verb in ("run", "plan", "compare"):
+        with pytest.raises(SystemExit):
+            main([verb, "--help"])
+        assert "method's own" in " ".join(capsys.readouterr().out.split())

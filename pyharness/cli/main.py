@@ -5,7 +5,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from pyharness.cli import say
+from pyharness.cli import say, say_again
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
 # Each verb is a module of pyharness.cli.verbs, loaded when it is called for.
@@ -65,8 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _leave_stdout()
         return _complain(f"standard output: {error.strerror or error}", 2)
     except KeyboardInterrupt:
-        if sys.stderr.isatty():
-            sys.stderr.write("\r\x1b[K")  # how far it was
+        say_again("")  # wipes how far it was
         return _complain("interrupted", 130)
 
 
@@ -98,6 +97,5 @@ def _leave_stdout() -> None:
 
 def _complain(message: str, code: int) -> int:
     line = " ".join(message.split())
-    # A name from the command line may hold bytes that are no text.
-    say(f"pyharness: {line}\n".encode(errors="backslashreplace").decode())
+    say(f"pyharness: {line}\n")
     return code

@@ -9,7 +9,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import Any, NoReturn
 
-from pyharness.cli import say
+from pyharness.cli import say, say_again, shown, write_text
 from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
@@ -161,11 +161,17 @@ def chosen_scene(
     if options.steps is not None:
         changes["steps"] = whole(options.steps, "--steps")
     if abs(scene.attitude_length - 1.0) > NEAR_ONE:
-        warn(f"the attitude has the length {scene.attitude_length:.6g}; divided by it")
+        warn(f"the attitude has {_norm(scene.attitude_length)}; it was normalised")
     scene = checked_scene(replace(scene, **changes), any_axes, any_torque)
     if scene.is_impossible:
         warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
     return scene
+
+
+def _norm(length: float) -> str:
+    if math.isinf(length):
+        return f"a norm above {sys.float_info.max:.6g}"
+    return f"the norm {length:.6g}"
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
@@ -260,8 +266,7 @@ def warn(message: str) -> None:
 
 def progress(text: str) -> None:
     """Say on a terminal how far it is, in a line that the next one replaces; "" wipes it."""
-    if sys.stderr.isatty():
-        say(f"\r\x1b[K{text}")
+    say_again(text)
 
 
 def check_outputs(options: argparse.Namespace) -> None:
@@ -312,10 +317,9 @@ def emit(content: str | bytes, out: str | None) -> None:
     if out is not None:
         from pyharness.cli.output import write_files
 
-        write_files({out: content if isinstance(content, bytes) else content.encode()}, "--out")
+        data = content if isinstance(content, bytes) else shown(content).encode()
+        write_files({out: data}, "--out")
     elif isinstance(content, bytes):
         sys.stdout.buffer.write(content)
     else:
-        # A name may hold letters that the terminal's encoding lacks.
-        encoding = sys.stdout.encoding or "utf-8"
-        sys.stdout.write(content.encode(encoding, "backslashreplace").decode(encoding))
+        write_text(sys.stdout, content)

@@ -11,8 +11,10 @@ from threading import current_thread, main_thread
 from typing import Self
 
 from pyharness.model.errors import InputError
-from pyharness.model.pipes import write_waiting
+from pyharness.model.pipes import read_input, write_waiting
 from pyharness.views.pictures import numbers_beside
+
+_LARGEST_MARK = 1 << 24  # bytes of the file that lists what a verb wrote
 
 
 def check_writable(path: str, option: str) -> None:
@@ -38,6 +40,12 @@ def check_writable(path: str, option: str) -> None:
         elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
             reason = "permission denied"
         else:
+            # What no permission tells: a file system that takes no file, /proc among them.
+            probe = _File(path)
+            try:
+                probe.write(b"")
+            finally:
+                _remove([probe.new])
             return
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -178,11 +186,27 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
             raise InputError(f"{option} '{path}': is not a folder; give one, or a new name")
         for name in names:
             check_writable(str(folder / name), option)
-    elif not folder.parent.is_dir() or not os.access(folder.parent, os.W_OK):
+    elif reason := _why_not_made(folder):
         raise InputError(
-            f"{option} '{path}': can't be made in '{folder.parent}'; "
+            f"{option} '{path}': can't be made in '{folder.parent}'{reason}; "
             "give a folder, or a new name in a folder that can be written"
         )
+
+
+def _why_not_made(folder: Path) -> str:
+    """Return why a folder can't be made, after a colon; empty where it can.
+
+    It is made and removed: no permission tells of a name that is too long, or of a file system
+    that takes no folder.
+    """
+    if not folder.parent.is_dir():
+        return ": there is no such folder"
+    try:
+        folder.mkdir()
+        folder.rmdir()
+    except OSError as error:
+        return f": {error.strerror or error}"
+    return ""
 
 
 def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
@@ -211,12 +235,20 @@ def check_tree(path: str, mark: str, option: str) -> None:
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
+    new, old = _beside(folder)
     try:
-        reason = _why_not_anew(folder, mark)
+        # Both names will be needed, and a file in the first.
+        reason = _why_not_anew(folder, mark) or _why_not_made(old)
+        if not reason:
+            new.mkdir()
+            try:
+                (new / mark).touch()
+            finally:
+                shutil.rmtree(new, ignore_errors=True)
     except OSError as error:
         reason = error.strerror or str(error)
     if reason:
-        raise InputError(f"{option} '{path}': {reason}; give a new name")
+        raise InputError(f"{option} '{path}': {reason.removeprefix(': ')}; give a new name")
 
 
 def _why_not_anew(folder: Path, mark: str) -> str:
@@ -235,10 +267,16 @@ def _why_not_anew(folder: Path, mark: str) -> str:
 
 def _listed(mark: Path) -> Iterable[str]:
     try:
-        files = json.loads(mark.read_bytes())["files"]
+        files = json.loads(read_input(mark, "--out", _LARGEST_MARK, "a list of files"))["files"]
     except (OSError, ValueError, TypeError, KeyError):
         return ()
     return files if isinstance(files, dict) else ()
+
+
+def _beside(folder: Path) -> tuple[Path, Path]:
+    """Return where a folder is made anew, and where the one that stood there waits."""
+    new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
+    return new, old
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
@@ -247,7 +285,7 @@ def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     They are written beside it first. What stood there is gone when they have its place.
     """
     folder = Path(os.path.realpath(path))
-    new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
+    new, old = _beside(folder)
     try:
         with _Patience() as patience:
             try:

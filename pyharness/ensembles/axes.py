@@ -2,7 +2,7 @@
 
 import math
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -14,6 +14,8 @@ from pyharness.ensembles.fields import CHOICES, NUMBERS, field_names
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.scene_file import check_keys
 from pyharness.model.values import finite, whole
+
+Floats = NDArray[np.float64]
 
 # Of one axis: its values are held in memory.
 MOST_VALUES = 100_000_000
@@ -74,11 +76,11 @@ class Axis:
 def _coordinates(axis: Axis) -> NDArray[Any]:
     if axis.is_choice:
         return np.array(axis.values, dtype=object)
-    found: NDArray[np.float64]
+    found: Floats
     if axis.how == "listed":
         found = np.array(axis.values, dtype=np.float64)
     elif axis.how == "linear":
-        found = np.linspace(axis.values[0], axis.values[1], axis.count)
+        found = _between(axis, lambda first, last: np.linspace(first, last, axis.count))
     elif axis.how == "log":
         found = np.geomspace(axis.values[0], axis.values[1], axis.count)
     else:
@@ -89,7 +91,7 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
     return found
 
 
-def _drawn(axis: Axis) -> NDArray[np.float64]:
+def _drawn(axis: Axis) -> Floats:
     # All at once, so that no chunk has a say in it; each field has numbers of its own.
     seeds = np.random.SeedSequence([axis.seed, zlib.crc32(axis.field.encode())])
     source = np.random.Generator(np.random.Philox(seeds))
@@ -99,8 +101,21 @@ def _drawn(axis: Axis) -> NDArray[np.float64]:
     if axis.how == "normal":
         return source.normal(first, second, axis.count)
     if axis.how == "uniform":
-        return source.uniform(first, second, axis.count)
-    return np.exp(source.uniform(math.log(first), math.log(second), axis.count))
+        return _between(axis, lambda low, high: source.uniform(low, high, axis.count))
+    drawn = np.exp(source.uniform(math.log(first), math.log(second), axis.count))
+    # Rounding may take a draw beyond the ends, and beyond the range of numbers there.
+    return np.clip(drawn, min(first, second), max(first, second))
+
+
+def _between(axis: Axis, made: Callable[[float, float], Floats]) -> Floats:
+    """Return what is made between the ends of an axis, even where their distance overflows."""
+    first, last = axis.values
+    if math.isfinite(last - first):
+        return made(first, last)
+    # Halves and doubles are exact: numbers of that size are far from the least.
+    with np.errstate(over="ignore"):
+        doubled = 2.0 * made(0.5 * first, 0.5 * last)
+    return np.clip(doubled, min(first, last), max(first, last))
 
 
 def axis_of(table: object, number: int) -> Axis:

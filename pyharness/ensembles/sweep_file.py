@@ -20,7 +20,14 @@ from pyharness.methods.registry import REGISTRY, requested_tolerance
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.scene_file import case_scene, check_keys, read_scene, read_toml, scene_of
+from pyharness.model.scene_file import (
+    case_scene,
+    check_keys,
+    read_file,
+    scene_of,
+    scene_of_file,
+    toml_of,
+)
 from pyharness.model.values import finite, number, truth, whole
 
 _KEYS = ("name", "scene", "axis", "solve", "reductions", "chunk", "picture")
@@ -54,11 +61,11 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
-    data = read_toml(path, where)
+    content = read_file(path, where)
+    data = toml_of(content, where)
     try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
-        return _sweep(data, Path(path), text, claims or {})
-    except (InputError, OSError) as error:
+        return _sweep(data, Path(path), content.decode("utf-8-sig"), claims or {})
+    except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
 
@@ -107,8 +114,9 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         if not isinstance(table["file"], str):
             raise InputError(f"[scene] file is {kind_of(table['file'])}; it must be text")
         beside = path.parent / table["file"]
-        scene = read_scene(beside)
-        return checked_scene(scene), b"\0" + beside.read_bytes()
+        named = f"scene file '{beside}'"
+        content = read_file(beside, named)
+        return checked_scene(scene_of_file(content, beside.stem, named)), b"\0" + content
     if not table:
         raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
     return checked_scene(scene_of(table, path.stem)), b""

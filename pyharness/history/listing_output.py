@@ -7,10 +7,10 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import zip_longest
-from pathlib import Path
 
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.pipes import read_input
 from pyharness.model.report import Column, Report, Section, Table, words
 from pyharness.model.scene_file import case_scene
 from pyharness.original.printer import page
@@ -61,16 +61,11 @@ class Fit:
 
 def read_page(path: str) -> list[list[str]]:
     """Return the lines of a file that hold numbers alone, field by field; InputError for others."""
-    try:
-        with Path(path).open("rb") as file:
-            text = file.read(_LARGEST).decode("ascii", "replace")
-    except OSError as error:
-        raise InputError(f"--listing-output {path}: {error.strerror}") from None
-    found = _numbers(text)
+    where = f"--listing-output '{path}'"
+    content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
+    found = _numbers(content.decode("ascii", "replace"))
     if not any(len(line) >= 6 for line in found):
-        raise InputError(
-            f"--listing-output {path}: no row of numbers; allowed: what a program printed to TAPE6"
-        )
+        raise InputError(f"{where}: no row of numbers; allowed: what a program printed to TAPE6")
     return found
 
 

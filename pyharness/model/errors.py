@@ -42,11 +42,16 @@ class NotBuiltError(RuntimeError):
     """The compiled extension is missing: exit code 3 on the command line."""
 
 
-def printable(text: str) -> str:
-    """Return a text with what is no character, or steers a terminal, as an escape sequence."""
-    if text.isprintable():
+def printable(text: str, kept: str = "") -> str:
+    r"""Return a text in which what steers a terminal, or is no character, is an escape sequence.
+
+    The characters in `kept`, as in ``"\n\t"``, stay as they are.
+    """
+    if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
         return text
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return "".join(
+        c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text
+    )
 
 
 def kind_of(value: object) -> str:

@@ -6,25 +6,70 @@ import select
 import stat
 import time
 
+from pyharness.model.errors import InputError
+
 PATIENCE = 10.0  # s, until the other end of a pipe must have said or taken something
+_PIECE = 1 << 20
 
 
-def read_some(path: str, limit: int) -> bytes:
-    """Return what a file holds, `limit` bytes at the most; OSError where no one writes it."""
-    # Without O_NONBLOCK, opening a pipe waits for someone who writes.
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
+    """Return the content of a file that a user named: the one reader of such files.
+
+    It may be a regular file, or a pipe (``/dev/stdin`` among them) that someone writes to.
+
+    Parameters
+    ----------
+    path : path
+        Of the file.
+    where : str
+        How a message begins, as in ``scene file 'brick.toml'``.
+    limit : int
+        The largest size that is read, in bytes.
+    what : str
+        What the file should be, for a message: ``a TOML file``.
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read, a folder, a device, a file larger than `limit`, or a pipe
+        to which no one writes for `PATIENCE` seconds.
+    """
     try:
-        content = b""
-        while len(content) < limit:
+        content = _read(os.fspath(path), limit)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{where}: {reason}; give {what} that can be read") from None
+    if len(content) > limit:
+        raise InputError(f"{where}: larger than {limit} bytes; give {what} of at most that size")
+    return content
+
+
+def _read(path: str, limit: int) -> bytes:
+    """Return a file's content, up to a byte more than `limit`; OSError where it can't be read."""
+    # Without O_NONBLOCK, opening a pipe waits for someone who writes.
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
+    try:
+        mode = os.fstat(handle).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, "Is a directory")
+        if stat.S_ISBLK(mode) or (stat.S_ISCHR(mode) and not _is_quiet(handle)):
+            raise OSError(errno.EINVAL, "is a device")
+        content = bytearray()
+        while len(content) <= limit:
             if not select.select([handle], [], [], PATIENCE)[0]:
                 raise OSError(errno.ETIMEDOUT, f"nothing came within {PATIENCE:g} s")
-            piece = os.read(handle, limit - len(content))
+            piece = os.read(handle, min(_PIECE, limit + 1 - len(content)))
             if not piece:
                 break
             content += piece
-        return content
+        return bytes(content)
     finally:
         os.close(handle)
+
+
+def _is_quiet(handle: int) -> bool:
+    """Whether a character device is a terminal, or the empty one."""
+    return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 
 def write_waiting(path: str, content: bytes) -> None:

@@ -9,7 +9,7 @@ from typing import Any, SupportsIndex
 from pyharness.model.attitude import of_angles
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.facts import facts
-from pyharness.model.pipes import read_some
+from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.values import whole
 
@@ -59,22 +59,33 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
         raise InputError(f"scene file: {kind_of(path)}; allowed: a path, as text or a Path")
     path = os.fsdecode(path)
     where = f"scene file '{path}'"
-    data = read_toml(path, where)
+    return scene_of_file(read_file(path, where), Path(path).stem, where)
+
+
+def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
+    """Return the scene of a file's content; InputError, which begins with `where`, if none."""
+    data = toml_of(content, where)
     try:
-        return scene_of(data, Path(path).stem)
+        return scene_of(data, default_name)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
     """Return the content of a user's TOML file; InputError, which begins with `where`, if none."""
-    try:
-        content = read_some(os.fspath(path), _LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{where}: {reason}; give a TOML file that can be read") from None
-    if len(content) > _LARGEST_FILE:
-        raise InputError(f"{where}: larger than {_LARGEST_FILE} bytes; a scene is a few lines")
+    return toml_of(read_file(path, where), where)
+
+
+def read_file(path: str | os.PathLike[str], where: str) -> bytes:
+    """Return the bytes of a user's TOML file; InputError, which begins with `where`, if none.
+
+    Whoever needs them twice keeps them: a pipe can be read once.
+    """
+    return read_input(path, where, _LARGEST_FILE, "a TOML file")
+
+
+def toml_of(content: bytes, where: str) -> dict[str, Any]:
+    """Return what the bytes of a TOML file say; InputError, which begins with `where`, if none."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pyharness.model.errors import InputError, kind_of
+from pyharness.model.pipes import read_input
 from pyharness.original.octal import operated
 
 OURS = Path(__file__).parent.parent / "data" / "words" / "cdc.json"
+_LARGEST = 1 << 24  # bytes of a file
 _FIELDS = ("name", "op", "x", "y", "result")
 
 
@@ -44,11 +46,11 @@ def answers(path: str | Path = OURS) -> list[Answer]:
 
     InputError where it can't be read, is not of that form, or has no vector.
     """
+    content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
-        entries = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        reason = getattr(error, "strerror", None) or f"no JSON: {error}"
-        raise InputError(f"vectors '{path}': {reason}") from None
+        entries = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"vectors '{path}': no JSON: {error}; give a JSON file") from None
     if not isinstance(entries, list) or not entries:
         raise InputError(f"vectors '{path}': {kind_of(entries)}; allowed: a list of vectors")
     return [_answer(f"vectors '{path}', entry {n}", each) for n, each in enumerate(entries, 1)]

@@ -8,7 +8,6 @@ import hashlib
 import math
 import platform
 import shlex
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -24,8 +23,9 @@ from pyharness.methods.plan import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.scene_file import case_numbers, case_scene, toml_of
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.theory.conditioning import conditioning
 from pyharness.verify.selection import RECORD, Selection, replay
@@ -33,6 +33,7 @@ from pyharness.verify.selection import RECORD, Selection, replay
 _STEPS = (1, 10)
 _RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
 _TOLERANCE = 1e-9
+_LARGEST = 1 << 24  # bytes of a file
 _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 
@@ -137,7 +138,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
     found = {}
     for path in sorted(folder.glob("*.toml")):
         try:
-            file = tomllib.loads(path.read_text(encoding="utf-8"))
+            file = toml_of(read_input(path, "file", _LARGEST, "a record"), "file")
             for entry in file["trajectory"]:
                 _rows(entry)
                 _ = [entry[key] for key in _KEYS]

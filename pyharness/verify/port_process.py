@@ -8,6 +8,7 @@ import signal
 import subprocess
 import tempfile
 import time
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -17,6 +18,8 @@ PATIENCE = 60.0  # s for a run, the start of an interpreter that compiles includ
 _LARGEST = 1 << 26  # bytes of an answer
 _PIECE = 1 << 16
 _TO_END = 1.0  # s to end, once the output is closed
+_ROUNDS = 100  # of looking for what a port started; what is killed may take a while to end
+_MARK = "PYHARNESS_PORT"  # of every process that a port starts, in its environment
 
 
 class PortError(Exception):
@@ -34,6 +37,18 @@ def split_command(command: str) -> list[str]:
     return words
 
 
+def _processes_with(mark: str) -> list[int]:
+    """Return the processes alive with `mark` in their environment; none where there is no /proc."""
+    found = []
+    for folder in Path("/proc").glob("[1-9]*"):
+        # One may have ended meanwhile, or be another user's. One that has ended, and waits for its
+        # parent, has no environment any more.
+        with contextlib.suppress(OSError):
+            if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
+                found.append(int(folder.name))
+    return found
+
+
 class PortProcess:
     """A port from its start to its end, as a context; PortError where it can't be started."""
 
@@ -44,6 +59,7 @@ class PortProcess:
 
     def __enter__(self) -> Self:
         """Start it, in a group of its own: a shell's children end with it."""
+        self._mark = f"{_MARK}={os.urandom(16).hex()}"
         self._errors = tempfile.TemporaryFile()
         try:
             self._process = subprocess.Popen(
@@ -53,6 +69,7 @@ class PortProcess:
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
                 start_new_session=True,
+                env={**os.environ, _MARK: self._mark.removeprefix(f"{_MARK}=")},
             )
         except OSError as error:
             self._errors.close()
@@ -69,10 +86,19 @@ class PortProcess:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End it, whatever it is doing."""
+        """End it and all that it started, whatever they are doing."""
         # Where all of the group have ended there is none; macOS says so by the second.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
+        # One that has left the group, for a session of its own; it may be starting another.
+        for _ in range(_ROUNDS):
+            marked = _processes_with(self._mark)
+            if not marked:
+                break
+            for each in marked:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.kill(each, signal.SIGKILL)
+            time.sleep(0.01)
         self._process.wait()
         for file in (self._in, self._out, self._errors):
             file.close()

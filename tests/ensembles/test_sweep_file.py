@@ -1,5 +1,6 @@
 """Sweep files: what they say, and every mistake in a line."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -197,3 +198,26 @@ def test_sweep_of_the_documents_is_one() -> None:
     sweep = read_sweep(Path(__file__).parent.parent.parent / "docs/tumbling.toml")
     assert sweep.n_scenes == 2000
     assert sweep.n_chunks == 1
+
+
+@pytest.mark.parametrize("more", ["", "draw = 'uniform'\nseed = 1\n"])
+@pytest.mark.parametrize("ends", [(-1.7e308, 1.7e308), (1.7e308, -1.7e308)])
+def test_axis_may_span_the_whole_range_of_numbers(ends: tuple[float, float], more: str) -> None:
+    """The distance of the ends is no number."""
+    spread = [f"from = {ends[0]}", f"to = {ends[1]}", "count = 5"]
+    table = "\n".join(["field = 'omega.1'", *spread, more])
+    axis = axis_of(tomllib.loads(table), 1)
+    values = axis.coordinates()
+    assert np.abs(values).max() <= 1.7e308
+    if not more:
+        assert values.tolist() == [ends[0], 0.5 * ends[0], 0.0, 0.5 * ends[1], ends[1]]
+    assert len(set(values.tolist())) == 5
+
+
+def test_drawn_value_never_leaves_the_ends_of_its_axis() -> None:
+    """The logarithm of the largest number, rounded, is that of none."""
+    table = (
+        "field = 'omega.1'\ndraw = 'log-uniform'\nfrom = 1.7976931348623157e308\n"
+        "to = 1.7976931348623157e308\ncount = 9\nseed = 1"
+    )
+    assert set(axis_of(tomllib.loads(table), 1).coordinates().tolist()) == {1.7976931348623157e308}

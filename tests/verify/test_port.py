@@ -259,3 +259,21 @@ def test_requests_give_the_floats_back() -> None:
         assert asked["scene"]["masses"] == [100.0, 110.0, 120.0]
         assert asked["lipschitz"] == 500.0
     assert asked["scene"]["initial_torque"] is not None
+
+
+def test_what_leaves_the_group_of_a_port_is_ended_too(tmp_path: Path) -> None:
+    """A grandchild in a session of its own, whose parent has ended, outlived the check."""
+    script = (
+        "import os, sys, time\n"
+        "if os.fork() == 0:\n"
+        "    os.setsid()\n"
+        "    if os.fork():\n"
+        "        os._exit(0)\n"
+        "    os.execvp('sh', ['sh', '-c', 'read line; echo $$; exec sleep 60'])\n"
+        "os.wait(); time.sleep(60)"
+    )
+    with PortProcess(_python(tmp_path / "port.py", script)) as process:
+        child = int(process.ask(b"who?"))
+        os.kill(child, 0)
+        assert os.getsid(child) != os.getsid(process._process.pid)
+    assert _gone(child)

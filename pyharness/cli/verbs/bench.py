@@ -12,6 +12,7 @@ from pyharness.bench.measure import Refusal, measure, workloads
 from pyharness.bench.peers import installed, peers
 from pyharness.bench.random_loads import random_load
 from pyharness.cli import options as shared
+from pyharness.cli.forecast import SCENES, check_count
 from pyharness.compare.random_scenes import weekly_seed
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError, unknown
@@ -99,8 +100,7 @@ def _count(options: argparse.Namespace) -> int:
         return 0
     shared.refuse(options, "--random", ["case", "horizon", "plot"])
     count = shared.whole(options.random, "--random")
-    if count <= 0:
-        raise InputError(f"--random: {count}; allowed: a whole number above 0")
+    check_count("--random", count, 1, SCENES)
     seed = shared.chosen_seed(options)
     options.seed = weekly_seed() if seed is None else seed
     return count

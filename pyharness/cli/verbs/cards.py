@@ -2,14 +2,15 @@
 
 import argparse
 from hashlib import sha256
-from pathlib import Path
 
 from pyharness.cli import options as shared
 from pyharness.history.cards_report import cards_report, classes_report, scan_report
 from pyharness.model.errors import InputError
+from pyharness.model.pipes import read_input
 from pyharness.original.cards import chosen
 from pyharness.original.collation import expected_lines, undeclared, unexplained
 
+_LARGEST_SCAN = 1 << 24  # bytes
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "two-term, 1660, 1040-1090, two-term:1660; all where nothing is named",
@@ -51,11 +52,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _text(path: str) -> str:
+    where = f"--scan '{path}'"
+    content = read_input(path, where, _LARGEST_SCAN, "the text of a scan")
     try:
-        return Path(path).read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "is no text"
-        raise InputError(f"--scan '{path}': {reason}; give the text of a scan") from None
+        return content.decode()
+    except ValueError:
+        raise InputError(f"{where}: is no text; give the text of a scan") from None
 
 
 def _no_card(options: argparse.Namespace, chosen: str) -> None:

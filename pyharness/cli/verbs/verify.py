@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.cli import options as shared
+from pyharness.cli.forecast import CHECKS, check_count
 from pyharness.compare.checks import Check
 from pyharness.compare.checks_report import checks_report, samples, summary
 from pyharness.model.errors import InputError
@@ -138,8 +139,8 @@ def _selection(options: argparse.Namespace) -> Selection:
         if only and not any(each.partition("/")[0] == kind for each in only):
             shared.refuse(options, f"--only {options.only}", names)
     draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
-    if draws < 0:
-        raise InputError(f"--draws: {draws}; allowed: 0 or more")
+    if options.draws is not None:
+        check_count("--draws", draws, 0, CHECKS)
     seed = shared.chosen_seed(options)
     changes: dict[str, Any] = {} if seed is None else {"seed": seed}
     record = RECORD if options.record is None else Path(options.record)

@@ -1,0 +1,43 @@
+"""Forecasts: how long a number of random draws takes, said before any of them is made."""
+
+from typing import NamedTuple
+
+from pyharness.cli import say
+from pyharness.model.errors import InputError
+
+_WORTH_SAYING = 60.0  # s
+
+
+class Cost(NamedTuple):
+    """The cost of a draw, as measured on one core of 2026, and the most draws that are allowed."""
+
+    what: str  # the things drawn, in the plural
+    seconds: float
+    n_bytes: float
+    most: int
+
+
+# Nearly three checks a draw, each kept until the report.
+CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
+# Every contender with every setting, the reference included.
+SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
+
+
+def check_count(option: str, count: int, least: int, cost: Cost) -> None:
+    """Refuse a number of draws that no one waits for; say a forecast of one that takes long."""
+    from pyharness.ensembles.run import duration
+
+    if not least <= count <= cost.most:
+        shown = str(count) if abs(count) < 10**18 else "a number of more than 18 digits"
+        longest = duration(cost.most * cost.seconds)
+        raise InputError(
+            f"{option}: {shown}; allowed: a whole number from {least} to {cost.most}, which takes "
+            f"about {longest}"
+        )
+    seconds = count * cost.seconds
+    if seconds > _WORTH_SAYING:
+        memory = max(1.0, count * cost.n_bytes / 1e6)
+        say(
+            f"pyharness: {count} {cost.what} take about {duration(seconds)} and {memory:.0f} MB of "
+            "memory\n"
+        )

@@ -1,0 +1,209 @@
+"""Hostile input: devices, pipes, counts without end, letters that steer a terminal."""
+
+import os
+import re
+import time
+from pathlib import Path
+
+import pytest
+
+from pyharness import InputError
+from pyharness.cli import forecast, output, shown
+from pyharness.cli.main import main
+from pyharness.cli.options import progress, warn
+from pyharness.edition.report import MARK
+from pyharness.model import pipes
+from pyharness.model.errors import printable
+from pyharness.model.pipes import read_input
+
+Capture = pytest.CaptureFixture[str]
+
+BODY = "[body]\nmoments = [3.0, 2.0, 1.0]\n[initial]\nomega = [0.0, 1.0, 1.0]\n"
+SWEEP = (
+    "[scene]\ncase = 3\n[[axis]]\nfield = 'omega.1'\nfrom = 1.0\nto = 2.0\ncount = 2\n"
+    "[solve]\nt_end = 1.0\n"
+)
+# Every option that names a file to read; FILE stands for it.
+READERS = (
+    "run --method auto --scene FILE", "plan --scene FILE", "compare --scene FILE",
+    "cards --scan FILE", "words --vectors FILE", "verify --external FILE",
+    "verify --listing-output FILE", "sweep FILE --out store",
+)  # fmt: skip
+STEERING = "\x1b[31m\x07\u202e\x9b"
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pipes, "PATIENCE", 0.05)
+
+
+def _refusal(command: str, capsys: Capture) -> str:
+    assert main(command.split()) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert told[:-1].isprintable()
+    return told
+
+
+@pytest.mark.parametrize("command", READERS)
+def test_what_is_no_file_is_refused(command: str, capsys: Capture) -> None:
+    os.mkfifo("pipe")
+    Path("folder").mkdir()
+    begin = time.monotonic()
+    for path, words in (
+        ("/dev/zero", "is a device"),
+        ("/dev/full", "is a device"),
+        ("pipe", "nothing came within 0.05 s"),
+        ("folder", "Is a directory"),
+        ("missing", "No such file"),
+    ):
+        assert words in _refusal(command.replace("FILE", path), capsys)
+    assert time.monotonic() - begin < 5.0
+    assert not Path("store").exists()
+
+
+@pytest.mark.parametrize("command", READERS)
+def test_file_without_end_is_refused(command: str, capsys: Capture) -> None:
+    with open("large", "wb") as file:
+        file.truncate(1 << 40)
+    assert "larger than" in _refusal(command.replace("FILE", "large"), capsys)
+
+
+def test_reader_takes_files_and_pipes_up_to_its_limit() -> None:
+    Path("file").write_bytes(b"0123456789")
+    assert read_input("file", "it", 10, "a file") == b"0123456789"
+    with pytest.raises(InputError, match=r"^it: larger than 9 bytes; give a file of at most"):
+        read_input("file", "it", 9, "a file")
+    assert read_input("/dev/null", "it", 9, "a file") == b""
+    reader, writer = os.pipe()
+    try:
+        os.write(writer, b"content")
+        os.close(writer)
+        assert read_input(f"/dev/fd/{reader}", "it", 9, "a file") == b"content"
+    finally:
+        os.close(reader)
+    with pytest.raises(InputError, match="null"):
+        read_input("a\0b", "it", 9, "a file")
+
+
+def test_sweep_and_its_scene_come_through_pipes(capsys: Capture) -> None:
+    """Both were read twice; from a pipe the second time nothing comes, without end."""
+    sweep = SWEEP.replace("case = 3", f"file = '/dev/fd/{_piped(BODY)}'")
+    assert main(["sweep", f"/dev/fd/{_piped(sweep)}", "--out", "store"]) == 0
+    assert "2 scenes in 1 chunk" in capsys.readouterr().err
+
+
+def _piped(text: str) -> int:
+    """Return the end of a pipe to read a text from."""
+    reader, writer = os.pipe()
+    os.write(writer, text.encode())
+    os.close(writer)
+    return reader
+
+
+def test_record_and_list_of_an_edition_are_read_with_a_limit(capsys: Capture) -> None:
+    Path("record").mkdir()
+    os.mkfifo("record/taylor.toml")
+    assert "is no record" in _refusal("verify --only golden --record record", capsys)
+    Path("site").mkdir()
+    os.mkfifo(f"site/{MARK}")
+    # What it lists can't be known, so that there are no other files of the verb's own.
+    Path("site/mine.txt").write_text("mine")
+    assert "holds 'mine.txt'" in _refusal("edition --out site", capsys)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (
+            "bench --random 100000000",
+            "--random: 100000000; allowed: a whole number from 1 to 10000",
+        ),
+        ("bench --random 0", "--random: 0; allowed"),
+        ("verify --draws 1000000000", "--draws: 1000000000; allowed: a whole number from 0 to"),
+        ("verify --draws -1", "--draws: -1; allowed"),
+        (f"verify --draws {10**400}", "a number of more than 18 digits"),
+    ],
+)
+def test_draws_without_end_are_refused(command: str, words: str, capsys: Capture) -> None:
+    told = _refusal(command, capsys)
+    assert words in told
+    assert re.search(r"takes about [\d.]+ (h|days)", told)
+
+
+def test_draws_that_take_long_are_forecast(capsys: Capture) -> None:
+    forecast.check_count("--draws", 1000, 0, forecast.CHECKS)
+    assert capsys.readouterr().err == ""
+    forecast.check_count("--draws", 100_000, 0, forecast.CHECKS)
+    told = capsys.readouterr().err
+    assert told == "pyharness: 100000 random draws take about 58 min and 200 MB of memory\n"
+
+
+def test_name_of_a_sweep_does_not_steer_the_terminal(capsys: Capture) -> None:
+    name = 'name = "\\u001b[31mred\\u202e"\n'
+    Path("sweep.toml").write_text(name + SWEEP)
+    for form in ("table", "csv", "markdown", "json"):
+        assert main(["sweep", "sweep.toml", "--out", "store", "--format", form]) == 0
+        told = capsys.readouterr()
+        assert (told.out + told.err).replace("\n", "").isprintable()
+    assert main(["sweep", "sweep.toml", "--out", "store"]) == 0
+    assert "\\x1b[31mred\\u202e" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("form", ["table", "json", "junit"])
+def test_command_of_a_port_does_not_steer_the_terminal(form: str, capsys: Capture) -> None:
+    command = f"/bin/sh -c 'exit 7' {STEERING}"
+    arguments = ["verify", "--port", command, "--cell", "two-term/case-3", "--format", form]
+    for more in ([], ["--out", "report"]):
+        assert main([*arguments, *more]) == 1
+    told = capsys.readouterr()
+    for text in (told.out, told.err, Path("report").read_text()):
+        assert text.replace("\n", "").isprintable()
+    assert "exit code 7" in told.out
+
+
+def test_output_layer_keeps_lines_and_letters(capsys: Capture) -> None:
+    assert shown("a\tb\nü 日本 \f") == "a\tb\nü 日本 \f"
+    assert shown(f"{STEERING}\r\0\udcff\n") == "\\x1b[31m\\x07\\u202e\\x9b\\r\\x00\\udcff\n"
+    assert printable("a\nb") == "a\\nb"
+    warn(STEERING)
+    assert capsys.readouterr().err == "pyharness: warning: \\x1b[31m\\x07\\u202e\\x9b\n"
+    progress(STEERING)  # to a terminal alone
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("name", ["/proc/site", "x" * 255])
+def test_folder_that_can_not_be_made_is_refused_before_any_work(
+    name: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Permissions let a superuser do all; making a folder tells."""
+    monkeypatch.setattr("pyharness.edition.site.build_site", lambda *_: pytest.fail("worked"))
+    assert "give a" in _refusal(f"edition --out {name}", capsys)
+    assert list(Path().iterdir()) == []
+
+
+def test_file_that_can_not_be_written_is_refused_before_any_work(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pyharness.methods.solve.solve", lambda *_: pytest.fail("worked"))
+    for path in ("/proc/rows", "x" * 256):
+        _refusal(f"run --case 3 --method auto --out {path}", capsys)
+    assert list(Path().iterdir()) == []
+    # The check leaves nothing behind, and what was there as it was.
+    Path("there").write_text("old")
+    output.check_writable("there", "--out")
+    output.check_writable("new", "--out")
+    assert [(path.name, path.read_text()) for path in Path().iterdir()] == [("there", "old")]
+
+
+def test_large_quaternion_is_normalised(capsys: Capture) -> None:
+    numbers = "[1e308, 1e308, -1e308, 1e308]"
+    Path("scene.toml").write_text(BODY + f"attitude = {numbers}\n[run]\nsteps = 2\n")
+    command = "run --method auto --scene scene.toml --attitude quaternion"
+    assert main(command.split()) == 0
+    told = capsys.readouterr()
+    assert "attitude(0) = (0.5, 0.5, -0.5, 0.5)" in told.out
+    assert told.err == (
+        "pyharness: warning: the attitude has a norm above 1.79769e+308; it was normalised\n"
+    )

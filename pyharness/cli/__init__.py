@@ -20,22 +20,23 @@ def shown(text: str) -> str:
     return printable(text, _LAYOUT)
 
 
-def write_text(stream: TextIO, text: str) -> None:
-    """Write to a stream of this process; what its encoding lacks as an escape sequence."""
+def write_text(stream: TextIO, text: str, before: str = "") -> None:
+    """Write to a stream of this process; what its encoding lacks as an escape sequence.
+
+    `before` is our own, and may steer a terminal.
+    """
     encoding = stream.encoding or "utf-8"
-    stream.write(shown(text).encode(encoding, "backslashreplace").decode(encoding))
+    stream.write(before + shown(text).encode(encoding, "backslashreplace").decode(encoding))
 
 
-def say(text: str) -> None:
+def say(text: str, before: str = "") -> None:
     """Write to stderr, where that is not full or closed: it has no say in how a command ends."""
     with suppress(OSError, ValueError):
-        write_text(sys.stderr, text)
+        write_text(sys.stderr, text, before)
         sys.stderr.flush()
 
 
 def say_again(text: str) -> None:
     """Write a line to stderr in place of the one before, where that is a terminal."""
     if sys.stderr.isatty():
-        with suppress(OSError, ValueError):
-            sys.stderr.write(_WIPED)
-        say(text)
+        say(text, _WIPED)

@@ -80,7 +80,8 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
     if axis.how == "listed":
         found = np.array(axis.values, dtype=np.float64)
     elif axis.how == "linear":
-        found = _between(axis, lambda first, last: np.linspace(first, last, axis.count))
+        first, last = axis.values
+        found = _between(first, last, lambda a, b: np.linspace(a, b, axis.count))
     elif axis.how == "log":
         found = np.geomspace(axis.values[0], axis.values[1], axis.count)
     else:
@@ -100,16 +101,16 @@ def _drawn(axis: Axis) -> Floats:
     first, second = axis.values
     if axis.how == "normal":
         return source.normal(first, second, axis.count)
+    low, high = min(first, second), max(first, second)
     if axis.how == "uniform":
-        return _between(axis, lambda low, high: source.uniform(low, high, axis.count))
-    drawn = np.exp(source.uniform(math.log(first), math.log(second), axis.count))
+        return _between(low, high, lambda a, b: source.uniform(a, b, axis.count))
+    drawn = np.exp(source.uniform(math.log(low), math.log(high), axis.count))
     # Rounding may take a draw beyond the ends, and beyond the range of numbers there.
-    return np.clip(drawn, min(first, second), max(first, second))
+    return np.clip(drawn, low, high)
 
 
-def _between(axis: Axis, made: Callable[[float, float], Floats]) -> Floats:
-    """Return what is made between the ends of an axis, even where their distance overflows."""
-    first, last = axis.values
+def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
+    """Return the values made between two ends, even where the distance of these overflows."""
     if math.isfinite(last - first):
         return made(first, last)
     # Halves and doubles are exact: numbers of that size are far from the least.

@@ -260,7 +260,11 @@ def test_a_stderr_that_is_full_or_closed_has_no_say(
 def test_progress_falls_silent_where_the_terminal_goes_away(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    gone = Mock(isatty=lambda: True, write=Mock(side_effect=OSError(5, "Input/output error")))
+    gone = Mock(
+        encoding="ascii",
+        isatty=lambda: True,
+        write=Mock(side_effect=OSError(5, "Input/output error")),
+    )
     monkeypatch.setattr(sys, "stderr", gone)
     progress("1 of 2")
     warn("what no one reads")

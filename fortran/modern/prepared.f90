@@ -163,6 +163,10 @@ contains
                          found(1))
         ! Whoever let the kernel choose learns by the sign what it chose.
         count = merge(-quick_steps, quick_steps, code == QUICK_OR_TAYLOR)
+        if (code == QUICK .and. ended == SENSITIVE) then
+          call compare_with_series(problem, omega0, packed(TOLERANCE), packed(EFFORT), times, &
+                                   omega, ended, found)
+        end if
       end if
       if (ended /= COMPLETE .and. ended /= INTERRUPTED .and. code /= QUICK) then
         call taylor_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), 1, times, omega, &
@@ -183,6 +187,33 @@ contains
       if (.not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
     end if
   end subroutine solve_as_given
+
+  subroutine compare_with_series(problem, omega0, tolerance, effort, times, omega, ended, found)
+    !! Error and growth of a result whose method can't tell what the motion makes of rounding.
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: omega0(3)  !! rad/s
+    real(dp), intent(in) :: tolerance, effort
+    real(dp), intent(in) :: times(1)   !! s
+    real(dp), intent(in) :: omega(3)   !! the result, rad/s
+    integer, intent(inout) :: ended    !! SENSITIVE, or COMPLETE where the series rules that out
+    real(dp), intent(inout) :: found(2) !! estimated error, relative, and growth; below 0: unknown
+    real(dp) :: other(3, 1), no_attitude(4, 1)
+    real(dp) :: needed, estimates(3)
+    integer :: n_rows, ended_other
+    integer(int64) :: count
+
+    call taylor_solve(problem, omega0, tolerance, effort, 1, times, other, 0, no_attitude, n_rows, &
+                      ended_other, count, needed, estimates)
+    if (ended_other == INTERRUPTED) ended = INTERRUPTED
+    if (.not. is_result(ended_other)) then
+      found = -1.0_dp
+      return
+    end if
+    found(1) = max(found(1), maxval(abs(omega - other(:, 1))) &
+                   /max(maxval(abs(omega0)), maxval(abs(omega)), tiny(needed))) + estimates(1)
+    found(2) = estimates(2)
+    if (ended_other == COMPLETE .and. found(1) <= tolerance) ended = COMPLETE
+  end subroutine compare_with_series
 
   subroutine solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
     !! Angular velocity and attitude at `t_end`; NaN where there are none.

@@ -16,7 +16,7 @@ module scaled_march
 
 contains
 
-  subroutine march_constant(motion, start, h, fours, x, gaps, top, ended)
+  subroutine march_constant(motion, start, h, fours, x, gaps, top, spread, ended)
     !! Fours of equal steps under constant torque; and beside them, in the time that the processor
     !! waits for them, steps of twice and of four times the length.
     type(motion_t), intent(in) :: motion
@@ -26,6 +26,7 @@ contains
     real(dp), intent(out) :: x(3)
     real(dp), intent(out) :: gaps(3, 2) !! from where steps of twice the length lead, and theirs
     real(dp), intent(out) :: top(3)     !! largest size of the unknowns
+    real(dp), intent(out) :: spread     !! integral of the second unknown's size over time
     logical, intent(out) :: ended       !! by the user
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
     real(dp) :: y(3, 2)                 ! by the longer steps
@@ -56,6 +57,8 @@ contains
     y(:, 1) = start
     y(:, 2) = start
     top = abs(start)
+    ! The trapezoidal rule, whose last node is taken as a half after the loop.
+    spread = 0.5_dp*top(2)
     ended = .false.
     do i = 1, 2*fours
       do k = 1, 1 + mod(i, 2)
@@ -109,6 +112,7 @@ contains
         x1 = ((x1 + sixth*a1) + third*(b1 + c1)) + sixth*d1
         x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
         x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
+        spread = spread + abs(x2)
       end do
       top(1) = max(top(1), abs(x1))
       top(2) = max(top(2), abs(x2))
@@ -118,12 +122,13 @@ contains
         if (ended) exit
       end if
     end do
+    spread = abs(h)*(spread - 0.5_dp*abs(x2))
     x = [x1, x2, x3]
     gaps(:, 1) = x - y(:, 1)
     gaps(:, 2) = y(:, 1) - y(:, 2)
   end subroutine march_constant
 
-  subroutine march_varying(motion, start, aside, t_end, fours, x, gaps, top, ended)
+  subroutine march_varying(motion, start, aside, t_end, fours, x, gaps, top, spread, ended)
     !! The same under a torque of time: its integral is exact, and what remains is smooth.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: start(3)
@@ -133,6 +138,7 @@ contains
     real(dp), intent(out) :: x(3)        !! without the integral of the torque
     real(dp), intent(out) :: gaps(3, 2)
     real(dp), intent(out) :: top(3)      !! with the integral
+    real(dp), intent(out) :: spread      !! integral of the second unknown's size over time
     logical, intent(out) :: ended        !! by the user
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
     real(dp) :: y(3, 2)                  ! by the longer steps
@@ -179,6 +185,8 @@ contains
     y(:, 1) = x + aside
     y(:, 2) = x - GAIN*aside
     top = abs(start)
+    ! The trapezoidal rule, whose last node is taken as a half after the loop.
+    spread = 0.5_dp*top(2)
     s(:, 8) = motion%mean
     ended = .false.
     do i = 1, 2*fours
@@ -253,6 +261,7 @@ contains
         x1 = ((x1 + sixth*a1) + third*(b1 + c1)) + sixth*d1
         x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
         x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
+        spread = spread + abs(x2 + s(2, end_))
       end do
       top(1) = max(top(1), abs(x1 + s(1, end_)))
       top(2) = max(top(2), abs(x2 + s(2, end_)))
@@ -262,6 +271,7 @@ contains
         if (ended) exit
       end if
     end do
+    spread = abs(h)*(spread - 0.5_dp*abs(x2 + s(2, 8)))
     x = [x1, x2, x3]
     gaps(:, 1) = x - y(:, 1)
     gaps(:, 2) = y(:, 1) - y(:, 2)

@@ -14,6 +14,9 @@ module scaled_motion
   real(dp), parameter :: SLOW = 1e-8_dp      ! rad; a wave that turns less is a line to rounding
   real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! of Simpson's rule, times radians**4
 
+  ! An exponent beyond which no amplification says more.
+  real(dp), parameter :: MOST_EXPONENT = 300.0_dp
+
   type, public :: motion_t
     real(dp) :: scale(3)     ! angular velocity is scale times unknown, rad/s
     real(dp) :: slope(3)     ! constant torque in the unknowns, 1/s
@@ -29,7 +32,7 @@ module scaled_motion
     integer :: axes(3)       ! of the body
   end type motion_t
 
-  public :: average, integral, reach_of, scaled, steps_for_waves, turned, versine
+  public :: amplification, average, integral, reach_of, scaled, steps_for_waves, turned, versine
 
 contains
 
@@ -216,6 +219,29 @@ contains
     reach_of = maxval(abs(motion%on_sine(:, n)))*min(2.0_dp, angle) &
                + maxval(abs(motion%on_versine(:, n)))*min(2.0_dp, 0.5_dp*angle*angle)
   end function reach_of
+
+  pure subroutine amplification(motion, t_end, spread, top, exponent, bound)
+    !! A bound of the norm of the state-transition matrix of omega from any time to any later one.
+    !! In these unknowns of a body the Jacobian [0 z y; -z 0 -x; y x 0] has the symmetric part
+    !! [0 0 y; 0 0 0; y 0 0], so that its logarithmic norm (Dahlquist 1958) is |y|: the norm of the
+    !! matrix is at most the exponential of the integral of |y| over time.
+    type(motion_t), intent(in) :: motion
+    real(dp), intent(in) :: t_end        !! s
+    real(dp), intent(in) :: spread       !! integral of the second unknown's size over time
+    real(dp), intent(in) :: top(3)       !! largest size of the unknowns
+    real(dp), intent(out) :: exponent    !! integral of the logarithmic norm over time
+    real(dp), intent(out) :: bound       !! in rad/s for rad/s
+    integer :: n
+
+    exponent = spread
+    ! Where all three signs are alike the matrix is symmetric: its largest row is a bound.
+    if (motion%sign_2 > 0.0_dp) exponent = abs(t_end)*(sum(top) - minval(top))
+    do n = motion%resolved + 1, motion%waves
+      exponent = exponent + 2.0_dp*abs(t_end)*size_of(motion, n)
+    end do
+    exponent = min(MOST_EXPONENT, exponent)
+    bound = exp(exponent)*(maxval(abs(motion%scale))/minval(abs(motion%scale)))
+  end subroutine amplification
 
   pure elemental real(dp) function versine(angle)
     !! 1 - cosine, which would have no digit of it where the angle is small.

@@ -6,9 +6,9 @@ module scaled_runge_kutta
   use kinds, only: dp
   use problem, only: problem_t
   use scaled_march, only: GAIN, march_constant, march_varying
-  use scaled_motion, only: average, integral, MOST_WAVES, motion_t, reach_of, scaled, &
+  use scaled_motion, only: amplification, average, integral, MOST_WAVES, motion_t, reach_of, scaled, &
                            steps_for_waves
-  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED
+  use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
   implicit none(type, external)
   private
 
@@ -34,6 +34,15 @@ module scaled_runge_kutta
   real(dp), parameter :: A_WAVE = 0.9_dp     ! and of each wave in it
   real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging, of the aim
 
+  real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  ! Amplified rounding, in tolerances, up to which the series would say complete too: it says
+  ! sensitive from 0.3 on, and the bound of the amplification is from steps of a few digits.
+  real(dp), parameter :: CERTAIN = 0.1_dp
+  ! A spin of which the second unknown is so large a part of the first radians keeps it.
+  real(dp), parameter :: KEPT = 0.6_dp
+  real(dp), parameter :: BITS_KEPT = 51.0_dp ! of amplified rounding: those of 2**-53 and of CERTAIN
+  real(dp), parameter :: LOG_2 = 0.6931_dp
+
   public :: quick_solve
 
 contains
@@ -47,11 +56,14 @@ contains
     real(c_double), intent(in) :: tolerance             !! relative
     real(c_double), intent(in) :: effort                !! factor on the steps allowed
     real(c_double), intent(in) :: t_end                 !! s
-    integer(c_int), intent(in), value :: contest        !! not 0: REFUSED where a series is faster
+    !! not 0: REFUSED where a series is faster, or will have to be asked anyway
+    integer(c_int), intent(in), value :: contest
     real(c_double), intent(out) :: result(3)            !! rad/s
-    integer(c_int), intent(out) :: status               !! any but STOPPED
+    !! any but STOPPED; SENSITIVE where rounding may count: only a series can tell by how much
+    integer(c_int), intent(out) :: status
     integer(c_int), intent(out) :: steps                !! of the last try
-    real(c_double), intent(out) :: error                !! estimated, relative; where complete
+    !! estimated, relative, with amplified rounding where complete and without where sensitive
+    real(c_double), intent(out) :: error
     type(problem_t), pointer :: problem
     type(motion_t) :: motion
     logical :: varies
@@ -73,6 +85,10 @@ contains
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: cost         ! in steps under constant torque
     real(dp) :: bits         ! of the tolerance
+    real(dp) :: spread       ! integral of the second unknown's size over time
+    real(dp) :: exponent     ! integral of the logarithmic norm over time
+    real(dp) :: bound        ! of the norm of the state-transition matrix
+    real(dp) :: noise        ! bound of amplified rounding, relative
     logical :: ended         ! by the user
     integer :: n
 
@@ -119,6 +135,10 @@ contains
         status = REFUSED
         return
       end if
+      if (KEPT*abs(start(2)*t_end) > LOG_2*(BITS_KEPT - bits)) then
+        status = REFUSED
+        return
+      end if
     end if
     allowed = min(COUNTABLE, MOST_STEPS*effort)
     most = min(allowed, MOST_TIMES*n_steps)
@@ -129,9 +149,9 @@ contains
       steps = 4*n
       if (varies) then
         call march_varying(motion, start, (GAIN*left_out)*ASIDE, t_end, n, x, gaps, top, &
-                           ended)
+                           spread, ended)
       else
-        call march_constant(motion, start, (0.25_dp*t_end)/n, n, x, gaps, top, ended)
+        call march_constant(motion, start, (0.25_dp*t_end)/n, n, x, gaps, top, spread, ended)
       end if
       if (ended) then
         status = INTERRUPTED
@@ -162,7 +182,12 @@ contains
     x = x + gaps(:, 1)
     if (varies) x = x + integral(motion, t_end)
     result(motion%axes) = x*motion%scale
-    status = COMPLETE
+    ! Each step rounds omega; where perturbations grow alike from step to step, the last exponent's
+    ! worth of steps before a time make up for nearly all that has grown until then.
+    call amplification(motion, t_end, spread, top, exponent, bound)
+    noise = ROUNDING*(1.0_dp + 0.5_dp*real(steps, dp)/(1.0_dp + exponent))*bound
+    status = merge(COMPLETE, SENSITIVE, noise <= CERTAIN*tolerance)
+    if (status == COMPLETE) error = error + noise
   end subroutine quick_solve
 
 end module scaled_runge_kutta

@@ -3,6 +3,7 @@ module taylor_attitude
   !! recurrence like that of omega, its error as a small turn in space, taken off the rows.
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
+  use taylor_error, only: remainder_of
   use taylor_series, only: expand, series_t
   use torque_terms, only: MOST_ORDER
   use two_words, only: two_sum
@@ -15,6 +16,8 @@ module taylor_attitude
     real(dp) :: q_low(4)  !! what its rounding left out
     real(dp) :: error(3)  !! half the turn, about axes of space, by which it errs
     real(dp) :: before(3) !! the same where the step began
+    real(dp) :: rates(3, 2) !! what omega's error turns in a step, by its value at either end
+    real(dp) :: left(4)   !! terms that the step leaves out
     real(dp) :: worst     !! largest error of a row so far, rad
   end type attitude_t
 
@@ -65,26 +68,41 @@ contains
     real(dp), intent(in) :: q(4)
     type(attitude_t), intent(out) :: now
 
-    now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
   end subroutine begin_attitude
 
-  pure subroutine turn_error(s, order, poles, before, carried, now)
+  pure subroutine turn_error(s, order, unit, from_rest, before, carried, now)
     !! The error at the end of the step: what that of omega turns, by the trapezoidal rule, and what
-    !! the step leaves out of the attitude itself.
+    !! the step leaves out of the attitude itself: where omega is steady that is all there is.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
-    real(dp), intent(in) :: poles(2)   !! of the remainder
+    real(dp), intent(in) :: unit       !! over which terms are near 1
+    logical, intent(in) :: from_rest   !! the first step of a body at rest
     real(dp), intent(in) :: before(3)  !! error of omega where the step begins, rad/s
     real(dp), intent(in) :: carried(3) !! and where it ends, but for what it leaves out, rad/s
     type(attitude_t), intent(inout) :: now
-    real(dp) :: left(4), q(4)
+    real(dp) :: q(4)
 
     now%before = now%error
     q = now%q + s%turn
-    left = poles(1)*s%turns(:, order) - poles(2)*s%turns(:, order - 1)
-    now%error = now%error + (0.5_dp*s%half(1))*(in_space(now%q, before) + in_space(q, carried)) &
-                - left_turn(left, q)
+    call remainder_of(s%turns, order, unit, from_rest, now%left)
+    now%rates(:, 1) = s%half(1)*in_space(now%q, before)
+    now%rates(:, 2) = s%half(1)*in_space(q, carried)
+    now%error = error_within(now, order, 1.0_dp, q)
   end subroutine turn_error
+
+  pure function error_within(now, order, part, q) result(error)
+    !! Half the turn by which an attitude q within the step errs, about axes of space.
+    type(attitude_t), intent(in) :: now
+    integer, intent(in) :: order
+    real(dp), intent(in) :: part !! of the step
+    real(dp), intent(in) :: q(4)
+    real(dp) :: error(3)
+
+    error = now%before + part*((1.0_dp - 0.5_dp*part)*now%rates(:, 1) &
+                               + (0.5_dp*part)*now%rates(:, 2)) &
+            - part**(order + 1)*left_turn(now%left, q)
+  end function error_within
 
   pure subroutine turn_on(s, now)
     !! To the end of the step.
@@ -97,19 +115,20 @@ contains
     end do
   end subroutine turn_on
 
-  pure subroutine add_attitude_row(small, part, known, now, row)
+  pure subroutine add_attitude_row(small, order, part, known, now, row)
     !! A row, its error taken off where it is small enough to be known; of length 1.
     real(dp), intent(in) :: small(4) !! what is added to the attitude
-    real(dp), intent(in) :: part     !! of the way from the error before to that at the end
+    integer, intent(in) :: order
+    real(dp), intent(in) :: part     !! of the step
     real(dp), intent(in) :: known    !! error that may be taken off, rad
     type(attitude_t), intent(inout) :: now
     real(dp), intent(out) :: row(4)
     real(dp) :: error(3), size
 
-    error = now%before + part*(now%error - now%before)
+    row = now%q + small
+    error = error_within(now, order, part, row)
     size = 2.0_dp*sqrt(dot_product(error, error))
     if (.not. size <= now%worst) now%worst = size
-    row = now%q + small
     if (size <= known) row = now%q + (small - from_left(error, row))
     row = row/sqrt(dot_product(row, row))
   end subroutine add_attitude_row

@@ -27,7 +27,7 @@ module taylor_error
     integer :: steps_a_block
   end type blocks_t
 
-  public :: begin, count_step, growths_of, leave_out
+  public :: begin, count_step, growths_of, leave_out, remainder_of
 
 contains
 
@@ -44,52 +44,92 @@ contains
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
-  pure subroutine leave_out(s, order, unit, left, poles)
-    !! Sum of the terms that a step leaves out, as if one pair of poles made its last four:
-    !! v(k + 1) = a v(k) - b v(k - 1), by least squares; the error has it from here on.
+  pure subroutine leave_out(s, order, unit, from_rest, left)
+    !! Sum of the terms of omega that a step leaves out; the error has it from here on.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! over which terms are near 1, s/rad
+    logical, intent(in) :: from_rest   !! the first step of a body at rest
     real(dp), intent(out) :: left(4)   !! rad/s
-    real(dp), intent(out) :: poles(2)  !! the sum by the last two terms
-    real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
-    real(dp) :: x, u, v, w
-    real(dp) :: a, b, determinant
     integer :: i
 
-    do i = 1, 4
-      x = unit*s%terms(i, order)
-      u = unit*s%terms(i, order - 1)
-      v = unit*s%terms(i, order - 2)
-      w = unit*s%terms(i, order - 3)
-      uu(i) = u*u + v*v
-      vv(i) = v*v + w*w
-      uv(i) = u*v + v*w
-      ux(i) = u*x + v*u
-      vx(i) = v*x + w*u
-    end do
-    uu(1) = RIDGE*((uu(1) + uu(2)) + uu(3))
-    vv(1) = RIDGE*((vv(1) + vv(2)) + vv(3))
-    uv(1) = (uv(1) + uv(2)) + uv(3)
-    ux(1) = (ux(1) + ux(2)) + ux(3)
-    vx(1) = (vx(1) + vx(2)) + vx(3)
-    determinant = uu(1)*vv(1) - uv(1)*uv(1)
-    a = vv(1)*ux(1) - uv(1)*vx(1)
-    b = uv(1)*ux(1) - uu(1)*vx(1)
-    ! Poles within the step, or nearly, are none of a series that converges.
-    determinant = max((determinant - a) + b, abs(a - b), abs(b), LEAST)
-    a = (a - b)/determinant
-    b = b/determinant
-    poles = [a, b]
-    do i = 1, 4
-      left(i) = a*s%terms(i, order) - b*s%terms(i, order - 1)
-    end do
+    call remainder_of(s%terms, order, unit, from_rest, left)
     do i = 1, 4
       s%lanes(i, 1) = s%lanes(i, 1) - FIRST(i)*left(1)
       s%lanes(i, 2) = s%lanes(i, 2) - FIRST(i)*left(2)
       s%lanes(i, 3) = s%lanes(i, 3) - FIRST(i)*left(3)
     end do
   end subroutine leave_out
+
+  pure subroutine remainder_of(terms, order, unit, from_rest, left)
+    !! Sum of the terms beyond the last, of omega or of an attitude, as if one pair of poles made
+    !! the last four: v(k + 1) = a v(k) - b v(k - 1), by least squares.
+    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
+    integer, intent(in) :: order
+    real(dp), intent(in) :: unit       !! times which the last terms are near 1
+    logical, intent(in) :: from_rest
+    real(dp), intent(out) :: left(4)
+    real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
+    real(dp) :: x, u, v, w
+    real(dp) :: a, b, determinant
+    integer :: i
+
+    do i = 1, 4
+      x = unit*terms(i, order)
+      u = unit*terms(i, order - 1)
+      v = unit*terms(i, order - 2)
+      w = unit*terms(i, order - 3)
+      uu(i) = u*u + v*v
+      vv(i) = v*v + w*w
+      uv(i) = u*v + v*w
+      ux(i) = u*x + v*u
+      vx(i) = v*x + w*u
+    end do
+    call fit_poles((uu(1) + uu(2)) + (uu(3) + uu(4)), (vv(1) + vv(2)) + (vv(3) + vv(4)), &
+                   (uv(1) + uv(2)) + (uv(3) + uv(4)), (ux(1) + ux(2)) + (ux(3) + ux(4)), &
+                   (vx(1) + vx(2)) + (vx(3) + vx(4)), a, b)
+    do i = 1, 4
+      left(i) = a*terms(i, order) - b*terms(i, order - 1)
+    end do
+    if (from_rest) call take_thirds(terms, order, unit, left)
+  end subroutine remainder_of
+
+  pure subroutine fit_poles(uu, vv, uv, ux, vx, a, b)
+    !! The pair of poles of v(k + 1) = a v(k) - b v(k - 1), for the sum of all terms beyond x, the
+    !! last, and u, the one before: a x - b u.
+    real(dp), intent(in) :: uu, vv, uv, ux, vx !! products of the terms
+    real(dp), intent(out) :: a, b
+    real(dp) :: determinant
+
+    determinant = (RIDGE*uu)*(RIDGE*vv) - uv*uv
+    a = (RIDGE*vv)*ux - uv*vx
+    b = uv*ux - (RIDGE*uu)*vx
+    ! Poles within the step, or nearly, are none of a series that converges.
+    determinant = max((determinant - a) + b, abs(a - b), abs(b), LEAST)
+    a = (a - b)/determinant
+    b = b/determinant
+  end subroutine fit_poles
+
+  pure subroutine take_thirds(terms, order, unit, left)
+    !! From rest a torque that grows with time makes every third term only, of which four in a row
+    !! tell nothing: the same with three terms for each, where that leaves out more.
+    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
+    integer, intent(in) :: order
+    real(dp), intent(in) :: unit
+    real(dp), intent(inout) :: left(4)
+    real(dp), dimension(4, 3) :: x, u, v, w
+    real(dp) :: thirds(4)
+    real(dp) :: a, b
+
+    x = unit*terms(:, order - 2:order)
+    u = unit*terms(:, order - 5:order - 3)
+    v = unit*terms(:, order - 8:order - 6)
+    w = unit*terms(:, order - 11:order - 9)
+    call fit_poles(sum(u*u) + sum(v*v), sum(v*v) + sum(w*w), sum(u*v) + sum(v*w), &
+                   sum(u*x) + sum(v*u), sum(v*x) + sum(w*u), a, b)
+    thirds = (a*sum(x, dim=2) - b*sum(u, dim=2))/unit
+    if (sum(abs(thirds)) > sum(abs(left))) left = thirds
+  end subroutine take_thirds
 
   pure subroutine count_step(precise, lanes, blocks)
     !! One more step: where its block is full, the derivative is put aside and begun anew; if need

@@ -63,7 +63,6 @@ contains
     type(outcome_t), intent(out) :: found
     real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
     real(dp) :: left(4)       ! by the step, rad/s
-    real(dp) :: poles(2)      ! by the last two terms
     real(dp) :: error(3)      ! carried so far, rad/s
     real(dp) :: h             ! step, s
     real(dp) :: rest          ! time to go, s
@@ -75,6 +74,7 @@ contains
     real(dp) :: coupling
     real(dp) :: farthest      ! in a step, rad: a spin has no terms that would tell
     logical :: at_end, with_attitude
+    logical :: from_rest      ! in the first step
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
     integer(int64) :: part    ! 65536 over the order
     integer :: order
@@ -180,9 +180,11 @@ contains
       else
         call carry(s)
       end if
-      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left, poles)
+      from_rest = found%steps == 0 .and. .not. maxval(abs(omega)) > 0.0_dp
+      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), from_rest, left)
       if (with_attitude) then
-        call turn_error(s, order, poles, error, s%lanes(1, :) + left(:3), attitude)
+        call turn_error(s, order, 1.0_dp/share, from_rest, error, s%lanes(1, :) + left(:3), &
+                        attitude)
       end if
       call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
                     n_attitudes, attitudes, found)
@@ -198,8 +200,8 @@ contains
         exit
       end if
       if (at_end) then
-        call add_last_row(s%lanes(1, :), tolerance, now, attitude, rows, n_attitudes, attitudes, &
-                          found)
+        call add_last_row(s%lanes(1, :), order, tolerance, now, attitude, rows, n_attitudes, &
+                          attitudes, found)
         exit
       end if
       now%since = merge(0, now%since + 1, now%since + 1 >= lasting)

@@ -87,7 +87,7 @@ contains
         return
       end if
       if (n_attitudes > 0) then
-        call add_attitude_row(attitude%q_low + inside(s%turns, order, part), part, &
+        call add_attitude_row(attitude%q_low + inside(s%turns, order, part), order, part, &
                               min(LINEAR, tolerance), attitude, &
                               attitudes(:, found%n_rows + 1))
       end if
@@ -101,9 +101,11 @@ contains
     end do
   end subroutine add_rows
 
-  pure subroutine add_last_row(error, tolerance, now, attitude, rows, n_attitudes, attitudes, found)
+  pure subroutine add_last_row(error, order, tolerance, now, attitude, rows, n_attitudes, &
+                               attitudes, found)
     !! The row at the end of the last step, once omega and attitude are there.
     real(dp), intent(in) :: error(3)        !! rad/s
+    integer, intent(in) :: order
     real(dp), intent(in) :: tolerance
     type(state_t), intent(inout) :: now
     type(attitude_t), intent(inout) :: attitude
@@ -115,7 +117,7 @@ contains
     found%n_rows = size(rows, 2)
     call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, found%n_rows))
     if (n_attitudes > 0) then
-      call add_attitude_row(attitude%q_low, 1.0_dp, min(LINEAR, tolerance), attitude, &
+      call add_attitude_row(attitude%q_low, order, 1.0_dp, min(LINEAR, tolerance), attitude, &
                             attitudes(:, found%n_rows))
     end if
   end subroutine add_last_row

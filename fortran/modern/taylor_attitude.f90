@@ -3,7 +3,7 @@ module taylor_attitude
   !! recurrence like that of omega, its error as a small turn in space, taken off the rows.
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
-  use taylor_error, only: remainder_of
+  use taylor_error, only: remainder_of, rise
   use taylor_series, only: expand, series_t
   use torque_terms, only: MOST_ORDER
   use two_words, only: two_sum
@@ -16,7 +16,8 @@ module taylor_attitude
     real(dp) :: q_low(4)  !! what its rounding left out
     real(dp) :: error(3)  !! half the turn, about axes of space, by which it errs
     real(dp) :: before(3) !! the same where the step began
-    real(dp) :: rates(3, 2) !! what omega's error turns in a step, by its value at either end
+    real(dp) :: rates(3, 2) !! what omega's error would turn in a step, as it is at either end
+    real(dp) :: slopes(3, 2) !! change of that in a step, as it is at either end
     real(dp) :: left(4)   !! terms that the step leaves out
     real(dp) :: worst     !! largest error of a row so far, rad
   end type attitude_t
@@ -68,12 +69,12 @@ contains
     real(dp), intent(in) :: q(4)
     type(attitude_t), intent(out) :: now
 
-    now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
   end subroutine begin_attitude
 
   pure subroutine turn_error(s, order, unit, from_rest, before, carried, now)
-    !! The error at the end of the step: what that of omega turns, by the trapezoidal rule, and what
-    !! the step leaves out of the attitude itself: where omega is steady that is all there is.
+    !! The error at the end of the step: what that of omega turns, by Hermite's cubic, and what the
+    !! step leaves out of the attitude itself: where omega is steady that is all there is.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! over which terms are near 1
@@ -86,10 +87,29 @@ contains
     now%before = now%error
     q = now%q + s%turn
     call remainder_of(s%turns, order, unit, from_rest, now%left)
-    now%rates(:, 1) = s%half(1)*in_space(now%q, before)
-    now%rates(:, 2) = s%half(1)*in_space(q, carried)
+    call rate_of_turn(s, s%terms(:3, 0), now%q, before, now%rates(:, 1), now%slopes(:, 1))
+    call rate_of_turn(s, s%terms(:3, 0) + s%change(:3), q, carried, now%rates(:, 2), &
+                      now%slopes(:, 2))
     now%error = error_within(now, order, 1.0_dp, q)
   end subroutine turn_error
+
+  pure subroutine rate_of_turn(s, w, q, error, rate, slope)
+    !! How fast an error of omega turns the attitude about axes of space, and how that changes.
+    type(series_t), intent(in) :: s
+    real(dp), intent(in) :: w(3)      !! omega, rad/s
+    real(dp), intent(in) :: q(4)
+    real(dp), intent(in) :: error(3)  !! of omega, rad/s
+    real(dp), intent(out) :: rate(3)  !! half a turn a step
+    real(dp), intent(out) :: slope(3) !! the same over the step
+    real(dp) :: change(3) ! of the error, over the step, about the axes of space
+
+    change = rise(s%factors(:3), w, error)
+    change(1) = change(1) + 2.0_dp*s%half(1)*(w(2)*error(3) - w(3)*error(2))
+    change(2) = change(2) + 2.0_dp*s%half(1)*(w(3)*error(1) - w(1)*error(3))
+    change(3) = change(3) + 2.0_dp*s%half(1)*(w(1)*error(2) - w(2)*error(1))
+    rate = s%half(1)*in_space(q, error)
+    slope = s%half(1)*in_space(q, change)
+  end subroutine rate_of_turn
 
   pure function error_within(now, order, part, q) result(error)
     !! Half the turn by which an attitude q within the step errs, about axes of space.
@@ -98,9 +118,14 @@ contains
     real(dp), intent(in) :: part !! of the step
     real(dp), intent(in) :: q(4)
     real(dp) :: error(3)
+    real(dp) :: square, cube ! of the part
 
-    error = now%before + part*((1.0_dp - 0.5_dp*part)*now%rates(:, 1) &
-                               + (0.5_dp*part)*now%rates(:, 2)) &
+    square = part*part
+    cube = square*part
+    error = now%before + (part - cube + 0.5_dp*part*cube)*now%rates(:, 1) &
+            + (cube - 0.5_dp*part*cube)*now%rates(:, 2) &
+            + (0.5_dp*square - 2.0_dp/3.0_dp*cube + 0.25_dp*part*cube)*now%slopes(:, 1) &
+            + (0.25_dp*part*cube - cube/3.0_dp)*now%slopes(:, 2) &
             - part**(order + 1)*left_turn(now%left, q)
   end function error_within
 

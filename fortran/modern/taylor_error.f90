@@ -27,7 +27,7 @@ module taylor_error
     integer :: steps_a_block
   end type blocks_t
 
-  public :: begin, count_step, growths_of, leave_out, remainder_of
+  public :: begin, count_step, growths_of, leave_out, remainder_of, rise
 
 contains
 
@@ -130,6 +130,16 @@ contains
     thirds = (a*sum(x, dim=2) - b*sum(u, dim=2))/unit
     if (sum(abs(thirds)) > sum(abs(left))) left = thirds
   end subroutine take_thirds
+
+  pure function rise(factors, w, error)
+    !! Of a small difference, times the step, rad/s.
+    real(dp), intent(in) :: factors(3), w(3), error(3)
+    real(dp) :: rise(3)
+
+    rise(1) = factors(1)*(w(2)*error(3) + w(3)*error(2))
+    rise(2) = factors(2)*(w(1)*error(3) + w(3)*error(1))
+    rise(3) = factors(3)*(w(1)*error(2) + w(2)*error(1))
+  end function rise
 
   pure subroutine count_step(precise, lanes, blocks)
     !! One more step: where its block is full, the derivative is put aside and begun anew; if need

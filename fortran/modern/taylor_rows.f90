@@ -6,6 +6,7 @@ module taylor_rows
   use kinds, only: dp
   use statuses, only: INTERRUPTED, OVERFLOW
   use taylor_attitude, only: add_attitude_row, attitude_t
+  use taylor_error, only: rise
   use taylor_series, only: inside, series_t
   implicit none(type, external)
   private
@@ -121,16 +122,6 @@ contains
                             attitudes(:, found%n_rows))
     end if
   end subroutine add_last_row
-
-  pure function rise(factors, w, error)
-    !! Of a small difference, times the step, rad/s.
-    real(dp), intent(in) :: factors(3), w(3), error(3)
-    real(dp) :: rise(3)
-
-    rise(1) = factors(1)*(w(2)*error(3) + w(3)*error(2))
-    rise(2) = factors(2)*(w(1)*error(3) + w(3)*error(1))
-    rise(3) = factors(3)*(w(1)*error(2) + w(2)*error(1))
-  end function rise
 
   pure subroutine add_row(w, small, error, tolerance, now, row)
     !! A row, its error taken off where it is small enough to be known: an estimate that is wrong

@@ -142,7 +142,8 @@ contains
     steps = outcome%steps
     ! The way is known as it is: it asks for no march that is more precise.
     growth = growth*outcome%way
-    found = [outcome%error + ROUNDING*growth, growth, spent]
+    found = [max(outcome%error, min(outcome%least, UNSURE*tolerance)) + ROUNDING*growth, growth, &
+             spent]
     if (status == COMPLETE .and. ROUNDING*growth > UNSURE*tolerance) status = SENSITIVE
     if (status == GAVE_UP) then
       ! An error that is too large already will ask for another march, in shorter steps.

@@ -20,6 +20,7 @@ module taylor_attitude
     real(dp) :: slopes(3, 2) !! change of that in a step, as it is at either end
     real(dp) :: left(4)   !! terms that the step leaves out
     real(dp) :: worst     !! largest error of a row so far, rad
+    real(dp) :: peak      !! half the largest error so far, of a row or not, rad
   end type attitude_t
 
   public :: add_attitude_row, begin_attitude, expand_both, turn_error, turn_on
@@ -69,7 +70,8 @@ contains
     real(dp), intent(in) :: q(4)
     type(attitude_t), intent(out) :: now
 
-    now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, &
+                     0.0_dp)
   end subroutine begin_attitude
 
   pure subroutine turn_error(s, order, unit, from_rest, before, carried, now)
@@ -91,6 +93,7 @@ contains
     call rate_of_turn(s, s%terms(:3, 0) + s%change(:3), q, carried, now%rates(:, 2), &
                       now%slopes(:, 2))
     now%error = error_within(now, order, 1.0_dp, q)
+    now%peak = max(now%peak, sum(abs(now%error)))
   end subroutine turn_error
 
   pure subroutine rate_of_turn(s, w, q, error, rate, slope)

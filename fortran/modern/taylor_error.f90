@@ -27,7 +27,7 @@ module taylor_error
     integer :: steps_a_block
   end type blocks_t
 
-  public :: begin, count_step, growths_of, leave_out, remainder_of, rise
+  public :: begin, count_step, growths_of, leave_out, likely_remainder, remainder_of, rise
 
 contains
 
@@ -130,6 +130,18 @@ contains
     thirds = (a*sum(x, dim=2) - b*sum(u, dim=2))/unit
     if (sum(abs(thirds)) > sum(abs(left))) left = thirds
   end subroutine take_thirds
+
+  pure real(dp) function likely_remainder(terms, order)
+    !! Size of the terms beyond the last, should they decay as the last six do: the fit of a pair of
+    !! poles may come out small by chance, and where there are few steps no other makes up for it.
+    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
+    integer, intent(in) :: order
+    real(dp) :: last, before
+
+    last = sum(abs(terms(:, order - 2:order)))
+    before = sum(abs(terms(:, order - 5:order - 3)))
+    likely_remainder = last*min(0.5_dp, last/max(before, LEAST))
+  end function likely_remainder
 
   pure function rise(factors, w, error)
     !! Of a small difference, times the step, rad/s.

@@ -7,7 +7,8 @@ module taylor_march
   use problem, only: problem_t
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_attitude, only: attitude_t, begin_attitude, expand_both, turn_error, turn_on
-  use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out
+  use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out, &
+                          likely_remainder
   use taylor_plan, only: LEAST_SHARE, plan
   use taylor_rows, only: add_last_row, add_rows, outcome_t, state_t
   use taylor_series, only: carry, carry_precisely, expand, fitting, following, rescale, series_t, &
@@ -26,6 +27,9 @@ module taylor_march
   real(dp), parameter :: A_STEP = 60.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
   real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
+  ! Of the largest error so far: an estimate that is smaller may be so by chance.
+  real(dp), parameter :: BY_CHANCE = 0.1_dp
+  integer, parameter :: FEW_STEPS = 2
   real(dp), parameter :: NO_DIGIT = 1e100_dp ! an error that says no more, relative
 
   ! Columns of four begin where a register's load does: Fortran can't ask for it of a variable.
@@ -84,7 +88,7 @@ contains
     integer(int64) :: half_way   ! of the steps allowed
     real(dp) :: t_half           ! the time then, s
 
-    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true., &
+    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true., &
                       1.0_dp)
     with_attitude = n_attitudes > 0
     rest = times(n_times)
@@ -95,7 +99,7 @@ contains
       return
     end if
     now = state_t([omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
-                  max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0)
+                  max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0.0_dp, 0)
     call plan(problem, now%scale, asked, rest, with_attitude, order, share, h)
     found%finest = share <= LEAST_SHARE
     part = 65536/order
@@ -186,6 +190,11 @@ contains
         call turn_error(s, order, 1.0_dp/share, from_rest, error, s%lanes(1, :) + left(:3), &
                         attitude)
       end if
+      now%peak = max(now%peak, maxval(abs(error)))
+      if (found%steps < FEW_STEPS) then
+        found%least = max(found%least, likely_remainder(s%terms, order)/max(now%scale, tiny(h)))
+        if (with_attitude) found%least = max(found%least, 2.0_dp*likely_remainder(s%turns, order))
+      end if
       call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
                     n_attitudes, attitudes, found)
       if (found%status /= COMPLETE) exit
@@ -235,8 +244,12 @@ contains
     found%precise_steps = coupling*now%scale*abs(times(n_times))/A_PRECISE_STEP
     found%error = now%worst
     if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
-    if (now%scale > 0.0_dp) found%error = found%error/now%scale
+    if (now%scale > 0.0_dp) then
+      found%error = found%error/now%scale
+      found%least = max(found%least, BY_CHANCE*(now%peak/now%scale))
+    end if
     if (with_attitude) then
+      found%least = max(found%least, (2.0_dp*BY_CHANCE)*attitude%peak)
       found%way = 1.0_dp + 0.5_dp*now%scale*abs(times(n_times))
       if (.not. attitude%worst <= found%error) found%error = attitude%worst
     end if

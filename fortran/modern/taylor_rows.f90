@@ -23,6 +23,7 @@ module taylor_rows
     real(dp) :: t_low     ! what its rounding left out
     real(dp) :: scale     ! largest |omega| so far, rad/s
     real(dp) :: worst     ! largest error of a row so far, rad/s
+    real(dp) :: peak      ! largest error so far, of a row or not, rad/s
     integer :: since      ! steps since the waves' sines were made; 0: to be made
   end type state_t
 
@@ -32,6 +33,7 @@ module taylor_rows
     integer :: n_rows
     integer(int64) :: steps
     real(dp) :: error    ! largest of a row, relative, before it was taken off
+    real(dp) :: least    ! what the error may be where it is estimated to be less, relative
     real(dp) :: growth   ! of a small difference until the end
     real(dp) :: largest  ! and until any time on the way
     real(dp) :: ahead    ! steps to the end, as far as known; where it gave up

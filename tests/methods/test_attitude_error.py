@@ -1,0 +1,164 @@
+"""The error that the series reports of an attitude, where omega has none: spins about one axis.
+
+There the attitude is elementary: a turn about that axis by the integral of omega, taken here in
+many digits. The scenes are drawn at random.
+"""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from pyharness import Scene, TorqueLaw, prepare, solve
+from pyharness.model.scene import Triple
+from pyharness.model.trajectory import Array
+from tests.random_scenes import moments, triple
+
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+ROUNDING = 2.0**-53
+# Relative to what the body turns (rad): below it the error of a double is no error of the method.
+_DOUBT = 1e-15
+KINDS = ("steady", "constant", "ramp", "wave", "ramp from rest", "slow")
+
+
+def _drawn(kind: str, generator: np.random.Generator) -> tuple[Scene, float]:
+    axis = int(generator.integers(3))
+    along = np.zeros(3)
+    along[axis] = 1.0
+    spin = generator.choice([-1.0, 1.0]) * 10.0 ** generator.uniform(-2.0, 1.0)
+    push = generator.normal() * 10.0 ** generator.uniform(-2.0, 0.0)
+    time = 10.0 ** generator.uniform(0.0, 2.0) / abs(spin)
+    none: Triple = (0.0, 0.0, 0.0)
+    law = TorqueLaw()
+    if kind == "constant":
+        law = TorqueLaw(triple(push * along))
+    elif kind in ("ramp", "ramp from rest"):
+        law = TorqueLaw(none, triple(push * along))
+    elif kind == "wave":
+        law = TorqueLaw(sines=[(triple(push * along), float(10.0 ** generator.uniform(-1.0, 1.0)))])
+    if kind == "ramp from rest":
+        spin = 0.0
+        time = float(generator.uniform(0.5, 4.0) / abs(push) ** (1.0 / 3.0))
+    elif kind == "slow":
+        spin, time = spin * 1e-4, time * generator.uniform(0.0, 0.1) * 1e4
+    time = float(min(time, 60.0) if kind not in ("steady", "slow") else time)
+    attitude = generator.normal(size=4)
+    attitude /= np.linalg.norm(attitude)
+    first, second, third, fourth = attitude.tolist()
+    scene = Scene(
+        "", triple(spin * along), triple(moments(generator)), torque=law,
+        attitude=(first, second, third, fourth),
+    )  # fmt: skip
+    return scene, float(generator.choice([-1.0, 1.0])) * time
+
+
+def _angle_errors(scene: Scene, times: Array | list[float], attitudes: Array) -> list[float]:
+    """Return the angle (rad) from the true attitude at each time, of a spin about one axis."""
+    assert scene.attitude is not None
+    assert scene.moments is not None
+    law = scene.torque
+    vectors = [scene.omega, law.constant, law.rate, *(amplitude for amplitude, _ in law.sines)]
+    axis = int(np.argmax(np.abs(vectors).max(axis=0)))
+    found = []
+    with mpmath.workdps(40):
+        moment = mpmath.mpf(scene.moments[axis])
+        for time, attitude in zip(map(mpmath.mpf, times), attitudes, strict=True):
+            gained = mpmath.mpf(law.constant[axis]) * time**2 / 2
+            gained += mpmath.mpf(law.rate[axis]) * time**3 / 6
+            for amplitude, frequency in law.sines:
+                turn = mpmath.mpf(frequency) * time
+                gained += mpmath.mpf(amplitude[axis]) * (turn - mpmath.sin(turn)) / frequency**2
+            half = (mpmath.mpf(scene.omega[axis]) * time + gained / moment) / 2
+            spun = [mpmath.cos(half), 0, 0, 0]
+            spun[1 + axis] = mpmath.sin(half)
+            length = mpmath.sqrt(sum(mpmath.mpf(x) ** 2 for x in scene.attitude))
+            true = _product([mpmath.mpf(x) / length for x in scene.attitude], spun)
+            back = [true[0], -true[1], -true[2], -true[3]]
+            apart = _product(back, [mpmath.mpf(float(x)) for x in attitude])
+            found.append(float(2 * mpmath.sqrt(sum(x**2 for x in apart[1:]))))
+    return found
+
+
+def _product(p: list[mpmath.mpf], q: list[mpmath.mpf]) -> list[mpmath.mpf]:
+    return [
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] + p[2] * q[0] + p[3] * q[1] - p[1] * q[3],
+        p[0] * q[3] + p[3] * q[0] + p[1] * q[2] - p[2] * q[1],
+    ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_reported_error_is_no_less_than_a_tenth_of_the_true_one(kind: str) -> None:
+    generator = np.random.default_rng([25, KINDS.index(kind)])
+    judged = 0
+    for number in range(60):
+        scene, time = _drawn(kind, generator)
+        tolerance = TOLERANCES[number % len(TOLERANCES)]
+        times = [time] if number % 2 else [0.3 * time, 0.7 * time, time]
+        found = solve(scene, times, "taylor", tolerance, attitude=True)
+        assert found.attitude is not None
+        assert found.error is not None
+        error = max(_angle_errors(scene, times, found.attitude))
+        turned = 1.0 + float(np.abs(found.omega).max()) * abs(time)
+        # About the axis of the middle moment perturbations grow: here none begins to.
+        assert found.ended == "sensitive" or max(error, found.error) <= tolerance
+        assert found.error >= 0.1 * (error - _DOUBT * turned), (number, tolerance)
+        judged += error > 10.0 * _DOUBT * turned
+    assert judged > 10 or kind == "slow"
+
+
+def test_prepared_solver_reports_it_too() -> None:
+    generator = np.random.default_rng(2501)
+    judged = 0
+    for _ in range(40):
+        scene, time = _drawn("constant", generator)
+        solver = prepare(scene, "auto", 1e-3, attitude=True)
+        _, attitude = solver(scene.omega, time)
+        (error,) = _angle_errors(scene, [time], np.array([attitude]))
+        assert solver.error is not None
+        assert solver.error >= 0.1 * error - 1e-13
+        judged += error > 1e-8
+    assert judged > 20
+
+
+def test_steady_spin_of_a_brick() -> None:
+    """Twenty thousand times the reported error, once."""
+    scene = Scene("", (0.0, 0.0, 1.0), moments=(4.0, 3.0, 2.0), attitude=(1.0, 0.0, 0.0, 0.0))
+    found = solve(scene, [40.0], "taylor", 1e-3, attitude=True)
+    assert found.attitude is not None
+    assert found.error is not None
+    (error,) = _angle_errors(scene, [40.0], found.attitude)
+    # It is taken off, all but a part of it.
+    assert 1e-7 < error < 0.5 * found.error < 1e-4
+    assert found.digits == pytest.approx(-math.log10(found.error), abs=0.1)
+
+
+def test_error_is_accumulated_from_step_to_step() -> None:
+    """Turns left out add, about the axes of space: the error is the number of steps times one."""
+    scene = Scene("", (0.0, 0.0, 1.0), moments=(4.0, 3.0, 2.0), attitude=(0.5, -0.5, 0.5, 0.5))
+    errors = []
+    for time in (40.0, 400.0):
+        found = solve(scene, [time], "taylor", 1e-3, attitude=True)
+        errors.append((found.error or 0.0) / found.steps)
+        assert found.evaluations == found.steps
+    # The local tolerance is less for the longer way.
+    assert 0.0 < errors[1] < errors[0]
+    assert 400.0 * errors[1] > 1e-7
+
+
+def test_intermediate_rows_have_the_error_of_their_own_times() -> None:
+    """Within the first step the series errs by far less than at its end, or at the last time."""
+    generator = np.random.default_rng(2502)
+    for _ in range(20):
+        scene, _ = _drawn("steady", generator)
+        period = 2.0 * math.pi / max(map(abs, scene.omega))
+        times = [0.2 * period, 0.3 * period, 20.0 * period]
+        found = solve(scene, times, "taylor", 1e-3, attitude=True)
+        assert found.attitude is not None
+        assert found.error is not None
+        early, later, last = _angle_errors(scene, times, found.attitude)
+        assert max(early, later) < 1e-3 * last + 1e-15
+        alone = solve(scene, times[:2], "taylor", 1e-3, attitude=True)
+        assert (alone.error or 0.0) < 1e-2 * found.error + 1e-15

@@ -4,7 +4,7 @@ module taylor_attitude
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
   use taylor_error, only: remainder_of, rise
-  use taylor_series, only: expand, series_t
+  use taylor_series, only: expand, MORE_TURNS, series_t
   use torque_terms, only: MOST_ORDER
   use two_words, only: two_sum
   implicit none(type, external)
@@ -29,19 +29,19 @@ contains
 
   ! unroll: expand_both
   subroutine expand_both(order, s)
-    !! The terms of omega as by `expand`, those of the attitude, and their sum.
+    !! The terms of omega as by `expand`, those of the attitude and two more, and the sum without.
     integer(c_int), intent(in), value :: order
     type(series_t), intent(inout) :: s   !! turns(:, 0) and half are given too
-    real(dp) :: parts(4, 3, 0:MOST_ORDER) ! of each term, times the units of the axes
+    real(dp) :: parts(4, 3, 0:MOST_ORDER + MORE_TURNS) ! of each term, times the units of the axes
     real(dp) :: sums(4)
     integer :: i, j, k
 
     call expand(order, s)
     s%turn = 0.0_dp
-    do k = 1, order
+    do k = 1, order + MORE_TURNS
       call times_units(s%turns(:, k - 1), s%half(1), parts(:, :, k - 1))
       sums = 0.0_dp
-      do j = 0, k - 1
+      do j = max(0, k - 1 - order), k - 1
         do i = 1, 4
           sums(i) = sums(i) + ((parts(i, 1, j)*s%terms(1, k - 1 - j) &
                                 + parts(i, 2, j)*s%terms(2, k - 1 - j)) &
@@ -88,7 +88,10 @@ contains
 
     now%before = now%error
     q = now%q + s%turn
-    call remainder_of(s%turns, order, unit, from_rest, now%left)
+    ! No pair of poles tells those of a turn that begins at no speed: its every second term is at
+    ! right angles to the one before.
+    call remainder_of(order + MORE_TURNS, s%turns, unit, from_rest, now%left)
+    now%left = now%left + (s%turns(:, order + 1) + s%turns(:, order + 2))
     call rate_of_turn(s, s%terms(:3, 0), now%q, before, now%rates(:, 1), now%slopes(:, 1))
     call rate_of_turn(s, s%terms(:3, 0) + s%change(:3), q, carried, now%rates(:, 2), &
                       now%slopes(:, 2))

@@ -4,7 +4,6 @@ module taylor_error
   !! omega on the way, whose largest norm is the growth of a small difference.
   use kinds, only: dp
   use taylor_series, only: series_t
-  use torque_terms, only: MOST_ORDER
   implicit none(type, external)
   private
 
@@ -53,7 +52,7 @@ contains
     real(dp), intent(out) :: left(4)   !! rad/s
     integer :: i
 
-    call remainder_of(s%terms, order, unit, from_rest, left)
+    call remainder_of(order, s%terms, unit, from_rest, left)
     do i = 1, 4
       s%lanes(i, 1) = s%lanes(i, 1) - FIRST(i)*left(1)
       s%lanes(i, 2) = s%lanes(i, 2) - FIRST(i)*left(2)
@@ -61,11 +60,11 @@ contains
     end do
   end subroutine leave_out
 
-  pure subroutine remainder_of(terms, order, unit, from_rest, left)
-    !! Sum of the terms beyond the last, of omega or of an attitude, as if one pair of poles made
+  pure subroutine remainder_of(order, terms, unit, from_rest, left)
+    !! Sum of the terms beyond the order, of omega or of an attitude, as if one pair of poles made
     !! the last four: v(k + 1) = a v(k) - b v(k - 1), by least squares.
-    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
     integer, intent(in) :: order
+    real(dp), intent(in) :: terms(4, 0:order)
     real(dp), intent(in) :: unit       !! times which the last terms are near 1
     logical, intent(in) :: from_rest
     real(dp), intent(out) :: left(4)
@@ -91,7 +90,7 @@ contains
     do i = 1, 4
       left(i) = a*terms(i, order) - b*terms(i, order - 1)
     end do
-    if (from_rest) call take_thirds(terms, order, unit, left)
+    if (from_rest) call take_thirds(order, terms, unit, left)
   end subroutine remainder_of
 
   pure subroutine fit_poles(uu, vv, uv, ux, vx, a, b)
@@ -110,11 +109,11 @@ contains
     b = b/determinant
   end subroutine fit_poles
 
-  pure subroutine take_thirds(terms, order, unit, left)
+  pure subroutine take_thirds(order, terms, unit, left)
     !! From rest a torque that grows with time makes every third term only, of which four in a row
     !! tell nothing: the same with three terms for each, where that leaves out more.
-    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
     integer, intent(in) :: order
+    real(dp), intent(in) :: terms(4, 0:order)
     real(dp), intent(in) :: unit
     real(dp), intent(inout) :: left(4)
     real(dp), dimension(4, 3) :: x, u, v, w
@@ -131,11 +130,11 @@ contains
     if (sum(abs(thirds)) > sum(abs(left))) left = thirds
   end subroutine take_thirds
 
-  pure real(dp) function likely_remainder(terms, order)
+  pure real(dp) function likely_remainder(order, terms)
     !! Size of the terms beyond the last, should they decay as the last six do: the fit of a pair of
     !! poles may come out small by chance, and where there are few steps no other makes up for it.
-    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
     integer, intent(in) :: order
+    real(dp), intent(in) :: terms(4, 0:order)
     real(dp) :: last, before
 
     last = sum(abs(terms(:, order - 2:order)))

@@ -192,8 +192,8 @@ contains
       end if
       now%peak = max(now%peak, maxval(abs(error)))
       if (found%steps < FEW_STEPS) then
-        found%least = max(found%least, likely_remainder(s%terms, order)/max(now%scale, tiny(h)))
-        if (with_attitude) found%least = max(found%least, 2.0_dp*likely_remainder(s%turns, order))
+        found%least = max(found%least, likely_remainder(order, s%terms)/max(now%scale, tiny(h)))
+        if (with_attitude) found%least = max(found%least, 2.0_dp*likely_remainder(order, s%turns))
       end if
       call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
                     n_attitudes, attitudes, found)

@@ -8,6 +8,8 @@ module taylor_series
   implicit none(type, external)
   private
 
+  integer, parameter, public :: MORE_TURNS = 2
+
   ! Columns of four numbers fill a register, the fourth idle. taylor_terms.c knows this layout.
   type, bind(c), public :: series_t
     real(c_double) :: terms(4, 0:MOST_ORDER) !! coefficient times step**k, rad/s
@@ -15,7 +17,8 @@ module taylor_series
     real(c_double) :: factors(4)             !! step times A, B, C, s
     real(c_double) :: change(4)              !! sum of the terms from 1, rad/s
     real(c_double) :: lanes(4, 3)            !! small differences, a vector in each lane, rad/s
-    real(c_double) :: turns(4, 0:MOST_ORDER) !! the same of an attitude
+    !! The same of an attitude, and the two beyond the order but for what omega's next makes of them.
+    real(c_double) :: turns(4, 0:MOST_ORDER + MORE_TURNS)
     real(c_double) :: half(4)                !! of the step, s
     real(c_double) :: turn(4)                !! sum of its terms from 1
     real(c_double) :: weight                 !! of its terms among those of omega, rad/s; 0: none
@@ -206,6 +209,8 @@ contains
     s%factors = s%factors*ratio
     if (with_attitude) then
       call rescale_terms(order, ratio, s%turns, s%turn)
+      s%turns(:, order + 1) = s%turns(:, order + 1)*ratio**(order + 1)
+      s%turns(:, order + 2) = s%turns(:, order + 2)*ratio**(order + 2)
       s%half = s%half*ratio
     end if
   end subroutine rescale
@@ -213,7 +218,7 @@ contains
   pure subroutine rescale_terms(order, ratio, terms, change)
     integer, intent(in) :: order
     real(dp), intent(in) :: ratio
-    real(dp), intent(inout) :: terms(4, 0:MOST_ORDER)
+    real(dp), intent(inout) :: terms(4, 0:order)
     real(dp), intent(out) :: change(4) !! sum of the terms from 1
     real(dp) :: power
     integer :: k
@@ -229,10 +234,10 @@ contains
     end do
   end subroutine rescale_terms
 
-  pure function inside(terms, order, part) result(change)
+  pure function inside(order, terms, part) result(change)
     !! Change of omega, or of an attitude, at a part of the step.
-    real(dp), intent(in) :: terms(4, 0:MOST_ORDER)
     integer, intent(in) :: order
+    real(dp), intent(in) :: terms(4, 0:order)
     real(dp), intent(in) :: part
     real(dp) :: change(4)
     integer :: k

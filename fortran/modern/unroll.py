@@ -55,7 +55,8 @@ TORQUE = 4 * (MOST_ORDER + 1)
 RATES = TORQUE + 4 * MOST_ORDER
 CHANGE = RATES + 4
 TURNS = CHANGE + 4 + 12
-HALF = TURNS + 4 * (MOST_ORDER + 1)
+MORE_TURNS = 2  # terms of the attitude beyond the order: what a step leaves out begins with them
+HALF = TURNS + 4 * (MOST_ORDER + MORE_TURNS + 1)
 TURN = HALF + 4
 # Of the parts of q (0, x, y, z), axis by axis.
 SIGNS = ("-1.0, 1.0, 1.0, -1.0", "-1.0, -1.0, 1.0, 1.0", "-1.0, 1.0, -1.0, 1.0")
@@ -351,8 +352,7 @@ def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
             yield c(f"c = c + t{k}", known)
         if with_attitude:
             yield from attitude_term(k, wide)
-            if k < order:
-                yield from ready_for_products(k, wide)
+            yield from ready_for_products(k, wide)
             if k == 5:
                 yield c("d = k4 + k5", known)
             elif k > 5:
@@ -360,6 +360,12 @@ def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
     yield from (c(f"c = c + t{k}", known) for k in (3, 2, 1))
     yield f"_mm256_store_pd(s + {CHANGE}, c);"
     if with_attitude:
+        k = order + 1
+        yield from attitude_term(k, wide)
+        # Of omega there is no such term.
+        yield f"const __m256d t{k} = _mm256_setzero_pd();"
+        yield from ready_for_products(k, wide)
+        yield from attitude_term(k + 1, wide)
         yield from (c(f"d = d + k{k}", known) for k in (3, 2, 1))
         yield f"_mm256_store_pd(s + {TURN}, d);"
 

@@ -186,7 +186,11 @@ contains
     ! worth of steps before a time make up for nearly all that has grown until then.
     call amplification(motion, t_end, spread, top, exponent, bound)
     noise = ROUNDING*(1.0_dp + 0.5_dp*real(steps, dp)/(1.0_dp + exponent))*bound
-    if (.not. abs(t_end) > 0.0_dp) noise = 0.0_dp
+    if (.not. abs(t_end) > 0.0_dp) then
+      ! Nothing errs, not even by the units.
+      result = omega
+      noise = 0.0_dp
+    end if
     status = merge(COMPLETE, SENSITIVE, noise <= CERTAIN*tolerance)
     if (status == COMPLETE) error = error + noise
   end subroutine quick_solve

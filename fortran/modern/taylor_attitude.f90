@@ -16,8 +16,11 @@ module taylor_attitude
     real(dp) :: q_low(4)  !! what its rounding left out
     real(dp) :: error(3)  !! half the turn, about axes of space, by which it errs
     real(dp) :: before(3) !! the same where the step began
-    real(dp) :: rates(3, 2) !! what omega's error would turn in a step, as it is at either end
-    real(dp) :: slopes(3, 2) !! change of that in a step, as it is at either end
+    real(dp) :: ends(4, 2)  !! the attitude where the step began, and where it ended
+    ! What omega's error turns, and how that changes, were it all along as it is at either end: half
+    ! a turn a step, about the axes of the body.
+    real(dp) :: rates(3, 2)
+    real(dp) :: slopes(3, 2)
     real(dp) :: left(4)   !! terms that the step leaves out
     real(dp) :: worst     !! largest error of a row so far, rad
     real(dp) :: peak      !! half the largest error so far, of a row or not, rad
@@ -71,7 +74,7 @@ contains
     type(attitude_t), intent(out) :: now
 
     now = attitude_t(q, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, &
-                     0.0_dp)
+                     0.0_dp, 0.0_dp)
   end subroutine begin_attitude
 
   pure subroutine turn_error(s, order, unit, from_rest, before, carried, now)
@@ -92,29 +95,28 @@ contains
     ! right angles to the one before.
     call remainder_of(order + MORE_TURNS, s%turns, unit, from_rest, now%left)
     now%left = now%left + (s%turns(:, order + 1) + s%turns(:, order + 2))
-    call rate_of_turn(s, s%terms(:3, 0), now%q, before, now%rates(:, 1), now%slopes(:, 1))
-    call rate_of_turn(s, s%terms(:3, 0) + s%change(:3), q, carried, now%rates(:, 2), &
-                      now%slopes(:, 2))
+    now%ends(:, 1) = now%q
+    now%ends(:, 2) = q
+    call rate_of_turn(s, s%terms(:3, 0), before, now%rates(:, 1), now%slopes(:, 1))
+    call rate_of_turn(s, s%terms(:3, 0) + s%change(:3), carried, now%rates(:, 2), now%slopes(:, 2))
     now%error = error_within(now, order, 1.0_dp, q)
     now%peak = max(now%peak, sum(abs(now%error)))
   end subroutine turn_error
 
-  pure subroutine rate_of_turn(s, w, q, error, rate, slope)
-    !! How fast an error of omega turns the attitude about axes of space, and how that changes.
+  pure subroutine rate_of_turn(s, w, error, rate, slope)
+    !! How fast an error of omega turns the attitude, and how that changes about axes of space.
     type(series_t), intent(in) :: s
     real(dp), intent(in) :: w(3)      !! omega, rad/s
-    real(dp), intent(in) :: q(4)
     real(dp), intent(in) :: error(3)  !! of omega, rad/s
-    real(dp), intent(out) :: rate(3)  !! half a turn a step
-    real(dp), intent(out) :: slope(3) !! the same over the step
-    real(dp) :: change(3) ! of the error, over the step, about the axes of space
+    real(dp), intent(out) :: rate(3), slope(3) !! about the axes of the body
+    real(dp) :: change(3) ! of the error, over the step
 
     change = rise(s%factors(:3), w, error)
     change(1) = change(1) + 2.0_dp*s%half(1)*(w(2)*error(3) - w(3)*error(2))
     change(2) = change(2) + 2.0_dp*s%half(1)*(w(3)*error(1) - w(1)*error(3))
     change(3) = change(3) + 2.0_dp*s%half(1)*(w(1)*error(2) - w(2)*error(1))
-    rate = s%half(1)*in_space(q, error)
-    slope = s%half(1)*in_space(q, change)
+    rate = s%half(1)*error
+    slope = s%half(1)*change
   end subroutine rate_of_turn
 
   pure function error_within(now, order, part, q) result(error)
@@ -128,10 +130,11 @@ contains
 
     square = part*part
     cube = square*part
-    error = now%before + (part - cube + 0.5_dp*part*cube)*now%rates(:, 1) &
-            + (cube - 0.5_dp*part*cube)*now%rates(:, 2) &
-            + (0.5_dp*square - 2.0_dp/3.0_dp*cube + 0.25_dp*part*cube)*now%slopes(:, 1) &
-            + (0.25_dp*part*cube - cube/3.0_dp)*now%slopes(:, 2) &
+    error = now%before &
+            + in_space(now%ends(:, 1), (part - cube + 0.5_dp*part*cube)*now%rates(:, 1) &
+                       + (0.5_dp*square - 2.0_dp/3.0_dp*cube + 0.25_dp*part*cube)*now%slopes(:, 1)) &
+            + in_space(now%ends(:, 2), (cube - 0.5_dp*part*cube)*now%rates(:, 2) &
+                       + (0.25_dp*part*cube - cube/3.0_dp)*now%slopes(:, 2)) &
             - part**(order + 1)*left_turn(now%left, q)
   end function error_within
 

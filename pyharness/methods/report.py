@@ -77,7 +77,6 @@ def trajectory_report(
         return {
             "scene": records.scene_record(scene),
             "method": method,
-            "tolerance": trajectory.tolerance,
             "listing": None if listing is None else records.listing_record(listing),
             **({} if word is None else {"word": word}),
             "trajectory": {
@@ -86,6 +85,7 @@ def trajectory_report(
                 "omega": trajectory.omega.tolist(),
                 "velocity": None if velocity is None else velocity.tolist(),
                 "attitude": None if attitude is None else attitude.tolist(),
+                "tolerance": trajectory.tolerance,
                 **records.estimate_record(trajectory),
             },
             **records.ending_record(trajectory),

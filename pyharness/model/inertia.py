@@ -1,16 +1,54 @@
 """Full inertia matrices: their principal moments and axes."""
 
 import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 
+from pyharness.model.diagonal import diagonalised
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple, several, three
 
 Matrix = tuple[Triple, Triple, Triple]
+Exact = tuple[Fraction, Fraction, Fraction]
 
 _ALIKE = 1e-12  # of the largest entry: so much may two entries differ that ought to be the same
+# Of the largest moment: by so much the rounding of a matrix's entries may move each of the others.
+_ROUNDED = Fraction(1, 1 << 50)
+_KEPT = 256  # matrices whose axes are not computed again
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipalFrame:
+    """The principal moments of a body, and the axes they are about.
+
+    Attributes
+    ----------
+    moments, moments_low : tuple of three floats
+        The moments rounded to nearest (kg m2), and what the rounding took off them.
+    axes : ndarray, shape (3, 3)
+        The axes in columns, rounded to nearest: a right-handed frame, the one nearest to the
+        body's own.
+    exact_moments, exact_axes
+        The same to some 38 digits; each axis is a tuple of its components about the body's axes.
+    """
+
+    moments: Triple
+    moments_low: Triple
+    axes: Array
+    exact_moments: Exact
+    exact_axes: tuple[Exact, Exact, Exact]
+
+    def into(self, vector: Exact) -> Exact:
+        """Return the components of a vector of the body about the principal axes."""
+        first, second, third = (
+            sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
+            for axis in self.exact_axes
+        )
+        return first, second, third
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
@@ -30,29 +68,74 @@ def checked_inertia(where: str, values: object) -> Matrix:
     half = [[0.5 * given[i][j] + 0.5 * given[j][i] for j in range(3)] for i in range(3)]
     (a, b, c), (d, e, f), (g, h, k) = half
     matrix = ((a, b, c), (d, e, f), (g, h, k))
-    least = min(principal_axes(matrix)[0])
-    if not least > 0.0:
+    least = min(principal_frame(matrix).exact_moments)
+    if not least > 0:
         raise InputError(
-            f"{where}: its least principal moment is {least:g}; allowed: a positive definite matrix"
+            f"{where}: its least principal moment is {_float(least):g}; allowed: a positive "
+            "definite matrix"
         )
     return matrix
 
 
-def principal_axes(inertia: Matrix | tuple[()]) -> tuple[Triple, Array]:
+@lru_cache(maxsize=_KEPT)
+def principal_frame(inertia: Matrix) -> PrincipalFrame:
+    """Return the principal moments and axes of a symmetric matrix; the moments in no order.
+
+    Every moment is good to its last digit, however small it is beside the others.
+    """
+    found = diagonalised(inertia)
+    order: list[int] = []
+    # The axis of each row is the one that is nearest to it of those that are left.
+    for row in range(3):
+        left = [k for k in range(3) if k not in order]
+        order.append(max(left, key=lambda k: abs(found.vectors[k][row])))
+    axes = [found.vectors[k] for k in order]
+    axes = [_turned(axis) if axis[n] < 0 else axis for n, axis in enumerate(axes)]
+    if _determinant(axes) < 0:
+        least = min(range(3), key=lambda n: abs(axes[n][n]))
+        axes[least] = _turned(axes[least])
+    first, second, third = (found.values[k] for k in order)
+    exact = first, second, third
+    rounded = _float(first), _float(second), _float(third)
+    low = _rest(first, rounded[0]), _rest(second, rounded[1]), _rest(third, rounded[2])
+    columns = np.array([[float(x) for x in axis] for axis in axes]).T
+    columns.flags.writeable = False
+    return PrincipalFrame(rounded, low, columns, exact, (axes[0], axes[1], axes[2]))
+
+
+def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
     """Return the principal moments (kg m2) and the axes they are about, columns of a (3, 3) array.
 
     A right-handed frame, the one nearest to the body's own.
     """
-    matrix = np.array(inertia)
-    # A power of two, so that no digit changes and nothing leaves the range of numbers.
-    unit = math.ldexp(1.0, math.frexp(np.abs(matrix).max())[1] - 1)
-    moments, axes = np.linalg.eigh(matrix / unit)
-    order: list[int] = []
-    for row in np.abs(axes):
-        order.append(max((k for k in range(3) if k not in order), key=lambda k: row[k]))
-    axes = axes[:, order]
-    axes *= np.where(np.diag(axes) < 0.0, -1.0, 1.0)
-    if np.linalg.det(axes) < 0.0:
-        axes[:, np.argmin(np.abs(np.diag(axes)))] *= -1.0
-    first, second, third = (float(x) * unit for x in moments[order])
-    return (first, second, third), axes
+    found = principal_frame(inertia)
+    return found.moments, found.axes.copy()
+
+
+def breaks_triangle(inertia: Matrix) -> bool:
+    """Whether the largest principal moment exceeds the sum of the others.
+
+    A body that is flat has them equal; the rounding of its matrix is not held against it.
+    """
+    low, middle, high = sorted(principal_frame(inertia).exact_moments)
+    return high - low - middle > _ROUNDED * high
+
+
+def _turned(axis: Exact) -> Exact:
+    return -axis[0], -axis[1], -axis[2]
+
+
+def _determinant(axes: list[Exact]) -> Fraction:
+    (a, b, c), (d, e, f), (g, h, k) = axes
+    return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
+
+
+def _float(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def _rest(value: Fraction, rounded: float) -> float:
+    return float(value - Fraction(rounded)) if math.isfinite(rounded) else 0.0

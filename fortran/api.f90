@@ -230,6 +230,28 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
                    omega0, effort(1), n_times, times, rows, n_rows, status, effort(2))
 end subroutine sphere_solution
 
+subroutine torque_noise_ratio(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t_end, &
+                              steps, scale, noise)
+  ! What the terms of a torque that nearly cancel give alone, over the largest omega.
+  !f2py threadsafe
+  use problem, only: problem_t
+  use torque_noise, only: torque_noise_of
+  implicit none
+  real(8), intent(in) :: m_constant(3), m_rate(3) ! torque over moment, 1/s2, and its rate
+  integer(4), intent(in) :: n_sines
+  real(8), intent(in), target :: sines(4, n_sines)
+  integer(4), intent(in) :: n_cosines
+  real(8), intent(in), target :: cosines(4, n_cosines)
+  real(8), intent(in) :: t_end      ! s
+  real(8), intent(in) :: steps      ! in each of which the terms are rounded
+  real(8), intent(in) :: scale      ! largest |omega|, rad/s; the opposite of the first if unknown
+  real(8), intent(out) :: noise
+
+  noise = torque_noise_of(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines, n_cosines, &
+                                    sines, cosines), &
+                          t_end, steps, scale)
+end subroutine torque_noise_ratio
+
 subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
                           omega0, n_times, times, stages, step, effort, rows, reached, n_rows, &
                           status, evaluations)

@@ -3,7 +3,9 @@ module many_slots
   use bodies, only: bodies_t, LANES, of_body
   use kinds, only: dp
   use many_columns, only: columns_of, equations_of
+  use problem, only: problem_t
   use taylor_plan, only: add_wave_rates, share_and_step, steady_rates
+  use torque_noise, only: torque_noise_of
   implicit none(type, external)
   private
 
@@ -17,6 +19,7 @@ module many_slots
   ! what it leaves out is known and taken off.
   real(dp), parameter :: MORE = 3.0_dp
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
+  real(dp), parameter :: CANCELLED = 10.0_dp !! torque of terms that leave so little of each
   real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! of each radian of a wave
   ! None that a symmetry keeps from growing; of length 1 as growth takes it.
   real(dp), parameter :: DIFFERENCE(3) = [0.48_dp, -0.31_dp, 0.21_dp]
@@ -76,10 +79,11 @@ contains
     !! The next bodies, as many as there are lanes; r%fits is below 0 of one that is none for here.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: first
-    real(dp), intent(inout) :: waves(4, MOST_WAVES, LANES)
+    real(dp), intent(inout), target :: waves(4, MOST_WAVES, LANES)
     type(ready_t), intent(inout) :: r
     real(dp), dimension(LANES, 3) :: moments
     real(dp), dimension(LANES) :: coupling, gain, rate, turned, fastest
+    type(problem_t) :: torque
     real(dp) :: push, ramp, tolerance
     integer :: i, n, n_sines, n_waves
 
@@ -117,6 +121,8 @@ contains
     n_sines = size(bodies%sines, 2)
     n_waves = n_sines + size(bodies%cosines, 2)
     if (n_waves > 0) then
+      torque%n_sines = n_sines
+      torque%n_cosines = n_waves - n_sines
       fastest = 0.0_dp
       do n = 1, n_waves
         do i = 1, r%there
@@ -135,6 +141,14 @@ contains
       end do
       do i = 1, r%there
         if (.not. fastest(i)*abs(r%rest(i))*WAVES_ERR <= SURE*tolerance) r%fits(i) = -1.0_dp
+        if (r%fits(i) < 0.0_dp) cycle
+        torque%constant = r%constant(i, :)
+        torque%rate = r%rate(i, :)
+        torque%sines => waves(:, :n_sines, i)
+        torque%cosines => waves(:, n_sines + 1:n_waves, i)
+        if (torque_noise_of(torque, r%rest(i), 1.0_dp, -r%scale(i)) > CANCELLED) then
+          r%fits(i) = -1.0_dp
+        end if
       end do
     end if
     do i = 1, LANES

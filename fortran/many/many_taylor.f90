@@ -46,7 +46,7 @@ contains
     real(dp) :: waves(4, MOST_WAVES, SLOTS)
     integer :: body(SLOTS)   ! in each slot; 0: none
     type(ready_t) :: ready
-    real(dp) :: ready_waves(4, MOST_WAVES, LANES)
+    real(dp), target :: ready_waves(4, MOST_WAVES, LANES)
     integer :: n_sines, n_waves, order, first, active, i, j, unseen
 
     call c_f_pointer(bodies_at, bodies)

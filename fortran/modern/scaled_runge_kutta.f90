@@ -9,6 +9,7 @@ module scaled_runge_kutta
   use scaled_motion, only: amplification, average, integral, MOST_WAVES, motion_t, reach_of, scaled, &
                            steps_for_waves
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
+  use torque_noise, only: torque_noise_of
   implicit none(type, external)
   private
 
@@ -35,6 +36,9 @@ module scaled_runge_kutta
   real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging, of the aim
 
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  ! Roundings of a wave, which is turned from half step to half step, some hundred times until it is
+  ! made afresh.
+  real(dp), parameter :: OF_WAVES = 32.0_dp
   ! Amplified rounding, in tolerances, up to which the series would say complete too: it says
   ! sensitive from 0.3 on, and the bound of the amplification is from steps of a few digits.
   real(dp), parameter :: CERTAIN = 0.1_dp
@@ -89,6 +93,7 @@ contains
     real(dp) :: exponent     ! integral of the logarithmic norm over time
     real(dp) :: bound        ! of the norm of the state-transition matrix
     real(dp) :: noise        ! bound of amplified rounding, relative
+    real(dp) :: blurred      ! by rounding of torques that cancel, relative
     logical :: ended         ! by the user
     integer :: n
 
@@ -182,6 +187,11 @@ contains
     x = x + gaps(:, 1)
     if (varies) x = x + integral(motion, t_end)
     result(motion%axes) = x*motion%scale
+    blurred = 0.0_dp
+    if (problem%n_sines + problem%n_cosines > 0) then
+      blurred = OF_WAVES*ROUNDING*torque_noise_of(problem, t_end, real(steps, dp), &
+                                                  maxval(abs(top*motion%scale)))
+    end if
     ! Each step rounds omega; where perturbations grow alike from step to step, the last exponent's
     ! worth of steps before a time make up for nearly all that has grown until then.
     call amplification(motion, t_end, spread, top, exponent, bound)
@@ -191,7 +201,9 @@ contains
       result = omega
       noise = 0.0_dp
     end if
-    status = merge(COMPLETE, SENSITIVE, noise <= CERTAIN*tolerance)
+    blurred = blurred*bound
+    error = error + blurred
+    status = merge(COMPLETE, SENSITIVE, noise + blurred <= CERTAIN*tolerance)
     if (status == COMPLETE) error = error + noise
   end subroutine quick_solve
 

@@ -10,6 +10,7 @@ module space_torque
   use space_torque_plan, only: LEAST_SHARE, order_for, plan
   use space_torque_series, only: expand, fitting, inside, LONGER, series_t, torque_terms
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
+  use torque_noise, only: torque_noise_of
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -66,6 +67,7 @@ contains
     real(dp) :: h             ! first guess of a step, s
     real(dp) :: cost, most, spent
     real(dp) :: error
+    real(dp) :: blurred       ! by rounding of torques that cancel, relative
     integer :: marches, failed
 
     n_rows = 0
@@ -117,9 +119,15 @@ contains
     n_rows = now%n_rows
     status = now%status
     steps = now%steps
-    found(1) = error + ROUNDING
+    blurred = 0.0_dp
+    if (problem%n_sines + problem%n_cosines > 0) then
+      ! Any axis of the body may come to lie along the torque.
+      blurred = ROUNDING*torque_noise_of(problem, times(n_times), real(steps, dp), &
+                                         now%scale/maxval(ratios))
+    end if
+    found(1) = error + (ROUNDING + blurred)
     found(3) = spent
-    if (status == COMPLETE .and. .not. error <= tolerance) status = SENSITIVE
+    if (status == COMPLETE .and. .not. error + blurred <= tolerance) status = SENSITIVE
     if (status == GAVE_UP) then
       if (marches == 1) now%ahead = MARCHES*now%ahead
       needed = (spent - real(now%steps, dp) + now%ahead)*cost/MOST_STEPS

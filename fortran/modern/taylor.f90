@@ -8,6 +8,7 @@ module taylor
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
   use taylor_march, only: march, room_t
   use taylor_rows, only: outcome_t
+  use torque_noise, only: torque_noise_of
   use torque_terms, only: wave_t, waves_of
   implicit none(type, external)
   private
@@ -102,6 +103,7 @@ contains
     real(dp) :: most    ! steps left
     real(dp) :: spent   ! steps of the marches before
     real(dp) :: growth
+    real(dp) :: blurred  ! by rounding at the end, relative
     logical :: precise  ! this march, for a growth known too coarsely
 
     asked = tolerance
@@ -142,9 +144,13 @@ contains
     steps = outcome%steps
     ! The way is known as it is: it asks for no march that is more precise.
     growth = growth*outcome%way
-    found = [max(outcome%error, min(outcome%least, UNSURE*tolerance)) + ROUNDING*growth, growth, &
-             spent]
-    if (status == COMPLETE .and. ROUNDING*growth > UNSURE*tolerance) status = SENSITIVE
+    blurred = ROUNDING*growth
+    if (problem%n_sines + problem%n_cosines > 0) then
+      blurred = blurred + blurred*torque_noise_of(problem, times(n_times), real(steps, dp), &
+                                                  outcome%scale)
+    end if
+    found = [max(outcome%error, min(outcome%least, UNSURE*tolerance)) + blurred, growth, spent]
+    if (status == COMPLETE .and. blurred > UNSURE*tolerance) status = SENSITIVE
     if (status == GAVE_UP) then
       ! An error that is too large already will ask for another march, in shorter steps.
       if (outcome%error > tolerance) outcome%ahead = ANOTHER*outcome%ahead

@@ -242,6 +242,7 @@ contains
     end do
     call growths_of(precise, s%lanes, blocks, found%growth, found%largest)
     found%precise_steps = coupling*now%scale*abs(times(n_times))/A_PRECISE_STEP
+    found%scale = now%scale
     found%error = now%worst
     if (.not. maxval(abs(s%lanes(1, :))) <= found%error) found%error = maxval(abs(s%lanes(1, :)))
     if (now%scale > 0.0_dp) then

@@ -40,6 +40,7 @@ module taylor_rows
     real(dp) :: precise_steps ! to the end, at the least, of a march that is precise
     logical :: finest    ! no step could err less
     real(dp) :: way      ! how much more the attitude grows: an error of omega turns it all the way
+    real(dp) :: scale = 0.0_dp ! largest |omega|, rad/s
   end type outcome_t
 
   public :: add_last_row, add_rows

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyharness.methods.problem import normalized, remainders, trajectory_of
-from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive
+from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, torque_noise
 from pyharness.model.effort import advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, extension
@@ -59,6 +59,7 @@ def known_solution(
         )
     if status != COMPLETE:
         return trajectory_of(times, rows, n_rows, status, len(times), 0, attitudes=attitudes)
-    error, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, times[-1])
-    status = SENSITIVE if is_sensitive(growth, tolerance) else COMPLETE
+    noise = torque_noise(scene, scene.omega, times[-1])
+    error, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, times[-1], noise)
+    status = SENSITIVE if is_sensitive(growth, tolerance, noise) else COMPLETE
     return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth, attitudes)

@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING, Any
 from pyharness.methods.plan import Plan
 from pyharness.methods.problem import known
 from pyharness.methods.registry import GAUSS
-from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, motion_growth
+from pyharness.methods.sensitivity import (
+    closed_form_estimate,
+    is_sensitive,
+    motion_growth,
+    torque_noise,
+)
 from pyharness.model.extension import ENDS
 from pyharness.model.trajectory import WITH_ALL_ROWS, digits_left
 from pyharness.model.values import Triple
@@ -87,9 +92,12 @@ class LastCall:
         error, growth = known(of_kernel), known(grown)
         scene = self.plan.scene
         if self.plan.closed_form and not steps:
-            error, growth = closed_form_estimate(scene.euler_coefficients, omega0, t_end)
+            noise = torque_noise(scene, omega0, t_end)
+            error, growth = closed_form_estimate(scene.euler_coefficients, omega0, t_end, noise)
         elif self.plan.method in GAUSS:
             growth = motion_growth(replace(scene, omega=omega0), t_end)
+            noise = torque_noise(scene, omega0, t_end, abs(t_end) / scene.step_size)
         else:
             return status, error, growth
-        return "sensitive" if is_sensitive(growth, self._given[0]) else status, error, growth
+        is_blurred = is_sensitive(growth, self._given[0], noise)
+        return "sensitive" if is_blurred else status, error, growth

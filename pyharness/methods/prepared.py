@@ -30,6 +30,7 @@ from pyharness.model.values import (
     three,
     three_floats,
 )
+from pyharness.model.waves import with_merged_waves
 
 if TYPE_CHECKING:
     from pyharness._many import ManyStarts
@@ -204,6 +205,7 @@ def prepare(
     tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
     check_torque(scene, method, attitude)
+    scene = with_merged_waves(scene)
     if attitude:
         from pyharness.methods.prepared_attitude import prepared_attitude
 

@@ -69,10 +69,10 @@ def remainders(scene: Scene) -> Triple:
 
     Zeros where coefficients are given as such, and under torque, where no kernel asks.
     """
-    found = scene.euler_coefficients
-    if scene.moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
+    found, moments = scene.euler_coefficients, scene.exact_moments
+    if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
         return 0.0, 0.0, 0.0
-    i1, i2, i3 = map(Fraction, scene.moments)
+    i1, i2, i3 = moments
     a, b, c = map(Fraction, found)
     return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 

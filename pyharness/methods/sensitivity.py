@@ -1,5 +1,6 @@
 """What a motion makes of rounding: growth of small differences, and the error that it implies."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -21,23 +22,51 @@ _COARSE = 1e-3
 _LITTLE_WORK = 5e-3
 
 
-def is_sensitive(growth: float | None, tolerance: float) -> bool:
-    """Whether rounding times a known growth exceeds the tolerance (relative)."""
-    return growth is not None and ROUNDING * growth > _SHARE * tolerance
+def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
+    """Whether rounding times a known growth exceeds the tolerance (relative).
+
+    `noise` is that of the torque, in roundings of omega.
+    """
+    return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
+
+
+def torque_noise(
+    scene: Scene,
+    omega0: Triple,
+    t_end: float,
+    steps: float = math.inf,
+    scale: float | None = None,
+) -> float:
+    """Return the rounding of torques that nearly cancel, until `t_end` (s), in roundings of omega.
+
+    That is what the terms of the torque law give one by one over the largest omega, `scale`
+    (rad/s), and 0 where they do not cancel. They are rounded in each of so many steps. Without the
+    scale it is the larger of the start, `omega0` (rad/s), and of what the whole torque gives.
+    """
+    if not (scene.torque.sines or scene.torque.cosines):
+        return 0.0
+    if scale is None:
+        scale = -max(map(abs, omega0))
+    return float(
+        extension().torque_noise_ratio(*normalized(scene)[1:], t_end, min(steps, 1e300), scale)
+    )
 
 
 def closed_form_estimate(
-    coefficients: Triple, omega0: Triple, t_end: float
+    coefficients: Triple, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
     """Return error and growth of a closed form, started with omega0 (rad/s), at `t_end` (s).
 
     Coefficients that are all zero are a sphere's, whose differences stay as they are. The error is
-    relative to the largest omega on the way; both are None where there is no closed form.
+    relative to the largest omega on the way; both are None where there is no closed form. `noise`
+    is that of the torque, in roundings of omega.
     """
     growth: float | None = 1.0
     if any(coefficients):
         growth = known(extension().torque_free_growth(coefficients, omega0, t_end))
-    return None if growth is None else ROUNDING * growth + _CLOSED_FORM_ERROR, growth
+    if growth is None:
+        return None, None
+    return ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR, growth
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:

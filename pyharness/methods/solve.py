@@ -26,6 +26,7 @@ from pyharness.model.same_motion import factor_near_one, is_ordinary, scaled, un
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, number, several
+from pyharness.model.waves import with_merged_waves
 
 _ROWS = ("time", "recorded_time", "omega")
 _WORST_FIRST = ("overflow", "sensitive", "complete")
@@ -105,6 +106,8 @@ def solve(
         scene = replace(scene, attitude=start)
     is_full = scene.inertia is not None
     scene, axes = principal(scene)
+    if method != "reference":  # which rounds no amplitude
+        scene = with_merged_waves(scene)
     effort = checked_effort(effort)
     values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]

@@ -5,13 +5,14 @@ import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import TYPE_CHECKING, SupportsIndex
 
 from pyharness.model.attitude import Quaternion, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.facts import facts
 from pyharness.model.functions import cosine, sine
-from pyharness.model.inertia import Matrix, checked_inertia, principal_axes
+from pyharness.model.inertia import Exact, Matrix, breaks_triangle, checked_inertia
 from pyharness.model.values import (
     Number,
     Numbers,
@@ -225,11 +226,26 @@ class Scene:
         return (second - third) / first, (third - first) / second, (first - second) / third
 
     @property
+    def exact_moments(self) -> Exact | None:
+        """The principal moments without rounding (kg m2); None where only coefficients are known.
+
+        InputError for a full inertia matrix.
+        """
+        if self.coefficients is not None:
+            return None
+        if self.moments is None:
+            raise InputError(FULL_INERTIA)
+        first, second, third = map(Fraction, self.moments)
+        return first, second, third
+
+    @property
     def is_impossible(self) -> bool:
         """Whether the moments break the triangle inequality, so that no body has them."""
-        if self.coefficients is not None:
+        if self.inertia is not None:
+            return breaks_triangle(self.inertia)
+        if self.moments is None:
             return False
-        low, middle, high = sorted(self.moments or principal_axes(self.inertia or ())[0])
+        low, middle, high = sorted(self.moments)
         return high > low + middle
 
     @property

@@ -1,0 +1,103 @@
+module torque_noise
+  !! Rounding of a torque whose terms nearly cancel. Each term, divided by a moment, is rounded by
+  !! itself, by some 2**-53 of its own size; where the sum of the terms is much smaller than each,
+  !! that is much of the sum, and no method can know the solution any better.
+  use kinds, only: dp
+  use problem, only: problem_t
+  implicit none(type, external)
+  private
+
+  integer, parameter :: SAMPLES = 8          ! of the angular velocity that the sum has given
+  real(dp), parameter :: LOOSE = 4.0_dp      ! terms that make so many times their sum don't cancel
+  real(dp), parameter :: QUIET = 2.0_dp      ! terms that give so little of omega don't matter
+  real(dp), parameter :: SMALL = 1e-4_dp     ! rad; an angle whose square hardly counts
+
+  public :: torque_noise_of
+
+contains
+
+  pure real(dp) function torque_noise_of(problem, t, steps, scale) result(noise)
+    !! What the terms of the torque give one by one until `t`, over the largest angular velocity:
+    !! times the rounding of a number it is an error, relative. 0 where the terms do not cancel.
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: t      !! s
+    real(dp), intent(in) :: steps  !! in each of which terms are rounded; huge: none
+    real(dp), intent(in) :: scale  !! largest |omega|, rad/s; below 0: its opposite is that of the
+    !! start, and the sum of the terms may give more
+    real(dp) :: alone(3)     ! angular velocity that the terms give one by one, rad/s
+    real(dp) :: walked(3)    ! the same of the roundings in all steps
+    real(dp) :: together(3)  ! and the largest that their sum gives
+    real(dp) :: push(3)      ! of a wave all the time, rad/s
+    real(dp) :: angle        ! of a wave at the end, rad
+    real(dp) :: most, part
+    integer :: n
+
+    noise = 0.0_dp
+    alone = abs(problem%constant*t) + 0.5_dp*abs(problem%rate*t)*abs(t)
+    walked = alone
+    do n = 1, problem%n_sines
+      push = abs(problem%sines(1:3, n)*t)
+      angle = abs(problem%sines(4, n)*t)
+      alone = alone + push*share_of_sine(angle)
+      walked = walked + push*min(1.0_dp, angle)
+    end do
+    do n = 1, problem%n_cosines
+      push = abs(problem%cosines(1:3, n)*t)
+      alone = alone + push/max(1.0_dp, abs(problem%cosines(4, n)*t))
+      walked = walked + push
+    end do
+    most = max(alone(1), alone(2), alone(3))
+    if (.not. (most > QUIET*abs(scale) .and. most <= huge(most))) return
+    together = 0.0_dp
+    do n = 1, SAMPLES
+      part = t*(real(n, dp)/real(SAMPLES, dp))
+      together = max(together, abs(sum_until(problem, part)))
+    end do
+    most = maxval(alone - LOOSE*together)
+    if (.not. most > 0.0_dp) return
+    if (scale < 0.0_dp) then
+      part = max(-scale, together(1), together(2), together(3))
+    else
+      part = scale
+    end if
+    noise = maxval(merge(alone + walked/sqrt(max(1.0_dp, steps)), [0.0_dp, 0.0_dp, 0.0_dp], &
+                         alone > LOOSE*together))
+    noise = min(huge(part)**0.25_dp, noise/max(part, tiny(part)))
+  end function torque_noise_of
+
+  pure real(dp) function share_of_sine(angle)
+    !! Largest integral of a sine until an angle, over the angle.
+    real(dp), intent(in) :: angle !! at least 0, rad
+
+    share_of_sine = min(0.5_dp*angle, 1.0_dp)
+    if (angle > 2.0_dp) share_of_sine = 2.0_dp/angle
+  end function share_of_sine
+
+  pure function sum_until(problem, t)
+    !! Angular velocity that the torque alone gives until `t`, rad/s.
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: t
+    real(dp) :: sum_until(3)
+    real(dp) :: half
+    integer :: n
+
+    sum_until = problem%constant*t + (0.5_dp*t)*(problem%rate*t)
+    do n = 1, problem%n_sines
+      half = 0.5_dp*problem%sines(4, n)*t
+      sum_until = sum_until + problem%sines(1:3, n)*(t*quotient(half)*sin(half))
+    end do
+    do n = 1, problem%n_cosines
+      half = 0.5_dp*problem%cosines(4, n)*t
+      sum_until = sum_until + problem%cosines(1:3, n)*(t*quotient(half)*cos(half))
+    end do
+  end function sum_until
+
+  pure real(dp) function quotient(angle)
+    !! Sine over angle.
+    real(dp), intent(in) :: angle
+
+    quotient = 1.0_dp
+    if (abs(angle) > SMALL) quotient = sin(angle)/angle
+  end function quotient
+
+end module torque_noise

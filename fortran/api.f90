@@ -171,13 +171,15 @@ subroutine torque_free_solution(coefficients, coefficients_low, omega0, n_times,
                         status)
 end subroutine torque_free_solution
 
-subroutine torque_free_attitude_solution(moments, omega0, attitude0, n_times, times, rows, &
-                                         attitudes, n_rows, status)
+subroutine torque_free_attitude_solution(moments, moments_low, omega0, attitude0, n_times, times, &
+                                         rows, attitudes, n_rows, status)
   ! Closed form of a body without torque, and of its attitude: a quaternion, body to space.
   !f2py threadsafe
   use torque_free_attitude, only: torque_free_attitude_rows
   implicit none
   real(8), intent(in) :: moments(3)       ! kg m2
+  !f2py real(8), optional, intent(in) :: moments_low(3) = 0.0
+  real(8), intent(in) :: moments_low(3)   ! what rounding took off them
   real(8), intent(in) :: omega0(3)        ! rad/s at time 0
   real(8), intent(in) :: attitude0(4)     ! at time 0, scalar first, of any length
   integer(4), intent(in) :: n_times
@@ -187,8 +189,8 @@ subroutine torque_free_attitude_solution(moments, omega0, attitude0, n_times, ti
   integer(4), intent(out) :: n_rows       ! rows that hold a result
   integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 gave up
 
-  call torque_free_attitude_rows(moments, omega0, attitude0, n_times, times, rows, attitudes, &
-                                 n_rows, status)
+  call torque_free_attitude_rows(moments, moments_low, omega0, attitude0, n_times, times, rows, &
+                                 attitudes, n_rows, status)
 end subroutine torque_free_attitude_solution
 
 subroutine torque_free_growth(coefficients, omega0, t_end, growth)

@@ -8,7 +8,7 @@ module many_bodies
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, QUICK_OR_TAYLOR, RK4, &
                      TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
-                    N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
+                    MOMENTS_LOW, N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use prepared, only: solve_prepared, solve_prepared_attitude
   use statuses, only: INTERRUPTED, REFUSED
   use two_words, only: two_product, two_sum
@@ -206,6 +206,7 @@ contains
     packed(EFFORT) = effort_
     packed(COEFFICIENTS_LOW:COEFFICIENTS_LOW + 2) = 0.0_dp
     packed(MOMENTS:MOMENTS + 2) = of
+    packed(MOMENTS_LOW:MOMENTS_LOW + 2) = 0.0_dp
     if (bodies%by_moments) then
       packed(COEFFICIENTS_LOW) = remainder_of(of(2), of(3), of(1))
       packed(COEFFICIENTS_LOW + 1) = remainder_of(of(3), of(1), of(2))

@@ -15,6 +15,7 @@ module gauss_collocation
   private
 
   integer, parameter :: MOST_ITERATIONS = 60
+  integer, parameter :: PATIENT = 20 ! iterations that converge, if they do
   real(dp), parameter :: MOST_EVALUATIONS = 4e8_dp ! some ten seconds
   real(dp), parameter :: COUNTABLE = 4e18_dp
   real(dp), parameter :: BETWEEN_LOOKS = 5e5_dp ! at the user; right-hand sides, some 8 a step
@@ -141,11 +142,13 @@ contains
     real(dp) :: states(MOST_STAGES, 3)
     real(dp) :: low(MOST_STAGES, 3)     ! what the low words of the matrix add
     real(dp) :: change, change_before, scale
+    real(dp) :: push                    ! largest torque over moment, 1/s2
     real(dp) :: increment, total, part, back, rest
     integer :: axis, iteration, k
 
     status = GAVE_UP
     scale = max(abs(y(1)), abs(y(2)), abs(y(3)))
+    push = maxval(abs(m(:stages, :)))
     zero = 0.0_dp
     low = 0.0_dp
     call stage_sums(ONWARD(:, :, stages), f, zero, stages, z)
@@ -175,6 +178,9 @@ contains
       end do
       if (.not. change > 0.0_dp) status = COMPLETE
       if (change >= change_before .and. change <= ROUNDING*scale) status = COMPLETE
+      ! A torque that gives far more than there is, and is taken back by itself, leaves its rounding.
+      if (iteration > PATIENT .and. change >= change_before &
+          .and. change <= ROUNDING*(scale + abs(h)*push)) status = COMPLETE
       if (status == COMPLETE) exit
       change_before = change
     end do

@@ -9,7 +9,7 @@ module prepared
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, IMPROVED_EULER, QUICK, &
                      QUICK_OR_TAYLOR, RK4, SPACE_TORQUE, SPHERE, TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
-                    N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
+                    MOMENTS_LOW, N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use problem, only: problem_t
   use space_torque, only: space_torque_solve
   use sphere, only: sphere_rows
@@ -248,8 +248,9 @@ contains
         state(4:) = attitudes(:, 1)
         found = estimates(:2)
       else if (code /= TAYLOR) then
-        call torque_free_attitude_rows(packed(MOMENTS:MOMENTS + 2), start(:3), start(4:), 1, &
-                                       times, state(:3), state(4:), n_rows, status)
+        call torque_free_attitude_rows(packed(MOMENTS:MOMENTS + 2), &
+                                       packed(MOMENTS_LOW:MOMENTS_LOW + 2), start(:3), &
+                                       start(4:), 1, times, state(:3), state(4:), n_rows, status)
       end if
       if (status == REFUSED .and. code /= CLOSED_FORM) then
         call unpack(packed, n_packed, problem)

@@ -201,9 +201,8 @@ contains
       result = omega
       noise = 0.0_dp
     end if
-    blurred = blurred*bound
     error = error + blurred
-    status = merge(COMPLETE, SENSITIVE, noise + blurred <= CERTAIN*tolerance)
+    status = merge(COMPLETE, SENSITIVE, noise + blurred*bound <= CERTAIN*tolerance)
     if (status == COMPLETE) error = error + noise
   end subroutine quick_solve
 

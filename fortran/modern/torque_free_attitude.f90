@@ -28,10 +28,11 @@ module torque_free_attitude
 
 contains
 
-  subroutine torque_free_attitude_rows(moments, omega0, attitude0, n_times, times, rows, &
-                                       attitudes, n_rows, status)
+  subroutine torque_free_attitude_rows(moments, moments_low, omega0, attitude0, n_times, times, &
+                                       rows, attitudes, n_rows, status)
     !! Angular velocity and attitude of a torque-free body at each of `times`.
     real(dp), intent(in) :: moments(3)       !! kg m2, or in any unit
+    real(dp), intent(in) :: moments_low(3)   !! what rounding took off them
     real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
     real(dp), intent(in) :: attitude0(4)     !! at time 0, of any length
     integer, intent(in) :: n_times
@@ -44,7 +45,7 @@ contains
     integer :: i
 
     n_rows = 0
-    call prepare(moments, omega0, attitude0, orbit, status)
+    call prepare(moments, moments_low, omega0, attitude0, orbit, status)
     if (status /= COMPLETE) return
     do i = 1, n_times
       call evaluate(orbit, times(i), rows(:, i), attitudes(:, i), status)
@@ -59,17 +60,18 @@ contains
     end do
   end subroutine torque_free_attitude_rows
 
-  pure subroutine prepare(moments, omega0, attitude0, orbit, status)
+  pure subroutine prepare(moments, moments_low, omega0, attitude0, orbit, status)
     !! Everything about a motion that does not depend on the time.
-    real(dp), intent(in) :: moments(3), omega0(3), attitude0(4)
+    real(dp), intent(in) :: moments(3), moments_low(3), omega0(3), attitude0(4)
     type(orbit_t), intent(out) :: orbit
     integer, intent(out) :: status           !! COMPLETE or REFUSED
     real(dp) :: moment(3)   ! along the axes of the orbit, brought near 1
     real(dp) :: w(3)        ! angular velocity along them
+    type(pair_t) :: exact(3) ! the moments in two words
     type(pair_t) :: d12, d13, d23  ! differences of the moments, without sign
     type(pair_t) :: energies(3)    ! I omega**2
     type(pair_t) :: e1, e2, e3     ! d13 omega1**2 I1 + d23 omega2**2 I2 and so on
-    integer :: power
+    integer :: i, power
 
     status = REFUSED
     moment = moments
@@ -88,19 +90,22 @@ contains
 
     call take_axes(moment, w, orbit)
     status = COMPLETE
-    d12 = unsigned(difference_of(moment(1), moment(2)))
-    d13 = unsigned(difference_of(moment(1), moment(3)))
-    d23 = unsigned(difference_of(moment(2), moment(3)))
-    energies = [product_of(w(1), w(1))*moment(1), product_of(w(2), w(2))*moment(2), &
-                product_of(w(3), w(3))*moment(3)]
+    do i = 1, 3
+      exact(i) = pair_t(moment(i), scale(moments_low(orbit%axes(i)), -power))
+    end do
+    d12 = unsigned(exact(1) - exact(2))
+    d13 = unsigned(exact(1) - exact(3))
+    d23 = unsigned(exact(2) - exact(3))
+    energies = [product_of(w(1), w(1))*exact(1), product_of(w(2), w(2))*exact(2), &
+                product_of(w(3), w(3))*exact(3)]
     e2 = energies(3)*d23 - energies(1)*d12
     if (abs(e2%high) <= CANCELLED*energies(3)%high*d23%high) then
-      e2 = narrow_gap(moment, w, energies, d12, d23)
+      e2 = narrow_gap(exact, w, energies, d12, d23)
     end if
     if (e2%high < 0.0_dp) then
       ! The other of the extreme axes keeps its direction.
       orbit%axes = orbit%axes([3, 2, 1])
-      moment = moment([3, 2, 1])
+      exact = exact([3, 2, 1])
       w = w([3, 2, 1])
       energies = energies([3, 2, 1])
       e1 = d12
@@ -118,23 +123,26 @@ contains
       ! About the middle axis, all but exactly.
       status = REFUSED
     else
-      call prepare_orbit(moment, w, energies, d12, d13, d23, e1, e2, e3, orbit)
+      call prepare_orbit(exact, w, energies, d12, d13, d23, e1, e2, e3, orbit)
     end if
   end subroutine prepare
 
-  pure type(pair_t) function narrow_gap(moment, w, energies, d12, d23) result(gap)
+  pure type(pair_t) function narrow_gap(exact, w, energies, d12, d23) result(gap)
     !! I3 omega3**2 d23 - I1 omega1**2 d12 beside the separatrix, where nearly all of it cancels:
     !! from products of three words.
-    real(dp), intent(in) :: moment(3), w(3)
+    type(pair_t), intent(in) :: exact(3)
+    real(dp), intent(in) :: w(3)
     type(pair_t), intent(in) :: energies(3), d12, d23
     real(dp) :: x(3), y(3)
 
-    x = longer_product(longer_product(longer_product([w(3), 0.0_dp, 0.0_dp], w(3)), moment(3)), &
-                       d23%high)
-    y = longer_product(longer_product(longer_product([w(1), 0.0_dp, 0.0_dp], w(1)), moment(1)), &
-                       d12%high)
+    x = longer_product(longer_product(longer_product([w(3), 0.0_dp, 0.0_dp], w(3)), &
+                                      exact(3)%high), d23%high)
+    y = longer_product(longer_product(longer_product([w(1), 0.0_dp, 0.0_dp], w(1)), &
+                                      exact(1)%high), d12%high)
     gap = difference_of(x(1), y(1)) + difference_of(x(2), y(2)) + difference_of(x(3), y(3)) &
           + (energies(3)*d23%low - energies(1)*d12%low)
+    gap = gap + (product_of(w(3), w(3))*(exact(3)%low*d23%high) &
+                 - product_of(w(1), w(1))*(exact(1)%low*d12%high))
   end function narrow_gap
 
   pure subroutine take_axes(moment, w, orbit)
@@ -181,11 +189,13 @@ contains
     orbit%direction = w/speed%high
   end subroutine prepare_steady
 
-  pure subroutine prepare_orbit(moment, w, energies, d12, d13, d23, e1, e2, e3, orbit)
+  pure subroutine prepare_orbit(exact, w, energies, d12, d13, d23, e1, e2, e3, orbit)
     !! Rates, phase and theta series of a motion that is not steady.
-    real(dp), intent(in) :: moment(3), w(3)
+    type(pair_t), intent(in) :: exact(3) !! moments
+    real(dp), intent(in) :: w(3)
     type(pair_t), intent(in) :: energies(3), d12, d13, d23, e1, e2, e3
     type(orbit_t), intent(inout) :: orbit
+    real(dp) :: moment(3)   ! in one word
     real(dp) :: largest(3)  ! of omega on the way
     real(dp) :: pole(2)     ! (I2 - I1) I3/((I3 - I2) I1) and I1 E1/(I3 E3), whose product is k**2
     real(dp) :: k, comodulus, slope
@@ -194,8 +204,9 @@ contains
     type(pair_t) :: inertia          ! root of the product of the moments
 
     orbit%is_steady = .false.
-    momentum = root(energies(1)*moment(1) + energies(2)*moment(2) + energies(3)*moment(3))
-    inertia = root(product_of(moment(1), moment(2))*moment(3))
+    moment = exact%high
+    momentum = root(energies(1)*exact(1) + energies(2)*exact(2) + energies(3)*exact(3))
+    inertia = root(exact(1)*exact(2)*exact(3))
     pole = [d12%high*moment(3)/(d23%high*moment(1)), e1%high*moment(1)/(e3%high*moment(3))]
     k = sqrt(pole(1)*pole(2))
     largest = sqrt([e1%high/(moment(1)*d13%high), e1%high/(moment(2)*d23%high), &
@@ -206,11 +217,11 @@ contains
     if (e2%high > 0.0_dp) then
       scales(2) = root(d13*e2)
       comodulus = scales(2)%high/scales(1)%high
-      call take_rates(moment, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
+      call take_rates(exact, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
     else
       comodulus = 0.0_dp
       orbit%frequency = scales(1)/inertia*0.5_dp
-      orbit%half_rate = momentum/pair_t(moment(2), 0.0_dp)*0.5_dp
+      orbit%half_rate = momentum/exact(2)*0.5_dp
     end if
     slope = orbit%frequency%high*inertia%high/scales(1)%high
     call theta_series(pole, k, comodulus, orbit%theta)
@@ -230,10 +241,11 @@ contains
     call take_before(orbit)
   end subroutine prepare_orbit
 
-  pure subroutine take_rates(moment, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
+  pure subroutine take_rates(exact, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
     !! The mean rates: of the phase by the arithmetic-geometric mean, of the turn about the angular
     !! momentum by the sum that goes with it, of an integral of the third kind (Gauss).
-    real(dp), intent(in) :: moment(3), pole(2)
+    type(pair_t), intent(in) :: exact(3) !! moments
+    real(dp), intent(in) :: pole(2)
     type(pair_t), intent(in) :: momentum, inertia, scales(2), d12, d13, d23, e1, e3
     type(orbit_t), intent(inout) :: orbit
     type(pair_t) :: a, g, p, total, share, part, mean
@@ -243,9 +255,9 @@ contains
 
     by_moments = pole(1) < pole(2)
     if (by_moments) then
-      p = root(d13*e3*moment(2)/pair_t(moment(1), 0.0_dp))
+      p = root(d13*e3*exact(2)/exact(1))
     else
-      p = momentum*root(d13*d23/pair_t(moment(3), 0.0_dp))
+      p = momentum*root(d13*d23/exact(3))
     end if
     a = scales(1)
     g = scales(2)
@@ -268,12 +280,12 @@ contains
     mean%low = mean%low - half*half/(4.0_dp*mean%high)
     orbit%frequency = mean/inertia
     if (by_moments) then
-      part = pair_t(moment(2), 0.0_dp)*2.0_dp - d12*total*orbit%sense
-      orbit%half_rate = momentum*part/(product_of(moment(1), moment(2))*4.0_dp) &
+      part = exact(2)*2.0_dp - d12*total*orbit%sense
+      orbit%half_rate = momentum*part/(exact(1)*exact(2)*4.0_dp) &
                         - orbit%frequency*(0.5_dp*orbit%sense)
     else
       part = momentum*momentum*2.0_dp + e1*total*orbit%sense
-      orbit%half_rate = part/(momentum*(4.0_dp*moment(3)))
+      orbit%half_rate = part/(momentum*(exact(3)*4.0_dp))
     end if
   end subroutine take_rates
 

@@ -22,8 +22,8 @@ contains
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: t      !! s
     real(dp), intent(in) :: steps  !! in each of which terms are rounded; huge: none
-    real(dp), intent(in) :: scale  !! largest |omega|, rad/s; below 0: its opposite is that of the
-    !! start, and the sum of the terms may give more
+    real(dp), intent(in) :: scale  !! largest |omega|, rad/s; not above 0: its opposite is that of
+    !! the start, and the sum of the terms may give more
     real(dp) :: alone(3)     ! angular velocity that the terms give one by one, rad/s
     real(dp) :: walked(3)    ! the same of the roundings in all steps
     real(dp) :: together(3)  ! and the largest that their sum gives
@@ -55,11 +55,8 @@ contains
     end do
     most = maxval(alone - LOOSE*together)
     if (.not. most > 0.0_dp) return
-    if (scale < 0.0_dp) then
-      part = max(-scale, together(1), together(2), together(3))
-    else
-      part = scale
-    end if
+    part = scale
+    if (.not. scale > 0.0_dp) part = max(-scale, together(1), together(2), together(3))
     noise = maxval(merge(alone + walked/sqrt(max(1.0_dp, steps)), [0.0_dp, 0.0_dp, 0.0_dp], &
                          alone > LOOSE*together))
     noise = min(huge(part)**0.25_dp, noise/max(part, tiny(part)))

@@ -26,7 +26,7 @@ def known_solution(
                 "allowed: moments, and no torque"
             )
         rows, attitudes, n_rows, status = extension().torque_free_attitude_solution(
-            scene.moments, scene.omega, scene.attitude, times
+            scene.moments, scene.omega, scene.attitude, times, moments_low=scene.moments_low
         )
     elif not any(scene.euler_coefficients):
         rows, n_rows, status = extension().sphere_solution(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.methods.problem import normalized, trajectory_of
-from pyharness.methods.sensitivity import is_sensitive, motion_growth
+from pyharness.methods.sensitivity import is_sensitive, motion_growth, torque_noise
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, SENSITIVE, extension
@@ -47,6 +47,8 @@ def gauss(stages: int) -> Integrator:
         more = 1.0  # times the steps of the next try that will be needed, as far as known
         pace = 2.0 * stages  # right-hand sides of a step
         before: _Solution | None = None
+        last = math.inf  # difference of the two solutions before (rad/s)
+        growth: float | None = None
         counts = previous = _counts(lengths, step)
         while True:
             # Each step takes two iterations at the least.
@@ -73,18 +75,30 @@ def gauss(stages: int) -> Integrator:
                 # Where an interval has as many steps as before, the difference tells nothing.
                 ratio = float((counts / previous).min(initial=2.0))
                 known = ratio ** min(2 * stages, _ORDER_THAT_SHOWS) - 1.0
-                allowed = max(tolerance * scale * known / 2.0, _ROUNDING * scale)
+                count = int(counts.sum())
+                noise = torque_noise(scene, scene.omega, times[-1], count, scale)
+                floor = _ROUNDING * scale * (1.0 + noise)
+                if growth is None and difference > 0.5 * last:
+                    # Shorter steps no longer help: it is rounding, or the steps are still too long.
+                    growth = motion_growth(scene, times[-1])
+                if growth is not None and is_sensitive(growth, tolerance, noise):
+                    floor *= growth
+                allowed = max(tolerance * scale * known / 2.0, floor)
                 close = known > 0.0 and difference <= allowed
+                last = difference
                 if known > 0.0 and allowed > 0.0:
                     excess = difference / (allowed * (known + 1.0))
                     more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
-                count = int(counts.sum())
                 if close and found.status == COMPLETE:
                     # Rounding parts a motion from what was asked for, whatever solves it.
                     growth = motion_growth(scene, times[-1])
-                    status = SENSITIVE if is_sensitive(growth, tolerance) else COMPLETE
+                    is_blurred = is_sensitive(growth, tolerance, noise)
+                    status = SENSITIVE if is_blurred else COMPLETE
                     error = 2.0 * difference / (known * scale) if difference else 0.0
-                    error += ROUNDING * (growth or 1.0)
+                    if difference > tolerance * scale * known / 2.0:
+                        # Of rounding alone, which does not fall with the step.
+                        error = difference / scale
+                    error += ROUNDING * (growth or 1.0) * (1.0 + noise)
                     return trajectory_of(times, found.rows, n, status, count, spent, error, growth)
                 if found.blows_up(before, start):
                     return trajectory_of(times, found.rows, n, found.status, count, spent)

@@ -29,6 +29,7 @@ from pyharness.model.extension import ENDS, extension
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array
 from pyharness.model.values import Number, finite
+from pyharness.model.waves import with_merged_rows
 
 _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 
@@ -189,6 +190,9 @@ class _Bodies:
                 raise InputError(
                     f"{name}: {count} rows; allowed: 1, or as many as there are bodies, {self.n}"
                 )
+        self.constant, self.sines, self.cosines = with_merged_rows(
+            self.constant, self.sines, self.cosines
+        )
         if len(self.omega0) != self.n:
             self.omega0 = np.ascontiguousarray(np.broadcast_to(self.omega0, (self.n, 3)))
         self.step = given["step"]

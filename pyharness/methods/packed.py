@@ -22,7 +22,8 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
     packed[Places.RATE : Places.EFFORT] = rate
     packed[Places.EFFORT] = effort
     packed[Places.COEFFICIENTS_LOW : Places.MOMENTS] = remainders(scene)
-    packed[Places.MOMENTS : Places.WAVES] = scene.moments or (1.0, 1.0, 1.0)
+    packed[Places.MOMENTS : Places.MOMENTS_LOW] = scene.moments or (1.0, 1.0, 1.0)
+    packed[Places.MOMENTS_LOW : Places.WAVES] = scene.moments_low
     return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])
 
 

@@ -43,7 +43,8 @@ class Places:
     EFFORT = 14  # factor on the limits
     COEFFICIENTS_LOW = 15  # three: what rounding took off, for the closed form
     MOMENTS = 18  # three: of the closed form with attitude, and where the torque is in space
-    WAVES = 21  # four for each sine, then for each cosine
+    MOMENTS_LOW = 21  # three: what rounding took off them
+    WAVES = 24  # four for each sine, then for each cosine
 
 
 class Waves:

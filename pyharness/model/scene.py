@@ -239,6 +239,11 @@ class Scene:
         return first, second, third
 
     @property
+    def moments_low(self) -> Triple:
+        """What rounding took off the moments (kg m2): nothing, since they are given as floats."""
+        return 0.0, 0.0, 0.0
+
+    @property
     def is_impossible(self) -> bool:
         """Whether the moments break the triangle inequality, so that no body has them."""
         if self.inertia is not None:

@@ -11,9 +11,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pyharness.model.errors import InputError
 from pyharness.model.inertia import Exact
 from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
 
 ExactWave = tuple[Exact, float]
@@ -71,7 +75,8 @@ def merged(law: TorqueLaw) -> TorqueLaw:
 def is_mergeable(law: TorqueLaw) -> bool:
     """Whether two waves of a law are of one frequency, or one is of frequency 0."""
     for waves in (law.sines, law.cosines):
-        counts = Counter(abs(frequency) for _, frequency in waves)
+        # A wave without amplitude is none.
+        counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
         if 0.0 in counts or any(count > 1 for count in counts.values()):
             return True
     return False
@@ -130,3 +135,68 @@ def with_merged_waves(scene: Scene) -> Scene:
     """Return a scene whose torque has one wave for each frequency."""
     law = merged(scene.torque)
     return scene if law is scene.torque else replace(scene, torque=law)
+
+
+def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
+    """Return the constants and waves of many torque laws, with one wave for each frequency of each.
+
+    The shapes are (m, 3), (m, k, 4) and (m, l, 4), each m the number of laws, or 1 where one is
+    shared by all. Each law becomes what `merged` makes of it alone; a wave that is no longer there
+    has the amplitude and the frequency 0. A law that is not finite is left as it is.
+    """
+    concerned = _mergeable_rows(sines, cosines)
+    if not concerned.any():
+        return constant, sines, cosines
+    rows = max(map(len, (constant, sines, cosines)))
+    if not sines.size:
+        sines = np.empty((1, 0, 4))
+    if not cosines.size:
+        cosines = np.empty((1, 0, 4))
+    constant, sines, cosines = (
+        np.array(np.broadcast_to(each, (rows, *each.shape[1:])))
+        for each in (constant, sines, cosines)
+    )
+    for n in np.flatnonzero(np.broadcast_to(concerned, (rows,))):
+        if not all(np.isfinite(each[n]).all() for each in (constant, sines, cosines)):
+            continue
+        law = _law_of(constant[n], sines[n], cosines[n])
+        try:
+            law = merged(law)
+        except InputError:
+            # Its sum is no number, and its status will say so.
+            constant[n] = np.inf
+            continue
+        constant[n] = law.constant
+        for array, waves in ((sines, law.sines), (cosines, law.cosines)):
+            array[n] = 0.0
+            for place, (amplitude, frequency) in enumerate(waves):
+                array[n, place] = *amplitude, frequency
+    return constant, _without_empty(sines), _without_empty(cosines)
+
+
+def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
+    """Return where a law has two waves of one frequency, or one of frequency 0; shape (m,)."""
+    found = np.zeros(1, bool)
+    for waves in (sines, cosines):
+        if waves.size:
+            acts = waves[..., :3].any(axis=-1)
+            frequencies = np.abs(waves[..., 3])
+            # What fills up a shorter law has no amplitude, and is no wave.
+            found = found | (acts & (frequencies == 0.0)).any(axis=-1)
+            sizes = np.sort(np.where(acts, frequencies, np.nan), axis=-1)
+            found = found | (sizes[:, 1:] == sizes[:, :-1]).any(axis=-1)
+    return found
+
+
+def _law_of(constant: Array, sines: Array, cosines: Array) -> TorqueLaw:
+    first, second, third = constant.tolist()
+    return TorqueLaw((first, second, third), sines=_waves_of(sines), cosines=_waves_of(cosines))
+
+
+def _waves_of(rows: Array) -> list[Wave]:
+    return [((a, b, c), frequency) for a, b, c, frequency in rows.tolist()]
+
+
+def _without_empty(waves: Array) -> Array:
+    """Return an array of waves without the columns in which no law has one."""
+    return np.ascontiguousarray(waves[:, waves[..., :3].any(axis=(0, 2))])

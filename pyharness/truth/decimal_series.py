@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from decimal import Decimal
+from fractions import Fraction
 from operator import mul
 
 from pyharness.model.effort import advice, checked_effort, waves
@@ -145,6 +146,11 @@ def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
     return totals
 
 
+def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
+    """Return what torques are divided by, without rounding: the moments, or 1 for coefficients."""
+    return scene.exact_moments or (Fraction(1), Fraction(1), Fraction(1))
+
+
 class _Equations:
     """Equations 13-15 as recurrences of Taylor coefficients.
 
@@ -154,7 +160,7 @@ class _Equations:
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
         self._abc = coefficients
         self._torque = scene.body_torque
-        self._moments = [Decimal(i) for i in scene.moments or (1, 1, 1)]
+        self._moments = [Decimal(x.numerator) / x.denominator for x in divisors(scene)]
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [
             Decimal(f) / Decimal(m) for f, m in zip(scene.forces, scene.masses, strict=True)

@@ -50,7 +50,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
 def period_of(scene: Scene) -> Decimal | None:
     """Return the period of omega (s), to the digits of the arithmetic; None on the separatrix."""
-    i, w = [Fraction(x) for x in scene.moments or ()], [Fraction(x) for x in scene.omega]
+    i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
     lower, upper, both = i[middle] - i[low], i[high] - i[middle], i[high] - i[low]
@@ -70,7 +70,7 @@ def period_of(scene: Scene) -> Decimal | None:
 
 def is_steady(scene: Scene) -> bool:
     """Whether omega of a scene without torque does not change."""
-    i, w = [Fraction(x) for x in scene.moments or ()], [Fraction(x) for x in scene.omega]
+    i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
 
 

@@ -157,7 +157,7 @@ class _Wave:
 
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
     """Return what torques are divided by (kg m2, or 1 where it is done), and A, B, C, unrounded."""
-    moments = [Fraction(x) for x in scene.moments or (1, 1, 1)]
+    moments = list(scene.exact_moments or (Fraction(1),) * 3)
     if scene.coefficients is not None:
         return moments, [Fraction(x) for x in scene.coefficients]
     return moments, [(moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)]

@@ -18,7 +18,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.decimal_functions import sine_cosine
-from pyharness.truth.decimal_series import Row, taylor_series
+from pyharness.truth.decimal_series import Row, divisors, taylor_series
 
 DIGITS = 40
 # Order and tolerance (relative to the solution, per step) of the two series that are compared.
@@ -159,7 +159,8 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
     torque = scene.body_torque
     row = []
     for axis in range(3):
-        moment = Decimal(1) if scene.moments is None else Decimal(scene.moments[axis])
+        divisor = divisors(scene)[axis]
+        moment = Decimal(divisor.numerator) / divisor.denominator
         total = Decimal(torque.constant[axis]) * t + Decimal(torque.rate[axis]) * t * t / 2
         for amplitude, frequency in torque.sines:
             if frequency:
@@ -178,9 +179,9 @@ def exact_coefficients(scene: Scene) -> Row:
     """Return A, B, C, exact to the digits of the arithmetic."""
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]
-    assert scene.moments is not None
-    i1, i2, i3 = (Decimal(x) for x in scene.moments)
-    return [(i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3]
+    i1, i2, i3 = divisors(scene)
+    exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
+    return [Decimal(x.numerator) / x.denominator for x in exact]
 
 
 def _is_number(x: Decimal) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 
 from pyharness.methods.linearised import growth, propagators
 from pyharness.methods.problem import rows_trajectory
+from pyharness.methods.sensitivity import is_sensitive, torque_noise
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
@@ -134,6 +135,11 @@ def scipy_method(name: str) -> Integrator:
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
         ended = "complete" if count == len(times) else "overflow"
+        # Each right-hand side rounds the terms of the torque, at random.
+        calls = run.evaluations
+        noise = torque_noise(scene, scene.omega, times[-1], calls, ahead.largest)
+        if ended == "complete" and noise and is_sensitive(ahead.growth, tolerance, noise):
+            ended = "sensitive"
         # The result does not carry the steps taken; right-hand sides are what is counted, those of
         # the coarse run too.
         return _rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)

@@ -71,7 +71,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
     least = min(principal_frame(matrix).exact_moments)
     if not least > 0:
         raise InputError(
-            f"{where}: its least principal moment is {_float(least):g}; allowed: a positive "
+            f"{where}: its least principal moment is {nearest_float(least):g}; allowed: a positive "
             "definite matrix"
         )
     return matrix
@@ -96,7 +96,7 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
         axes[least] = _turned(axes[least])
     first, second, third = (found.values[k] for k in order)
     exact = first, second, third
-    rounded = _float(first), _float(second), _float(third)
+    rounded = nearest_float(first), nearest_float(second), nearest_float(third)
     low = _rest(first, rounded[0]), _rest(second, rounded[1]), _rest(third, rounded[2])
     columns = np.array([[float(x) for x in axis] for axis in axes]).T
     columns.flags.writeable = False
@@ -130,11 +130,12 @@ def _determinant(axes: list[Exact]) -> Fraction:
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 
 
-def _float(value: Fraction) -> float:
+def nearest_float(value: Fraction) -> float:
+    """Return the nearest float, infinity for what is beyond the range of floats."""
     try:
         return float(value)
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.inf if value > 0 else -math.inf
 
 
 def _rest(value: Fraction, rounded: float) -> float:

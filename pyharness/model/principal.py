@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from pyharness.model.attitude import IDENTITY, product
-from pyharness.model.inertia import Exact, PrincipalFrame, principal_frame
+from pyharness.model.inertia import Exact, PrincipalFrame, nearest_float, principal_frame
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.waves import exact_law
@@ -34,7 +34,9 @@ class PrincipalScene(Scene):
     def euler_coefficients(self) -> Triple:  # type: ignore[override]
         """A, B, C of equations 13-15, without unit, rounded once."""
         i1, i2, i3 = self.exact_moments
-        return _float((i2 - i3) / i1), _float((i3 - i1) / i2), _float((i1 - i2) / i3)
+        exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
+        a, b, c = map(nearest_float, exact)
+        return a, b, c
 
 
 def principal(scene: Scene) -> tuple[Scene, Array]:
@@ -92,10 +94,3 @@ def _quaternion(axes: Array) -> tuple[float, float, float, float]:
 
     x, y, z, w = Rotation.from_matrix(axes).as_quat().tolist()
     return w, x, y, z
-
-
-def _float(value: Fraction) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        return float("inf") if value > 0 else -float("inf")

@@ -1,0 +1,200 @@
+"""Torques whose terms nearly cancel: solved where that is possible, and sensitive where it is not.
+
+Each term, divided by a moment, is rounded by itself. Waves of one frequency are added before; what
+is left of other terms is in the error estimate, at every entry point.
+"""
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, TorqueLaw, prepare, solve, solve_many
+from pyharness.methods.sensitivity import torque_noise
+from pyharness.model.scene import Triple, Wave
+from pyharness.truth.reference import reference
+
+_ROUNDING = 2.0**-53
+
+
+def _triple(source: random.Random, size: float) -> Triple:
+    return source.gauss(0.0, size), source.gauss(0.0, size), source.gauss(0.0, size)
+
+
+def _times(values: Triple, factor: float) -> Triple:
+    return values[0] * factor, values[1] * factor, values[2] * factor
+
+
+def _scene(kind: str, number: int) -> Scene:
+    """Return a body from rest or nearly, whose torques leave 1e-2 to 1e-11 of themselves."""
+    source = random.Random(f"cancelling/{kind}/{number}")
+    frequency, left = source.uniform(0.5, 4.0), 10.0 ** -source.uniform(2.0, 11.0)
+    amplitude = _triple(source, source.uniform(0.3, 1.0) / left)
+    sines: list[Wave] = [(amplitude, frequency)]
+    cosines: list[Wave] = []
+    constant: Triple = (0.0, 0.0, 0.0)
+    if kind == "one frequency":
+        sines += [(_times(amplitude, left - 1.0), frequency)]
+    elif kind == "opposite frequencies":
+        sines += [(_times(amplitude, 1.0 - left), -frequency)]
+    elif kind == "three cosines":
+        sines, cosines = [], [(amplitude, frequency), (_times(amplitude, -0.3), -frequency)]
+        cosines += [(_times(amplitude, left - 0.7), frequency)]
+    elif kind == "no frequency":
+        sines, cosines = [], [(amplitude, 0.0)]
+        constant = _times(amplitude, left - 1.0)
+    elif kind == "near frequencies":
+        sines += [(_times(amplitude, -1.0), frequency * (1.0 + left))]
+    elif kind == "constant and cosine":
+        sines, cosines = [], [(amplitude, math.sqrt(left))]
+        constant = _times(amplitude, -1.0)
+    omega = _triple(source, source.choice((0.0, 0.5)))
+    moments = (source.uniform(1.0, 1.5), source.uniform(1.5, 2.0), source.uniform(2.0, 2.5))
+    law = TorqueLaw(constant, sines=sines, cosines=cosines)
+    return Scene(kind, omega, moments=moments, torque=law)
+
+
+_MERGED = ("one frequency", "opposite frequencies", "three cosines", "no frequency")
+_LEFT = ("near frequencies", "constant and cosine")
+_TIME = 1.5
+
+
+def _truth(scene: Scene) -> tuple[np.ndarray, float]:
+    times = [_TIME * k / 8.0 for k in range(1, 9)]
+    found = reference(scene, times)
+    largest = max(float(np.abs(found.omega).max()), *map(abs, scene.omega))
+    return found.omega[-1], largest
+
+
+@pytest.mark.parametrize("kind", [*_MERGED, *_LEFT])
+@pytest.mark.parametrize("number", range(5))
+def test_every_entry_point_is_right_or_says_that_it_is_not(kind: str, number: int) -> None:
+    scene = _scene(kind, number)
+    truth, largest = _truth(scene)
+    law = scene.torque
+
+    def rows(waves: tuple[Wave, ...]) -> np.ndarray:
+        return np.array([[[*amplitude, frequency] for amplitude, frequency in waves]] * 3)
+
+    starts = np.array([scene.omega] * 3)
+    arrays = {
+        name: rows(waves)
+        for name, waves in (("sines", law.sines), ("cosines", law.cosines))
+        if waves
+    }
+    bare = replace(scene, torque=TorqueLaw())
+    for tolerance in (1e-12, 1e-6):
+        answers: list[tuple[str, str, np.ndarray, float | None]] = []
+        for method in ("auto", "gauss-4"):
+            found = solve(scene, [_TIME], method, tolerance)
+            answers.append((method, found.ended, found.omega[-1], found.error))
+        for method in ("auto", "taylor"):
+            solver = prepare(scene, method, tolerance)
+            omega = solver(scene.omega, _TIME)
+            answers.append((f"prepared {method}", solver.status, omega, solver.error))
+        many = solve_many([scene] * 3, _TIME, tolerance=tolerance)
+        answers.append(("many", str(many.ended[1]), many.omega[1], None))
+        many = solve_many(
+            bare, _TIME, omega0=starts, torque_constant=np.array([law.constant] * 3),
+            tolerance=tolerance, **arrays,
+        )  # fmt: skip
+        answers.append(("arrays", str(many.ended[1]), many.omega[1], None))
+        for name, ended, omega, estimate in answers:
+            error = float(np.abs(omega - truth).max()) / largest
+            where = f"{name} to {tolerance:g}: error {error:g}, estimate {estimate}"
+            assert ended in ("complete", "sensitive"), where
+            if kind in _MERGED:
+                assert ended == "complete", where
+            if ended == "complete":
+                assert error <= 2.0 * tolerance + 4e-14, where
+            else:
+                assert tolerance < 1e-6 or error > 1e-10, where
+            assert estimate is None or error <= 10.0 * estimate, where
+
+
+def test_a_sphere_knows_what_rounding_leaves() -> None:
+    for number in range(8):
+        scene = replace(_scene("near frequencies", number), moments=(1.5, 1.5, 1.5))
+        truth, largest = _truth(scene)
+        found = solve(scene, [_TIME], "closed-form", 1e-13)
+        error = float(np.abs(found.omega[0] - truth).max()) / largest
+        assert found.error is not None
+        assert error <= 10.0 * found.error
+        assert (found.ended == "sensitive") == (found.error > 1e-13)
+        solver = prepare(scene, "closed-form", 1e-13)
+        solver(scene.omega, _TIME)
+        assert (solver.status, solver.error) == (found.ended, found.error)
+
+
+def test_quick_says_what_rounding_leaves() -> None:
+    seen = set()
+    for number in range(12):
+        scene = replace(_scene("near frequencies", number), omega=(0.3, -0.2, 0.5))
+        truth, largest = _truth(scene)
+        solver = prepare(scene, "quick", 1e-11)
+        omega = solver(scene.omega, _TIME)
+        seen.add(solver.status)
+        if np.isfinite(omega).all():
+            error = float(np.abs(omega - truth).max()) / largest
+            assert solver.error is not None
+            assert error <= 10.0 * solver.error
+            assert solver.status == "sensitive" or error <= 1e-11
+    assert "sensitive" in seen
+
+
+def test_gauss_sees_soon_that_no_step_will_do() -> None:
+    scene = _scene("constant and cosine", 3)
+    found = solve(scene, [_TIME], "gauss-4", 1e-12)
+    assert found.ended == "sensitive"
+    assert found.evaluations < 20_000
+
+
+def test_ordinary_torques_have_no_noise() -> None:
+    source = random.Random("ordinary")
+    for _ in range(50):
+        waves = [(_triple(source, 1.0), source.uniform(0.1, 5.0)) for _ in range(2)]
+        law = TorqueLaw(_triple(source, 1.0), sines=waves[:1], cosines=waves[1:])
+        scene = Scene("", _triple(source, 1.0), moments=(1.0, 2.0, 2.5), torque=law)
+        assert torque_noise(scene, scene.omega, source.uniform(0.1, 50.0)) == 0.0
+    assert torque_noise(replace(scene, torque=TorqueLaw((1.0, 2.0, 3.0))), (1.0, 1.0, 1.0), 9.0) == 0
+
+
+def test_noise_is_what_the_terms_give_over_what_they_give_together() -> None:
+    amplitude = (1.0, 0.0, 0.0)
+    law = TorqueLaw(sines=[(amplitude, 1.0), ((-1.0, 0.0, 0.0), 1.0 + 1e-8)])
+    scene = Scene("", (0.0, 1e-6, 0.0), moments=(1.0, 2.0, 2.5), torque=law)
+    # Each gives half of t**2, over the largest omega.
+    assert torque_noise(scene, scene.omega, 0.1) == pytest.approx(0.01 / 1e-6, rel=0.1)
+    # Steps round it too, at random; and a scale that is given is the one that counts.
+    walk = torque_noise(scene, scene.omega, 0.1, 100.0) / torque_noise(scene, scene.omega, 0.1)
+    assert walk == pytest.approx(1.0 + 2.0 * 0.1, rel=0.05)
+    assert torque_noise(scene, scene.omega, 0.1, scale=1e-4) == pytest.approx(100.0, rel=0.1)
+    assert torque_noise(scene, scene.omega, 0.1, scale=1.0) == 0.0
+    assert torque_noise(scene, scene.omega, 0.0) == 0.0
+
+
+def test_a_torque_in_space_that_cancels_is_told_of() -> None:
+    amplitude = (1e9, -2e9, 1e9)
+    waves = [(amplitude, 1.0), (_times(amplitude, -1.0), 1.0 + 1e-9)]
+    law = TorqueLaw(sines=waves, frame="space")
+    scene = Scene("", (0.3, 0.2, 0.1), moments=(1.0, 1.5, 2.0), torque=law)
+    found = solve(scene, [1.0], "auto", 1e-12, attitude=True)
+    assert found.ended == "sensitive"
+    assert found.error is not None
+    assert 1e-9 < found.error < 1e-5
+    alone = replace(scene, torque=replace(law, sines=[(amplitude, 1.0), (amplitude, -1.0)]))
+    assert solve(alone, [1.0], "auto", 1e-12, attitude=True).ended == "complete"
+
+
+def test_scipy_says_so_too() -> None:
+    seen = set()
+    for number in range(6):
+        scene = _scene("near frequencies", number)
+        ours = solve(scene, [_TIME], "taylor", 1e-11)
+        found = solve(scene, [_TIME], "dop853", 1e-11)
+        seen.add(found.ended)
+        assert found.ended == ours.ended
+        assert found.error is None
+    assert seen == {"complete", "sensitive"}

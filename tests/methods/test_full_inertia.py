@@ -1,0 +1,138 @@
+"""Bodies about tilted axes, thin ones and nearly round ones too, against solutions that are exact.
+
+The axes are rational, of rotations by 3/5 and 4/5, and the moments multiples of 625: so every entry
+of the matrix is a float, and every component of omega about the principal axes is one.
+"""
+
+import itertools
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, TorqueLaw, principal, solve
+from pyharness.model.inertia import Matrix
+from pyharness.model.scene import Triple
+from pyharness.truth.reference import reference
+
+# Times 25; the columns are the principal axes.
+_AXES = ((15, -16, 12), (20, 12, -9), (0, 15, 20))
+# Moments, over 625.
+_BODIES: dict[str, tuple[float, float, float]] = {
+    "plain": (1.0, 2.0, 2.5),
+    "thin": (2.0**-30, 1.0, 1.0 + 2.0**-31),
+    "thin, about another axis": (1.0 + 2.0**-31, 1.0, 2.0**-30),
+    "nearly round": (1.0, 1.0 + 2.0**-30, 1.0 - 2.0**-31),
+}
+_TIMES = {"plain": 20.0, "nearly round": 1e6}
+_SPIN: Triple = (25.0 / 32.0, -50.0 / 32.0, 75.0 / 64.0)  # about the principal axes
+
+
+def _turned(vector: Triple) -> Triple:
+    """Return a vector of the principal axes about those of the body."""
+    exact = [
+        sum(Fraction(a, 25) * Fraction(x) for a, x in zip(row, vector, strict=True))
+        for row in _AXES
+    ]
+    first, second, third = map(float, exact)
+    assert [first, second, third] == exact
+    return first, second, third
+
+
+def _matrix(moments: Triple) -> Matrix:
+    columns = list(zip(*_AXES, strict=True))
+    exact = np.zeros((3, 3), dtype=object)
+    for moment, axis in zip(moments, columns, strict=True):
+        for i, j in itertools.product(range(3), repeat=2):
+            exact[i, j] += Fraction(moment) * axis[i] * axis[j]
+    found = [[float(x) for x in row] for row in exact]
+    assert found == exact.tolist()
+    (a, b, c), (d, e, f), (g, h, k) = found
+    return (a, b, c), (d, e, f), (g, h, k)
+
+
+def _scenes(body: str, torque: Triple = (0.0, 0.0, 0.0)) -> tuple[Scene, Scene]:
+    """Return a scene about tilted axes, and the same about its principal ones."""
+    moments = _BODIES[body]
+    law = TorqueLaw(torque)
+    bare = Scene(body, _SPIN, moments=[625.0 * each for each in moments], torque=law)
+    tilted = Scene(
+        body, _turned(_SPIN), inertia=_matrix(moments), torque=TorqueLaw(_turned(torque))
+    )
+    return tilted, bare
+
+
+def _check_error(tilted: Scene, bare: Scene, time: float, method: str, tolerance: float) -> None:
+    found = solve(tilted, [time], method, tolerance)
+    truth = reference(bare, [time], precise=True)
+    assert truth.remainder is not None
+    axes = np.array(_AXES) / 25.0
+    expected = axes @ truth.omega[0] + axes @ truth.remainder[0]
+    largest = float(np.abs(truth.omega).max())
+    error = float(np.abs(found.omega[0] - expected).max()) / largest
+    assert found.ended == "complete"
+    assert error <= tolerance + 4e-15 * (found.growth or 1.0)
+    assert found.error is not None
+    assert error <= 10.0 * found.error
+
+
+@pytest.mark.parametrize("body", list(_BODIES))
+@pytest.mark.parametrize("method", ["auto", "taylor", "gauss-6"])
+def test_each_body_is_solved_to_the_tolerance(body: str, method: str) -> None:
+    tilted, bare = _scenes(body)
+    time = _TIMES.get(body, 5.0)
+    if time > 100.0 and method != "auto":
+        time = 50.0
+    _check_error(tilted, bare, time, method, 1e-12)
+
+
+def test_a_faint_torque_about_the_thin_axis_is_what_it_is() -> None:
+    """Along that axis the components of a torque nearly cancel, and its moment is 1e-9."""
+    tilted, bare = _scenes("thin", (25.0 * 2.0**-28, 25.0, -25.0 * 2.0**-3))
+    _check_error(tilted, bare, 3.0, "auto", 1e-12)
+
+
+def test_attitude_of_a_nearly_round_body() -> None:
+    tilted, bare = _scenes("nearly round")
+    about_principal, axes = principal(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)))
+    found = solve(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)), [300.0], attitude=True)
+    # `principal` orders the axes as it likes: the truth follows it, but for the moments.
+    exact = reference(replace(about_principal), [300.0])
+    assert found.attitude is not None
+    assert exact.attitude is not None
+    back = found.rotation().as_matrix()[0] @ axes
+    from scipy.spatial.transform import Rotation
+
+    other = Rotation.from_quat(exact.attitude[:, [1, 2, 3, 0]]).as_matrix()[0]
+    assert back == pytest.approx(other, abs=1e-12)
+    assert sorted(about_principal.moments or ()) == sorted(bare.moments or ())
+
+
+def test_the_moments_come_out_as_they_went_in() -> None:
+    for body, moments in _BODIES.items():
+        tilted, _ = _scenes(body)
+        bare, axes = principal(tilted)
+        assert sorted(bare.moments or ()) == sorted(625.0 * each for each in moments)
+        assert bare.moments_low == pytest.approx((0.0, 0.0, 0.0), abs=1e-36)
+        products = np.abs(axes.T @ (np.array(_AXES) / 25.0))
+        assert np.sort(products, axis=1) == pytest.approx(
+            np.array([[0.0, 0.0, 1.0]] * 3), abs=1e-15
+        )
+
+
+def test_what_rounding_takes_off_a_moment_is_kept() -> None:
+    third = 1.0 / 3.0
+    matrix = ((1.0, third, 0.0), (third, 1.0 + third, 0.1), (0.0, 0.1, 2.0))
+    bare, _ = principal(Scene("", (1.0, 2.0, 3.0), inertia=matrix))
+    exact = bare.exact_moments
+    assert exact is not None
+    assert any(bare.moments_low)
+    i1, i2, i3 = exact
+    assert bare.euler_coefficients == (
+        float((i2 - i3) / i1),
+        float((i3 - i1) / i2),
+        float((i1 - i2) / i3),
+    )
+    # Another start, say, is of the same body.
+    assert replace(bare, omega=(3.0, 2.0, 1.0)).exact_moments == exact

@@ -19,7 +19,7 @@ from pyharness.methods.sensitivity import is_sensitive, torque_noise
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
@@ -113,6 +113,11 @@ def scipy_method(name: str) -> Integrator:
             if len(times) > 1:
                 total *= _ROWS
             step = max(_FINEST_STEP, tolerance / total)
+            noise = torque_noise(scene, scene.omega, times[-1], scale=ahead.largest)
+            is_blurred = noise > 0.0 and is_sensitive(ahead.growth, tolerance, noise)
+            if is_blurred:
+                # No step errs less than the rounding of the torque, and the search for one is long.
+                step = max(step, ROUNDING * noise)
             allowed = step * ahead.largest
             # No step is longer than that of a wave which over the whole time would count.
             waves_that_count = (f for push, f in _pushes(scene) if push * abs(times[-1]) > allowed)
@@ -135,10 +140,7 @@ def scipy_method(name: str) -> Integrator:
         finite = np.isfinite(rows).all(axis=1)
         count = len(rows) if finite.all() else int(np.argmin(finite))
         ended = "complete" if count == len(times) else "overflow"
-        # Each right-hand side rounds the terms of the torque, at random.
-        calls = run.evaluations
-        noise = torque_noise(scene, scene.omega, times[-1], calls, ahead.largest)
-        if ended == "complete" and noise and is_sensitive(ahead.growth, tolerance, noise):
+        if ended == "complete" and is_blurred:
             ended = "sensitive"
         # The result does not carry the steps taken; right-hand sides are what is counted, those of
         # the coarse run too.

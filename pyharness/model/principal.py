@@ -31,7 +31,7 @@ class PrincipalScene(Scene):
         return first, second, third
 
     @cached_property
-    def euler_coefficients(self) -> Triple:  # type: ignore[override]
+    def euler_coefficients(self) -> Triple:
         """A, B, C of equations 13-15, without unit, rounded once."""
         i1, i2, i3 = self.exact_moments
         exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3

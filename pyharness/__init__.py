@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from pyharness.methods.prepared import Solver, prepare
     from pyharness.methods.solve import solve
     from pyharness.model.errors import InputError, NotBuiltError
+    from pyharness.model.impossible import ImpossibleBodyWarning
     from pyharness.model.listing import Listing, subset
     from pyharness.model.principal import principal
     from pyharness.model.scene import Scene, TorqueLaw
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "Ensemble",
+    "ImpossibleBodyWarning",
     "InputError",
     "Listing",
     "NotBuiltError",
@@ -50,6 +52,7 @@ __all__ = [
 _ROOMS = {
     "compare.comparison": ("Comparison", "compare_programs"),
     "model.errors": ("InputError", "NotBuiltError"),
+    "model.impossible": ("ImpossibleBodyWarning",),
     "model.listing": ("Listing", "subset"),
     "model.principal": ("principal",),
     "model.scene": ("Scene", "TorqueLaw"),

@@ -1,5 +1,6 @@
 """The package for others: types that accept what runs, what it shows, how it is cited."""
 
+import inspect
 import re
 import shutil
 import subprocess
@@ -118,6 +119,28 @@ def test_lower_bounds_are_what_the_landing_script_installs() -> None:
     assert done.stdout.split() == [each.replace(">=", "==") for each in bounds]
     assert all(re.fullmatch(r"[\w-]+==[\d.]+", each) for each in done.stdout.split())
     assert not re.search(r"(numpy|scipy|mpmath|matplotlib)[=><]", script)
+
+
+def test_signatures_can_be_read() -> None:
+    for name in ("solve", "solve_many", "prepare", "run_program", "run_many", "compare_programs"):
+        parameters = inspect.signature(getattr(pyharness, name)).parameters.values()
+        assert max(len(str(each)) for each in parameters) <= 130, name
+        assert "numpy._typing" not in str(parameters)
+
+
+def test_the_licences_of_others_are_declared() -> None:
+    declared = [file for glob in PROJECT["license-files"] for file in ROOT.glob(glob)]
+    assert ROOT / "LICENSE" in declared
+    assert ROOT / "THIRD-PARTY.md" in declared
+    notice = (ROOT / "THIRD-PARTY.md").read_text()
+    vendored = tomllib.loads((ROOT / "web/vendor/vendor.toml").read_text())["package"]
+    for each in vendored:
+        assert ROOT / "web/vendor" / each["name"] / "LICENSE" in declared
+        row = re.search(rf"^.*\b{each['name']} {each['version']} .*$", notice, re.MULTILINE | re.I)
+        assert row is not None, each["name"]
+        assert f"| {each['licence']}," in row[0]
+    for library in ("libgcc", "libgfortran"):
+        assert re.search(rf"^\| .*{library}.* WITH GCC-exception-3\.1", notice, re.MULTILINE)
 
 
 def test_nothing_tells_users_to_install_the_package_of_others() -> None:

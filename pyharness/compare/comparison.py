@@ -23,6 +23,7 @@ from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
 from pyharness.original.compiled_in_word import compiled_words
 from pyharness.original.programs import (
@@ -50,6 +51,8 @@ class ProgramFinding:
     order: Order | None
     seconds_per_step: float
 
+    __repr__ = short_repr
+
     @property
     def who(self) -> str:
         """The program and its listing."""
@@ -67,6 +70,8 @@ class MethodFinding:
     seconds: float
     failure: str = ""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -79,6 +84,8 @@ class Comparison:
     methods: tuple[MethodFinding, ...]
     growth: float | None  # of a small difference on the way, where it is known
     word: str = BINARY64  # of the programs
+
+    __repr__ = short_repr
 
     @property
     def digits(self) -> float | None:

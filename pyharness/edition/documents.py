@@ -6,19 +6,38 @@ from functools import partial
 from pathlib import Path
 
 from pyharness.edition.markdown import Document, document
+from pyharness.model.errors import InputError
 from pyharness.model.facts import shipped
 
 # What the documents show.
 _PICTURES = (".png", ".svg")
+# Pages that the menu names.
+_OF_THE_MENU = ("findings.md", "methods.md")
 
 
-def documents() -> Iterator[tuple[str, Document]]:
+def documents_folder(given: str | None = None) -> Path:
+    """Return the folder of the documents: the one that is given, or that of the checkout.
+
+    InputError where it has none: an installed package does not bring them along.
+    """
+    folder = shipped("docs") if given is None else Path(given)
+    missing = [name for name in _OF_THE_MENU if not (folder / name).is_file()]
+    if not missing:
+        return folder
+    if given is None:
+        raise InputError(
+            "edition: an installed package has no documents; give --docs DIR, the folder 'docs' of "
+            "the source, or run it in a checkout"
+        )
+    raise InputError(f"--docs '{given}': has no {missing[0]}; give the folder 'docs' of the source")
+
+
+def documents(folder: Path) -> Iterator[tuple[str, Document]]:
     """Give the path of each page in the site, and what is on it."""
-    folder = shipped("docs")
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         text = file.read_text(encoding="utf-8")
-        yield page_of(name), document(text, partial(_link, name))
+        yield page_of(name), document(text, partial(_link, folder, name))
 
 
 def page_of(name: str) -> str:
@@ -26,9 +45,8 @@ def page_of(name: str) -> str:
     return f"docs/{name.removesuffix('.md')}.html"
 
 
-def files() -> dict[str, bytes]:
+def files(folder: Path) -> dict[str, bytes]:
     """Return by path in the site what the documents show."""
-    folder = shipped("docs")
     return {
         f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
         for file in sorted(folder.rglob("*"))
@@ -36,21 +54,21 @@ def files() -> dict[str, bytes]:
     }
 
 
-def _link(name: str, target: str) -> str | None:
+def _link(folder: Path, name: str, target: str) -> str | None:
     """Return what a target in a document becomes; None for what the site does not have."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target
     here = posixpath.dirname(name)
-    if not _exists(posixpath.normpath(posixpath.join(here, path))):
+    if not _exists(folder, posixpath.normpath(posixpath.join(here, path))):
         return None
     return f"{path.removesuffix('.md')}.html{hash_}{anchor}" if path.endswith(".md") else path
 
 
-def _exists(name: str) -> bool:
+def _exists(folder: Path, name: str) -> bool:
     file = Path(name)
     return (
         file.suffix in (".md", *_PICTURES)
         and not name.startswith("..")
-        and (shipped("docs") / file).exists()
+        and (folder / file).exists()
     )

@@ -64,8 +64,14 @@ class Page(NamedTuple):
     menu: str = ""  # the entry of the menu that leads here; its own path where empty
 
 
-def build_site(progress: Callable[[str], None] = lambda _: None) -> dict[str, bytes]:
-    """Return the files of the site by path; `progress` is told what is being made."""
+def build_site(
+    progress: Callable[[str], None] = lambda _: None, docs: Path | None = None
+) -> dict[str, bytes]:
+    """Return the files of the site by path; `progress` is told what is being made.
+
+    `docs` is the folder of the documents, that of the checkout by default.
+    """
+    docs = docs or documents.documents_folder()
     progress("figures")
     drawn = figures.drawn()
     pictures = figures.together(drawn)
@@ -73,15 +79,17 @@ def build_site(progress: Callable[[str], None] = lambda _: None) -> dict[str, by
         pictures |= each.files
     content = {f"figures/{name}": file for name, file in pictures.items()}
     places: list[Found] = []
-    for page in _pages(drawn, progress):
+    for page in _pages(drawn, docs, progress):
         content[page.path] = _rendered(page)
         places += page.found
-    content |= _assets(places)
+    content |= _assets(places) | documents.files(docs)
     content[MARK] = json_text(listed(content)).encode()
     return content
 
 
-def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) -> Iterator[Page]:
+def _pages(
+    drawn: Mapping[str, figures.Drawn], docs: Path, progress: Callable[[str], None]
+) -> Iterator[Page]:
     progress("claims")
     judged = ledger.judgements()
     yield Page("index.html", "Rigid bodies, 1982", "index.html", {"counts": ledger.counts(judged)})
@@ -125,7 +133,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], progress: Callable[[str], None]) 
         ],
     )  # fmt: skip
     progress("documents")
-    yield from _documents()
+    yield from _documents(docs)
     offered = api.entries()
     yield Page(
         "api.html", "API", "api.html", {"entries": offered},
@@ -150,9 +158,9 @@ def _listing() -> Iterator[Page]:
     yield Page("listing/index.html", "The listing", "listing.html", context)
 
 
-def _documents() -> Iterator[Page]:
+def _documents(docs: Path) -> Iterator[Page]:
     titles = []
-    for path, each in documents.documents():
+    for path, each in documents.documents(docs):
         found = [
             Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
         ]
@@ -189,7 +197,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
     content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
     content["listing/edition.xml"], _ = _tei()
-    return content | documents.files()
+    return content
 
 
 def script(name: str, value: Any) -> bytes:

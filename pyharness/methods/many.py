@@ -27,6 +27,7 @@ from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import ENDS, extension
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene
+from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array
 from pyharness.model.values import Number, finite
 from pyharness.model.waves import with_merged_rows
@@ -57,6 +58,8 @@ class Ensemble:
     def ended(self) -> NDArray[np.str_]:
         """How each ended, in words: complete, sensitive, overflow, refused, gave up."""
         return np.array(ENDS)[self.status]
+
+    __repr__ = short_repr
 
     @property
     def has_result(self) -> NDArray[np.bool_]:

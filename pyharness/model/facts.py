@@ -19,7 +19,7 @@ def facts(name: str) -> dict[str, Any]:
 def shipped(name: str) -> Path:
     """Return a folder of the project that is no package: ``docs``, ``fortran/original``, ``web``.
 
-    An installed package brings it along; a checkout has it beside the package.
+    An installed package brings along all but ``docs``; a checkout has them beside the package.
     """
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

@@ -12,6 +12,7 @@ from pyharness.model.attitude import Quaternion, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.facts import facts
 from pyharness.model.functions import cosine, sine
+from pyharness.model.impossible import warn_of_impossible
 from pyharness.model.inertia import Exact, Matrix, breaks_triangle, checked_inertia
 from pyharness.model.values import (
     Number,
@@ -211,6 +212,7 @@ class Scene:
         self._set("forces", three("forces", self.forces))
         if self.case is not None:
             self._set("case", whole("case", self.case))
+        warn_of_impossible(self)
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)

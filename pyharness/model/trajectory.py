@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.errors import InputError, unknown
+from pyharness.model.shown import short_repr
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -101,6 +102,8 @@ class Trajectory:
     axes: Array | None = None
     exact: NDArray[np.object_] | None = None
     tolerance: float | None = None
+
+    __repr__ = short_repr
 
     def rotation(self) -> "Rotation":
         """Return the attitudes as rotations of SciPy, which turn vectors from body to space.

@@ -14,6 +14,7 @@ from pyharness.model.extension import columns, extension
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
 from pyharness.model.pieces import share
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
+from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, several, truth, whole
 from pyharness.original.compiled import stop_reads_velocity
@@ -62,17 +63,20 @@ class ProgramEnsemble:
     stop_quotient: Array
     ier: NDArray[np.int32] | None
 
+    __repr__ = short_repr
 
+
+# As text: else its signature shows what NumPy makes of ArrayLike, 300 characters for each.
 def run_many(
     scene: Scene,
     listing: Listing,
     *,
-    omega0: ArrayLike | None = None,
-    moments: ArrayLike | None = None,
-    coefficients: ArrayLike | None = None,
-    torque_constant: ArrayLike | None = None,
-    step_size: ArrayLike | None = None,
-    lipschitz: ArrayLike = 500.0,
+    omega0: "ArrayLike | None" = None,
+    moments: "ArrayLike | None" = None,
+    coefficients: "ArrayLike | None" = None,
+    torque_constant: "ArrayLike | None" = None,
+    step_size: "ArrayLike | None" = None,
+    lipschitz: "ArrayLike" = 500.0,
     may_stop: bool = True,
     velocity: bool = False,
     at: Sequence[SupportsIndex] | None = None,

@@ -22,7 +22,7 @@ FILES = {"index.html": b"<p>", "docs/a.html": b"a", MARK: json.dumps(LISTED).enc
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make a site of three files."""
-    monkeypatch.setattr(site, "build_site", lambda progress: FILES)
+    monkeypatch.setattr(site, "build_site", lambda progress, docs: FILES)
 
 
 def _there(folder: Path) -> dict[str, bytes]:
@@ -114,6 +114,21 @@ def test_what_fails_leaves_all_as_it_was(
     assert "No space left on device" in capsys.readouterr().err
     assert _there(folder) == before
     assert [each.name for each in tmp_path.iterdir()] == ["site"]
+
+
+def test_without_the_documents_it_says_where_they_are(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An installed package has none, and what is beside it is of others."""
+    for given, told in (
+        ([], "an installed package has no documents; give --docs DIR"),
+        (["--docs", str(tmp_path)], f"--docs '{tmp_path}': has no findings.md"),
+    ):
+        monkeypatch.setattr("pyharness.edition.documents.shipped", lambda _: tmp_path)
+        assert main(["edition", "--out", str(tmp_path / "site"), *given]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert told in line
+    assert not (tmp_path / "site").exists()
 
 
 @pytest.mark.parametrize("name", LIBRARIES)

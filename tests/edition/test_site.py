@@ -264,4 +264,4 @@ def test_pictures_and_licences_are_beside_the_pages(built_site: dict[str, bytes]
     ],
 )
 def test_links_of_documents(name: str, target: str, found: str | None) -> None:
-    assert documents._link(name, target) == found
+    assert documents._link(shipped("docs"), name, target) == found

@@ -22,7 +22,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.stress import hold as truth
 from pyharness.stress.hold import in_steps
-from pyharness.stress.run import Outcome, stress, worst
+from pyharness.stress.run import Outcome, bounded, stress, worst
 from pyharness.theory import promises
 from tests.stress import checks_of, failed
 
@@ -169,6 +169,30 @@ def test_the_worst_input_is_saved_and_its_command_gives_the_same(
         assert scene is not None
         assert (saved.omega, saved.moments) == (scene.omega, scene.moments)
         assert (saved.step_size, saved.steps) == (scene.step_size, scene.steps)
+
+
+def test_only_what_failed_is_saved_unless_a_folder_is_given(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 1.5))
+    good = Outcome(bounded("separatrix/taylor/a", 1.0, 2.0), scene)
+    bad = Outcome(bounded("separatrix/quick/b", 3.0, 2.0), scene)
+    for outcomes, code, names in (
+        ([good], 0, None),
+        ([good, bad], 1, ["separatrix-quick.toml"]),
+    ):
+        monkeypatch.setattr("pyharness.cli.verbs.stress.stress", lambda _, found=outcomes: found)
+        assert _run(capsys, "--only", "separatrix")[0] == code
+        folder = tmp_path / "worst"
+        assert folder.exists() == (names is not None)
+        assert names is None or [each.name for each in folder.iterdir()] == names
+    # What can't be saved does not hide what failed.
+    (tmp_path / "worst/separatrix-quick.toml").unlink()
+    (tmp_path / "worst").rmdir()
+    (tmp_path / "worst").write_text("a file")
+    assert main(["stress", "--only", "separatrix"]) == 1
+    assert "the inputs of what failed are not saved: " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

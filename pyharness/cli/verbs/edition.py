@@ -8,6 +8,7 @@ from pyharness.model.errors import InputError
 FORMATS = ("table", "json")
 OPTIONS = {
     "--out DIR": "folder for the pages, index.html at its top; made if missing",
+    "--docs DIR": "the documents, docs of the source (default: those of the checkout)",
     "--format F": "table (default) or json: of what was written",
 }
 
@@ -23,9 +24,11 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("edition: give --out DIR, a folder for the pages")
     check_tree(options.out, MARK, "--out")
     check_libraries()
+    from pyharness.edition.documents import documents_folder
     from pyharness.edition.site import build_site
 
-    content = build_site(lambda what: shared.progress(f"edition: {what}"))
+    docs = documents_folder(options.docs)
+    content = build_site(lambda what: shared.progress(f"edition: {what}"), docs)
     shared.progress("")
     write_tree(options.out, content, "--out")
     shared.emit(render(edition_report(options.out, content), options.format or "table"), None)

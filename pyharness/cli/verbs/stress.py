@@ -11,7 +11,7 @@ FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"trials, or checks by name: {', '.join(TRIALS)}",
-    "--save DIR": "where the worst inputs go, as scene files (default: worst)",
+    "--save DIR": "save each method's worst input there, as a scene file (else: failures, worst/)",
     **shared.outputs(FORMATS, plot="draw one trial"),
 }
 
@@ -22,13 +22,10 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None and len(_chosen(only)) != 1:
         raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")
     shared.check_outputs(options)
-    folder = options.save or _FOLDER
-    # One check alone is a replay: its input has been saved before.
-    saves = options.save is not None or not any("/" in each for each in only)
-    if saves:
+    if options.save is not None:
         from pyharness.cli.output import check_folder
 
-        check_folder(folder, (), "--save")
+        check_folder(options.save, (), "--save")
 
     outcomes: list[Outcome] = []
     for outcome in stress(only):
@@ -38,10 +35,17 @@ def run(options: argparse.Namespace) -> int:
     if not outcomes:
         raise unknown("check", ",".join(only), TRIALS, "--only")
     checks = [outcome.check for outcome in outcomes]
-    if saves:
-        _save(folder, outcomes)
+    failed = [outcome for outcome in outcomes if not outcome.check.passed]
+    if options.save is not None:
+        _save(options.save, outcomes)
+    # One check alone is a replay: its input has been saved before.
+    elif not any("/" in each for each in only):
+        try:
+            _save(_FOLDER, failed)
+        except InputError as error:
+            shared.warn(f"the inputs of what failed are not saved: {error}")
     shared.show(stress_report([trial(name) for name in _chosen(only)], checks), options)
-    return 0 if all(check.passed for check in checks) else 1
+    return 1 if failed else 0
 
 
 def _chosen(only: list[str]) -> list[str]:

@@ -1,0 +1,72 @@
+"""Bodies that can not exist: one warning, at the line of the user who makes one."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pyharness import (
+    ImpossibleBodyWarning,
+    Scene,
+    case_scene,
+    compare_programs,
+    read_scene,
+    run_program,
+    solve,
+    subset,
+)
+from pyharness.cli.main import main
+
+IMPOSSIBLE = (200.0, 10.0, 20.0)
+BODY = "[body]\nmoments = [200.0, 10.0, 20.0]\n[initial]\nomega = [1.0, 2.0, 3.0]\n"
+
+
+def _file(folder: Path) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(BODY)
+    return path
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda _: Scene("", (1.0, 2.0, 3.0), IMPOSSIBLE),
+        lambda _: Scene("", (1.0, 2.0, 3.0), inertia=np.diag(IMPOSSIBLE)),
+        lambda _: replace(Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 2.0)), moments=IMPOSSIBLE),
+        lambda _: case_scene(6),
+        lambda folder: read_scene(_file(folder)),
+    ],
+    ids=["moments", "inertia", "replaced", "case", "file"],
+)
+def test_one_warning_at_the_line_of_the_user(make: Callable[[Path], Scene], tmp_path: Path) -> None:
+    with pytest.warns(ImpossibleBodyWarning, match="no rigid body has these moments") as found:
+        assert make(tmp_path).is_impossible
+    (warning,) = found
+    assert warning.filename == __file__
+    assert issubclass(ImpossibleBodyWarning, UserWarning)
+
+
+def test_a_body_that_can_exist_and_what_is_made_of_a_scene_warn_of_nothing() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        scene = case_scene(6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # A flat body is the limit.
+        Scene("", (1.0, 2.0, 3.0), (5.0, 3.0, 2.0))
+        Scene("", (1.0, 2.0, 3.0), coefficients=(9.0, 1.0, 1.0))
+        solve(scene, [1.0])
+        solve(scene, [-1e-3, 1e3], attitude=True)
+        run_program(scene, subset("runge-kutta"))
+        compare_programs(scene)
+
+
+def test_the_command_line_says_it_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for where in (["--case", "6"], ["--scene", str(_file(tmp_path))]):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert main(["run", *where, "--method", "taylor", "--times", "1"]) == 0
+        assert capsys.readouterr().err.count("no rigid body has these moments") == 1

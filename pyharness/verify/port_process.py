@@ -6,7 +6,6 @@ import select
 import shlex
 import signal
 import subprocess
-import tempfile
 import time
 from pathlib import Path
 from types import TracebackType
@@ -18,7 +17,8 @@ PATIENCE = 60.0  # s for a run, the start of an interpreter that compiles includ
 _LARGEST = 1 << 26  # bytes of an answer
 _PIECE = 1 << 16
 _TO_END = 1.0  # s to end, once the output is closed
-_ROUNDS = 100  # of looking for what a port started; what is killed may take a while to end
+# Of looking for what a port started, and of reading what it has left: each has an end.
+_ROUNDS = 100
 _MARK = "PYHARNESS_PORT"  # of every process that a port starts, in its environment
 
 
@@ -60,24 +60,27 @@ class PortProcess:
     def __enter__(self) -> Self:
         """Start it, in a group of its own: a shell's children end with it."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
-        self._errors = tempfile.TemporaryFile()
+        self._told = b""  # the last of what it wrote to stderr
         try:
             self._process = subprocess.Popen(
                 self._words,
                 bufsize=0,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=self._errors,
+                stderr=subprocess.PIPE,
                 start_new_session=True,
                 env={**os.environ, _MARK: self._mark.removeprefix(f"{_MARK}=")},
             )
         except OSError as error:
-            self._errors.close()
             raise PortError(f"'{self._words[0]}' can't be started: {error.strerror}") from None
         assert self._process.stdin is not None
         assert self._process.stdout is not None
+        assert self._process.stderr is not None
         self._in, self._out = self._process.stdin, self._process.stdout
+        self._errors = self._process.stderr
+        self._heard = [self._errors]  # empty once it is closed
         os.set_blocking(self._in.fileno(), False)
+        os.set_blocking(self._errors.fileno(), False)
         return self
 
     def __exit__(
@@ -112,15 +115,18 @@ class PortProcess:
         while rest or not answered:
             writers = [self._in] if rest else []
             left = max(end - time.monotonic(), 0.0)
-            readable, writable, _ = select.select([self._out], writers, [], left)
+            readers = [self._out, *self._heard]
+            readable, writable, _ = select.select(readers, writers, [], left)
             if not left or not (readable or writable):
                 raise PortError(f"no answer within {self._patience:g} s")
+            if self._errors in readable:
+                self._hear()
             if writable:
                 try:
                     rest = rest[os.write(self._in.fileno(), rest[:_PIECE]) :]
                 except BrokenPipeError:
                     raise PortError(self._ending()) from None
-            if readable:
+            if self._out in readable:
                 piece = os.read(self._out.fileno(), _PIECE)
                 if not piece:
                     raise PortError(self._ending())
@@ -133,14 +139,28 @@ class PortProcess:
             raise PortError("more than one line for one run")
         return answer
 
+    def _hear(self) -> bool:
+        """Read what comes from stderr, and keep the last of it; whether there was anything."""
+        try:
+            piece = os.read(self._errors.fileno(), _PIECE)
+        except BlockingIOError:
+            return False
+        if not piece:
+            self._heard = []
+        self._told = (self._told + piece)[-_PIECE:]
+        return bool(piece)
+
     def _ending(self) -> str:
         try:
             code = self._process.wait(_TO_END)
         except subprocess.TimeoutExpired:
             return "it closed its input or output before it had answered"
         how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
-        self._errors.seek(max(self._errors.seek(0, os.SEEK_END) - _PIECE, 0))
-        said = self._errors.read().decode(errors="replace").split("\n")
+        # What is still in the pipe, once its writer has ended; a child of it may go on writing.
+        for _ in range(_ROUNDS):
+            if not self._hear():
+                break
+        said = self._told.decode(errors="replace").split("\n")
         told = [printable(each.strip()) for each in said if each.strip()]
         # The last that names an error: some interpreters say their version after it.
         told = [each for each in told if "rror" in each] or told

@@ -277,3 +277,18 @@ def test_what_leaves_the_group_of_a_port_is_ended_too(tmp_path: Path) -> None:
         os.kill(child, 0)
         assert os.getsid(child) != os.getsid(process._process.pid)
     assert _gone(child)
+
+
+def test_a_port_may_complain_without_end(tmp_path: Path) -> None:
+    """Its stderr went to a file that filled the disk; the last of it is kept."""
+    script = (
+        "import sys\n"
+        "for i in range(3000): print('x' * 1000, file=sys.stderr)\n"
+        "print(input(), flush=True)\n"
+        "print('error: the last word', file=sys.stderr); input(); sys.exit(3)"
+    )
+    with PortProcess(_python(tmp_path / "port.py", script)) as process:
+        assert process.ask(b"who?") == b"who?"
+        assert 0 < len(process._told) <= 1 << 16
+        with pytest.raises(PortError, match=r"exit code 3 .*: error: the last word"):
+            process.ask(b"and?")

@@ -18,9 +18,9 @@ WEB = ROOT / "web"
 # Ten cells: every program, every ending, a reading, the conjecture of Case 7.
 SAMPLE = (
     "two-term/case-2/original", "two-term/case-6/original", "two-term/case-7/initial-torque",
-    "two-term/case-3/corrected:c1-for-c", "four-term/case-5/original", "four-term/case-7/corrected",
+    "two-term/case-3/c1-for-c", "four-term/case-5/original", "four-term/case-7/corrected",
     "runge-kutta/case-2/original", "runge-kutta/case-3/stage-base",
-    "runge-kutta/case-6/corrected:do-variable", "runge-kutta/case-7/original",
+    "runge-kutta/case-6/do-variable", "runge-kutta/case-7/original",
 )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ import argparse
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from typing import Any, NoReturn
@@ -29,10 +29,10 @@ SCENE = {
 }
 LISTING = {
     "--listing L": "original or corrected",
-    "--fix NAME,...": "correct these defects",
+    "--fix NAME,...": "correct these defects, readings or conjectures",
     "--keep NAME,...": "keep these; alone: correct all others",
-    "--reading NAME,...": "select readings not adopted",
-    "--conjecture NAME,...": "assume these where no card exists, and no other; none: nothing",
+    "--reading NAME,...": "read cards of the original in the way that is not adopted",
+    "--conjecture NAME,...": "what the original assumes where no card exists; none: nothing",
     "--lipschitz L": "constant of the stop test (default 500)",
     "--no-stop": "run on where the stop test would end the run",
 }
@@ -183,7 +183,7 @@ def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
 def chosen_listing(options: argparse.Namespace) -> Listing:
     """Return the listing of the one program asked for."""
     chosen_programs(options)
-    return subset(
+    listing = subset(
         options.program,
         options.listing,
         names(options.fix),
@@ -191,6 +191,16 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
         names(options.reading),
         None if options.conjecture is None else names(options.conjecture),
     )
+    tell_inactive(options, [listing])
+    return listing
+
+
+def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
+    """Warn of readings and conjectures that were asked for and change nothing."""
+    asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
+    active = {name for listing in listings for name in listing.active}
+    for name in sorted(asked - active - set(names(options.fix))):
+        warn(f"no corrected statement depends on '{name}'; --keep {name} keeps it uncorrected")
 
 
 def listing_text(listing: Listing) -> str:

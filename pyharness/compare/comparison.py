@@ -21,7 +21,7 @@ from pyharness.methods.sensitivity import is_sensitive, motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
@@ -188,7 +188,7 @@ def compare_programs(
             for each in languages
         ]
         run, *other = (each.rows(scene) for each in candidates)
-        judged = in_floats and not (listing.defects or listing.readings or listing.conjectures)
+        judged = in_floats and not listing.active
         program = PROGRAM_REGISTRY[listing.program]
         order = measured_order(scene, program, listing, truth) if judged else None
         if attitude:
@@ -220,8 +220,8 @@ def listings_for(
 ) -> list[Listing]:
     """Return what to compare: original and corrected, and the subset asked for between them.
 
-    A defect or reading applies to the programs that have it; one that no program has is a
-    mistake. With `base` and nothing else, only that listing is shown.
+    A defect, reading or conjecture applies to the programs that have it; one that no program has
+    is a mistake. With `base` and nothing else, only that listing is shown.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]
@@ -231,7 +231,8 @@ def listings_for(
         ("reading", "--reading", readings),
         ("conjecture", "--conjecture", assumed),
     ):
-        allowed = {name for program in chosen for name in names_of(kind, program)}
+        names_in = switchable if kind == "defect" else partial(names_of, kind)
+        allowed = {name for program in chosen for name in names_in(program)}
         for name in names:
             if name not in allowed:
                 raise unknown(kind, name, sorted(allowed), option)
@@ -239,10 +240,8 @@ def listings_for(
         raise InputError(f"'{name}' is given to both --fix and --keep; give it to one")
     result = []
     for program in chosen:
-        defects, own = names_of("defect", program), names_of("reading", program)
-        fixed = [name for name in fix if name in defects]
-        kept = [name for name in keep if name in defects]
-        selected = [name for name in readings if name in own]
+        own = switchable(program)
+        fixed, kept, selected = ([n for n in names if n in own] for names in (fix, keep, readings))
         bases = [base] if base and not (fix or keep) else ["original", "corrected"]
         rows = [subset(program, each, (), (), selected, conjectures) for each in bases]
         if fixed or kept:

@@ -14,6 +14,7 @@ from pyharness.model.listing import Listing, corrected, names_of, original, subs
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Stop
+from pyharness.original.cells import subsets
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
@@ -77,20 +78,19 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield what a flagged defect or reading does in each of its programs, case by case.
 
-    For a reading, which no listing has by default, *corrected alone* is the original program and
-    *kept alone* the corrected program with the reading; both have it where they are compared.
+    For a reading, which no listing has by default, *original* has it and *corrected alone* has not.
     """
     known = entry(name)
     for program in known["programs"]:
         first, last = original(program), corrected(program)
         if known["kind"] == "reading":
-            listings = original(program, [name]), first, corrected(program, [name]), last
+            listings = original(program, [name]), first, Listing(program, [name]), last
         elif known["kind"] == "conjecture":
             with_it, without = first.conjectures | {name}, first.conjectures - {name}
             listings = (
                 replace(first, conjectures=with_it),
                 replace(first, conjectures=without),
-                replace(last, conjectures=frozenset([name])),
+                Listing(program, [name]),
                 last,
             )
         else:
@@ -104,14 +104,14 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return the effect of every subset of a program's defects, largest error of omega first."""
+    """Return the effect of every subset of a program's defects, largest error of omega first.
+
+    The readings are in the subsets like defects: the corrected program has none.
+    """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
-    names = switched(scene, program)
-    found = []
-    for bits in range(2 ** len(names)):
-        active = [name for i, name in enumerate(names) if bits >> i & 1]
-        found.append(effect(scene, Listing(program, active, readings), truth, effort=effort))
+    listings = [Listing(program, each) for each in subsets((*switched(scene, program), *readings))]
+    found = [effect(scene, listing, truth, effort=effort) for listing in listings]
     return sorted(found, key=_size, reverse=True)
 
 

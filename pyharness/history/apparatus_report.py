@@ -8,7 +8,6 @@ from itertools import zip_longest
 from typing import Any
 
 from pyharness.history.ablation import CaseEffects, Effect, switched
-from pyharness.model.listing import Listing
 from pyharness.model.records import listing_record, scene_record
 from pyharness.model.report import (
     Column,
@@ -105,12 +104,14 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
     text: list[Section] = []
     rows = []
     for program, effects in found.items():
-        letters = dict(zip(switched(scene, program), string.ascii_lowercase, strict=False))
+        readings = sorted({name for each in effects for name in each.listing.readings})
+        names = (*switched(scene, program), *readings)
+        letters = dict(zip(names, string.ascii_lowercase, strict=False))
         title = f"program {program}: every subset of its defects, sorted by effect"
         key = [f"  {letter}  {name}" for name, letter in letters.items()]
         subsets = []
         for each in effects:
-            errors, active = (each.omega, each.velocity, each.steps), _active(each.listing)
+            errors, active = (each.omega, each.velocity, each.steps), each.listing.active
             written = "".join(a if name in active else "." for name, a in letters.items())
             subsets.append([written, *errors, _stop(each)])
             variable = each.stop.variable if each.stop else None
@@ -125,10 +126,6 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
         },
         data=numbers("program active error_w error_v steps ended stop_variable", rows),
     )
-
-
-def _active(listing: Listing) -> frozenset[str]:
-    return listing.defects | listing.conjectures
 
 
 def _effect_record(effect: Effect) -> dict[str, Any]:

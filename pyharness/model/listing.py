@@ -14,7 +14,7 @@ _FIELDS = {"defect": "defects", "reading": "readings", "conjecture": "conjecture
 
 @dataclass(frozen=True)
 class Listing:
-    """A original program, corrected, or anything between.
+    """An original program, corrected, or anything between.
 
     Attributes
     ----------
@@ -23,9 +23,11 @@ class Listing:
     defects : frozenset of str
         The defects that are active.
     readings : frozenset of str
-        The readings selected that are not the adopted ones.
+        The readings that are active: an original statement is read the way that is not adopted. A
+        corrected program has none, for no reading changes a corrected statement.
     conjectures : frozenset of str
-        What is assumed where no card exists; also taken from among `defects`.
+        The active assumptions where no card exists. They and readings are also recognised
+        among `defects`.
     """
 
     program: str
@@ -47,9 +49,10 @@ class Listing:
         """Refuse names that the program does not have."""
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
-        assumed = given["defects"] & set(names_of("conjecture", self.program))
-        given["defects"] -= assumed
-        given["conjectures"] |= assumed
+        for kind in ("reading", "conjecture"):
+            among = given["defects"] & set(names_of(kind, self.program))
+            given["defects"] -= among
+            given[_FIELDS[kind]] |= among
         for kind, field in _FIELDS.items():
             names = given[field]
             object.__setattr__(self, field, names)
@@ -60,20 +63,23 @@ class Listing:
     @property
     def label(self) -> str:
         """`original`, `corrected` or `custom`."""
-        active = self.defects | self.conjectures
-        if not active:
+        if not self.active:
             return "corrected"
-        return "original" if active == set(switches(self.program)) else "custom"
+        return "original" if self.active - self.readings == set(switches(self.program)) else "custom"
+
+    @property
+    def active(self) -> frozenset[str]:
+        """The names of all that is active: defects, readings and conjectures."""
+        return self.defects | self.readings | self.conjectures
 
     @property
     def flags(self) -> int:
         """The active names as the bits that the Fortran reads."""
-        active = self.defects | self.readings | self.conjectures
-        return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in active)
+        return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
     def has(self, name: str) -> bool:
         """Whether the defect, reading or conjecture `name` is active."""
-        return name in self.defects or name in self.readings or name in self.conjectures
+        return name in self.active
 
 
 def flagged() -> list[dict[str, Any]]:
@@ -88,6 +94,11 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
         for entry in flagged()
         if entry["kind"] == kind and (program is None or program in entry["programs"])
     )
+
+
+def switchable(program: str | None = None) -> tuple[str, ...]:
+    """Return all names that can be corrected or kept: those of every kind, defects first."""
+    return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 
 def switches(program: str) -> tuple[str, ...]:
@@ -105,9 +116,9 @@ def original(program: str, readings: Iterable[str] = ()) -> Listing:
     return Listing(program, frozenset(switches(program)), frozenset(readings))
 
 
-def corrected(program: str, readings: Iterable[str] = ()) -> Listing:
-    """Return the corrected program: no defect is active."""
-    return Listing(program, frozenset(), frozenset(readings))
+def corrected(program: str) -> Listing:
+    """Return the corrected program, which is the same under every reading and conjecture."""
+    return Listing(program, frozenset())
 
 
 def subset(
@@ -125,12 +136,14 @@ def subset(
     base : {"original", "corrected"}, optional
         What to start from; where only `keep` is given, `corrected`, else `original`.
     fix, keep : iterable of str
-        Defects to correct, and defects to keep.
+        Defects, readings and conjectures to correct, and those to keep.
     readings : iterable of str
-        Readings to select that are not the adopted ones.
+        Readings to select that are not the adopted ones. A corrected statement has its intended
+        form under every reading: where the base is `corrected` only `keep` makes one active.
     conjectures : iterable of str, optional
-        What to assume where no card exists, ``none`` for nothing; by default what `original`
-        assumes where that is the base, and nothing where `corrected` is.
+        What the original assumes where no card exists, ``none`` for nothing; by default what
+        `original` has. As with readings, only `keep` makes one active where the base is
+        `corrected`.
 
     Raises
     ------
@@ -152,17 +165,18 @@ def subset(
         ("--reading", "reading", chosen),
         ("--conjecture", "conjecture", assumed or frozenset()),
     ):
-        for name in sorted(names - set(names_of(kind, program))):
+        allowed = switchable(program) if kind == "defect" else names_of(kind, program)
+        for name in sorted(names - set(allowed)):
             raise _foreign(kind, name, program, option)
     if base is None:
         base = "corrected" if kept and not fixed else "original"
     if not isinstance(base, str) or base not in ("original", "corrected"):
         raise unknown("listing", base, ("original", "corrected"), "--listing")
-    defects = set(names_of("defect", program)) if base == "original" else set()
+    if base == "corrected":
+        return Listing(program, kept)
     if assumed is None:
-        own = set(switches(program)) if base == "original" else set()
-        assumed = frozenset(own - set(names_of("defect", program)))
-    return Listing(program, frozenset((defects - fixed) | kept), chosen, assumed)
+        assumed = frozenset(switches(program)) - set(names_of("defect", program))
+    return Listing(program, ({*names_of("defect", program)} | chosen | assumed) - fixed | kept)
 
 
 def checked_listing(listing: object) -> Listing:
@@ -187,10 +201,12 @@ def _names(where: str, names: object) -> frozenset[str]:
 
 
 def _foreign(kind: str, name: str, program: str, where: str = "") -> InputError:
-    if name in names_of(kind):
+    every, own = names_of(kind), names_of(kind, program)
+    if where in ("--fix", "--keep"):
+        every, own = switchable(), switchable(program)
+    if name in every:
         place = f"{where}: " if where else ""
         return InputError(
-            f"{place}program {program} has no {kind} '{name}'; "
-            f"allowed: {', '.join(names_of(kind, program)) or 'none'}"
+            f"{place}program {program} has no {kind} '{name}'; allowed: {', '.join(own) or 'none'}"
         )
-    return unknown(kind, name, names_of(kind, program), where)
+    return unknown(kind, name, own, where)

@@ -38,8 +38,7 @@ def cell_name(listing: Listing, case: int) -> str:
 
 
 def listing_name(listing: Listing) -> str:
-    """Return `original`, `corrected` or the defects; readings follow after a colon."""
-    name = listing.label
-    if name == "custom":
-        name = "+".join(sorted(listing.defects | listing.conjectures))
-    return ":".join([name, *sorted(listing.readings)])
+    """Return `original`, with its readings after a colon, `corrected`, or all that is active."""
+    if listing.label == "custom":
+        return "+".join(sorted(listing.active))
+    return ":".join([listing.label, *sorted(listing.readings)])

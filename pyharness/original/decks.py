@@ -137,7 +137,8 @@ def _is_made(
         and dialect in named("dialect", [dialect])
         and named("case", case) == case
         and not ("corrects" in alteration and listing.has(named("corrects", "")))
-        and not ("unless" in alteration and listing.has(named("unless", "")))
+        and named("listing", listing.label) == listing.label
+        and not any(name == listing.label or listing.has(name) for name in named("unless", ()))
         and all(listing.has(alteration[key]) for key in ("keeps", "reading") if key in alteration)
     )
 

@@ -19,7 +19,7 @@ from pyharness.compare.report import comparison_report, verdict
 from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.methods.report import trajectory_report
 from pyharness.model.attitude import product
-from pyharness.model.listing import corrected, original
+from pyharness.model.listing import Listing, corrected, original
 from pyharness.model.trajectory import Trajectory, turned_to_space
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import reference
@@ -93,7 +93,9 @@ def test_listings_for_the_options() -> None:
     keeping = listings_for(["runge-kutta"], keep=["stage-base"])
     assert [each.defects for each in keeping if each.label == "custom"] == [{"stage-base"}]
     chosen = listings_for(readings=["c1-for-c"])
+    labels_of = [each.label for each in chosen if each.readings]
     assert {each.program for each in chosen if each.readings} == {"two-term"}
+    assert labels_of == ["original"]
     with pytest.raises(InputError, match="unknown defect 'nonsense'"):
         listings_for(fix=["nonsense"])
     with pytest.raises(InputError, match="both --fix and --keep"):
@@ -252,9 +254,9 @@ def test_picture_and_its_numbers(case_2: room.Comparison) -> None:
 def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its order is nobody's due, and its steps are those that were run."""
     monkeypatch.setattr(room, "timed", lambda *_: [1.0])
-    listings = [corrected("two-term", ["c1-for-c"]), original("runge-kutta")]
+    listings = [Listing("two-term", ["c1-for-c"]), original("runge-kutta")]
     reading, before = compare_programs(case_scene(2), listings).programs
-    assert reading.listing.label == "corrected"
+    assert reading.listing.label == "custom"
     assert reading.order is None
     assert reading.seconds_per_step == 1.0 / 100.0
     assert (before.trajectory.steps, before.seconds_per_step) == (25, 1.0 / 25.0)

@@ -158,13 +158,15 @@ def test_only_what_differs_is_in_the_address() -> None:
     first = "case=2&program=runge-kutta&listing=original"
     asked = [
         "", "#", "keep=stage-base", "omega0=0,1,10&steps=100", "conjecture=none&no-stop",
-        "listing=corrected&program=two-term&case=7&conjecture=torque-held&steps=+30",
+        "listing=corrected&program=two-term&case=7&keep=torque-held&steps=+30",
+        "listing=corrected&reading=do-variable&conjecture=torque-held,initial-torque",
     ]  # fmt: skip
     found = ask(body, asked)
     assert [each[0] for each in found] == [
         first, first, "case=2&program=runge-kutta&listing=corrected&keep=stage-base",
         f"{first}&omega0=0,1,10", f"{first}&conjecture=none&no-stop",
-        "case=7&program=two-term&listing=corrected&conjecture=torque-held&steps=30",
+        "case=7&program=two-term&listing=corrected&keep=torque-held&steps=30",
+        "case=2&program=runge-kutta&listing=corrected",
     ]  # fmt: skip
     given = "--case 2 --program runge-kutta --listing original --conjecture none --no-stop"
     assert found[4][1] == f"pyharness run {given}"

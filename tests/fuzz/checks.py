@@ -21,7 +21,7 @@ from pyharness import InputError, prepare, read_scene, solve
 from pyharness.cli.main import main
 from pyharness.compare.agreement import differences
 from pyharness.model.extension import ENDS
-from pyharness.model.listing import subset
+from pyharness.model.listing import names_of, subset
 from pyharness.model.trajectory import WITH_ALL_ROWS
 from pyharness.original.programs import PROGRAM_REGISTRY
 from tests.fuzz import strategies
@@ -128,9 +128,12 @@ def _listing(given: strategies.ListingInput, folder: Path) -> None:
     except InputError as error:
         _one_line(error)
     else:
-        assert not set(given.fix) & found.defects
-        assert set(given.keep) <= found.defects
-        assert set(given.readings) == found.readings
+        assert not set(given.fix) & found.active
+        assert set(given.keep) <= found.active
+        unsaid = "corrected" if given.keep and not given.fix else "original"
+        chosen = set(given.readings) if (given.base or unsaid) == "original" else set()
+        chosen |= set(given.keep) & set(names_of("reading"))
+        assert found.readings == chosen - set(given.fix)
         assert 0 <= found.flags < 2**31
 
 

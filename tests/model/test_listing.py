@@ -40,7 +40,7 @@ def test_labels() -> None:
         assert original(program).label == "original"
         assert corrected(program).label == "corrected"
     assert subset("two-term", conjectures=["none"]).label == "custom"
-    assert subset("two-term", "corrected", conjectures=["torque-held"]).label == "custom"
+    assert subset("two-term", "corrected", keep=["torque-held"]).label == "custom"
     assert subset("two-term", conjectures=["torque-held"]) == original("two-term")
 
 
@@ -50,6 +50,7 @@ def test_conjectures_are_known_among_defects() -> None:
     assert found.defects == {"dt-accumulates"}
     assert found.conjectures == {"torque-held"}
     assert found.has("torque-held")
+    assert Listing("two-term", ["c1-for-c"]).readings == {"c1-for-c"}
     assert found.flags == original("two-term").flags - Listing("two-term", ["x3-reads-acl2"]).flags
 
 
@@ -64,18 +65,31 @@ def test_options_of_the_command_line() -> None:
     assert both.conjectures == {"torque-held"}
 
 
+def test_no_reading_or_conjecture_changes_a_corrected_listing() -> None:
+    """Its statements use the intended name and index; what is to stay uncorrected is kept."""
+    given = {"readings": ["do-variable"], "conjectures": ["torque-held", "initial-torque"]}
+    assert subset("runge-kutta", "corrected", **given) == corrected("runge-kutta")
+    kept = subset("runge-kutta", keep=["do-variable"], **given)
+    assert (kept.label, kept.readings, kept.conjectures) == ("custom", {"do-variable"}, set())
+    assert subset("runge-kutta", "original", readings=["do-variable"]).label == "original"
+    fixed = subset("runge-kutta", fix=["do-variable", "initial-torque"], **given)
+    assert fixed == original("runge-kutta")
+    everything = [*switches("runge-kutta"), "do-variable"]
+    assert subset("runge-kutta", fix=everything, **given).active == {"initial-torque"}
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
         ({"program": "two-term", "fix": ["stage-base"]}, "program two-term has no defect"),
         ({"program": "two-term", "fix": ["dt-acumulates"]}, "did you mean 'dt-accumulates'"),
-        ({"program": "two-term", "keep": ["c1-for-c"]}, "unknown defect 'c1-for-c'"),
+        ({"program": "four-term", "keep": ["c1-for-c"]}, "--keep: program four-term has no defect"),
         ({"program": "two-term", "readings": ["do-variable"]}, "has no reading 'do-variable'"),
         ({"program": "two-term", "base": "mended"}, "unknown listing 'mended'"),
         ({"program": "two-term", "fix": ["a"], "keep": ["a"]}, "both --fix and --keep"),
         ({"program": "four-term", "readings": ["c1-for-c"]}, "allowed: none"),
         ({"program": "four-term", "conjectures": ["torque"]}, "--conjecture: unknown conjecture"),
-        ({"program": "four-term", "fix": ["torque-held"]}, "--fix: unknown defect 'torque-held'"),
+        ({"program": "four-term", "fix": ["torque"]}, "--fix: unknown defect 'torque'"),
     ],
 )
 def test_mistakes_are_named(call: dict[str, Any], words: str) -> None:

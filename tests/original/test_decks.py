@@ -12,6 +12,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
 from pyharness.original.decks import (
+    DIALECTS,
     SYSTEMS,
     compiler,
     deck_text,
@@ -39,9 +40,11 @@ def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
     before, after = (_cards(deck_text(listing(program))) for listing in (original, corrected))
     altered = [
         each for each in facts("cards/alterations")["alteration"]
-        if each["program"] == program and "corrects" in each and "dialect" not in each
+        if each["program"] == program and "dialect" not in each
+        and ("corrects" in each or each.get("listing") == "corrected")
     ]  # fmt: skip
-    assert {each["corrects"] for each in altered} == set(names_of("defect", program))
+    corrects = {each["corrects"] for each in altered if "corrects" in each}
+    assert corrects == set(names_of("defect", program))
     # The torque of Case 7, which no card holds, is the dialect's.
     new = {n for each in altered if "keeps" not in each for key in ("replace", "insert")
            for n, _ in each.get(key, ())}  # fmt: skip
@@ -100,6 +103,11 @@ def test_dialect_of_today_adds_marked_lines_alone() -> None:
     ]  # fmt: skip
     reading = subset("runge-kutta", readings=["do-variable"])
     assert "I=2  " not in deck_text(reading, None, "gfortran")
+    # A corrected deck needs no rule for the variable of a DO, in any dialect.
+    for dialect in DIALECTS:
+        text = deck_text(corrected("runge-kutta"), None, dialect)
+        assert _cards(text)[930].strip() == "I=3"
+        assert "I=2  " not in text
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,15 @@ import pytest
 from pyharness.compare.agreement import differences, distance
 from pyharness.compare.orders import measured_order
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, corrected, names_of, original, subset
+from pyharness.model.listing import (
+    PROGRAMS,
+    Listing,
+    corrected,
+    names_of,
+    original,
+    subset,
+    switchable,
+)
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
@@ -87,10 +95,10 @@ def test_overflow_ends_with_the_rows_until_then() -> None:
 
 def test_every_defect_alone_changes_something() -> None:
     """A flag that changes nothing in any case would be a flag that is not wired."""
-    for program, kind in itertools.product(PROGRAMS, ("keep", "readings")):
-        for name in names_of({"keep": "defect"}.get(kind, "reading"), program):
+    for program in PROGRAMS:
+        for name in switchable(program):
             # `lipschitz-mismatched-pairs` only moves the quotient, which a low limit shows.
-            with_it = subset(program, "corrected", **{kind: [name]})
+            with_it = subset(program, "corrected", keep=[name])
             assert any(
                 differences(
                     compiled.run(case_scene(case), with_it, limit),
@@ -106,7 +114,7 @@ def test_readings_not_adopted_lose_an_order(reading: str) -> None:
     program = next(p for p in PROGRAMS if reading in names_of("reading", p))
     scene = case_scene(5)
     truth = reference(scene, scene.times())
-    listing = corrected(program, [reading])
+    listing = Listing(program, [reading])
     order = measured_order(scene, PROGRAM_REGISTRY[program], listing, truth)
     assert order.state == "misses", order
 

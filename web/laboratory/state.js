@@ -5,6 +5,7 @@
 // them, `omega0` null where it is that of the case. `data` is what the page brings along: cases, programs, flags, limits.
 
 const LISTINGS = ["original", "corrected"];
+const KINDS = ["defect", "reading", "conjecture"];
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
 // What a page shows whose address says nothing.
@@ -52,14 +53,18 @@ export function wordsOf(data, state) {
   const words = [["case", String(state.case)], ["program", program], ["listing", base]];
   const add = (word, names) => names.length > 0 && words.push([word, names.join(",")]);
 
-  const defects = namesOf(data, program, "defect");
-  if (base === "original") add("fix", defects.filter((name) => !active.includes(name)));
-  else add("keep", chosen("defect"));
-  add("reading", chosen("reading"));
-  const conjectures = chosen("conjecture");
-  const assumed = namesOf(data, program, "conjecture").filter((name) => usual.active.includes(name));
-  if (conjectures.join() !== assumed.join()) {
-    add("conjecture", conjectures.length > 0 ? conjectures : ["none"]);
+  if (base === "corrected") {
+    // No reading or conjecture changes a corrected statement: one that is active is kept.
+    add("keep", KINDS.flatMap(chosen));
+  } else {
+    const defects = namesOf(data, program, "defect");
+    add("fix", defects.filter((name) => !active.includes(name)));
+    add("reading", chosen("reading"));
+    const conjectures = chosen("conjecture");
+    const assumed = namesOf(data, program, "conjecture").filter((name) => usual.active.includes(name));
+    if (conjectures.join() !== assumed.join()) {
+      add("conjecture", conjectures.length > 0 ? conjectures : ["none"]);
+    }
   }
   if (state.omega0 !== null) add("omega0", state.omega0.map(written));
   if (state.stepSize !== usual.stepSize) add("step-size", [state.stepSize]);
@@ -114,8 +119,10 @@ export function stateFrom(data, fragment) {
   const chosen = Number(read("case", (text) => oneOf("case", text, cases), number));
   const program = read("program", (text) => oneOf("program", text, data.programs), usual);
   const list = (kind) => (text, word) => namesIn(text, word, kind, namesOf(data, program, kind));
-  const fix = read("fix", list("defect"), []);
-  let keep = read("keep", list("defect"), []);
+  const every = KINDS.flatMap((kind) => namesOf(data, program, kind));
+  const switches = (text, word) => namesIn(text, word, "defect", every);
+  const fix = read("fix", switches, []);
+  let keep = read("keep", switches, []);
   const both = keep.filter((name) => fix.includes(name));
   if (both.length > 0) {
     problems.push(`'${both[0]}' is given to both fix and keep; give it to one`);
@@ -129,12 +136,15 @@ export function stateFrom(data, fragment) {
   const conjectures = namesOf(data, program, "conjecture");
   const assumed = conjectures.filter((name) => state.active.includes(name));
   const noneOr = (text, word) => (text === "none" ? [] : list("conjecture")(text, word));
-  const active = new Set([
-    ...state.active.filter((name) => !fix.includes(name) && !conjectures.includes(name)),
-    ...keep,
-    ...read("reading", list("reading"), []),
-    ...read("conjecture", noneOr, assumed),
-  ]);
+  const readings = read("reading", list("reading"), []);
+  const chosenConjectures = read("conjecture", noneOr, assumed);
+  const own = [
+    ...state.active.filter((name) => !conjectures.includes(name)),
+    ...readings,
+    ...chosenConjectures,
+  ].filter((name) => !fix.includes(name));
+  // A corrected statement has its intended form under every reading and conjecture.
+  const active = new Set([...(base === "corrected" ? [] : own), ...keep]);
   state.active = data.flags.map((flag) => flag.id).filter((name) => active.has(name));
   state.omega0 = read("omega0", omegaFrom, null);
   state.stepSize = read("step-size", positiveFrom, state.stepSize);

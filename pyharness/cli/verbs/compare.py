@@ -47,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
         shared.names(options.reading),
         None if options.conjecture is None else shared.names(options.conjecture),
     )
+    shared.tell_inactive(options, listings)
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     found = compare_programs(

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyharness.history.claims.rules import Runs, largest_error, largest_of, spread_of
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing, names_of, switches
+from pyharness.model.listing import Listing, corrected, names_of, subset, switchable
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
@@ -46,14 +46,16 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the program's listing in this state."""
-        active = set(switches(program)) - self.fixed if self.is_original else set()
-        if self.assumptions.conjectures is not None:
-            adopted = set(switches(program)) - set(names_of("defect", program))
-            assumed = self.assumptions.conjectures - (set() if self.is_original else adopted)
-            active = active - adopted | assumed
+        """Return the program's listing in this state; corrected, it depends on no assumption."""
+        if not self.is_original:
+            return corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
-        return Listing(program, frozenset(active), readings)
+        assumed = self.assumptions.conjectures
+        return subset(program, "original", self.fixed_in(program), (), readings, assumed)
+
+    def fixed_in(self, program: str) -> frozenset[str]:
+        """Return which of the `fixed` names the program has."""
+        return self.fixed & set(switchable(program))
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return a case under the assumptions, with `parts` in steps so much smaller."""

@@ -1,0 +1,135 @@
+"""Corrected listings under every reading and conjecture: orders, and the same bits everywhere."""
+
+import itertools
+import json
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.compare.agreement import differences
+from pyharness.compare.orders import Order, measured_order
+from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, subset
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.original.cells import subsets
+from pyharness.original.programs import PROGRAM_REGISTRY, run_program
+from pyharness.truth.reference import Reference, reference
+from pyharness.verify.port_protocol import read_answer, request
+from tests.ports import WEB, engine
+
+ASSUMED = [
+    (program, tuple(sorted(readings)), tuple(sorted(conjectures)))
+    for program in PROGRAMS
+    for readings in subsets(names_of("reading", program))
+    for conjectures in subsets(names_of("conjecture", program))
+]
+
+
+def _listing(assumed: tuple[str, tuple[str, ...], tuple[str, ...]]) -> Listing:
+    program, readings, conjectures = assumed
+    return subset(program, "corrected", readings=readings, conjectures=conjectures or ["none"])
+
+
+@cache
+def _truth(case: int) -> Reference:
+    scene = case_scene(case)
+    return reference(scene, scene.times())
+
+
+@cache
+def _order(case: int, listing: Listing) -> Order:
+    program = PROGRAM_REGISTRY[listing.program]
+    return measured_order(case_scene(case), program, listing, _truth(case))
+
+
+def _misses(listings: list[Listing]) -> Iterator[tuple[Listing, int]]:
+    for listing, case in itertools.product(listings, case_numbers()):
+        if _order(case, listing).state not in ("as due", "rounding"):
+            yield listing, case
+
+
+def test_corrected_programs_have_their_orders_under_every_reading_and_conjecture() -> None:
+    assert len(ASSUMED) == 4 + 8 + 8
+    assert not list(_misses([_listing(each) for each in ASSUMED]))
+
+
+def test_the_faults_that_readings_and_conjectures_are_cost_an_order_where_they_are_kept() -> None:
+    """What the other test would see if one of them reached a corrected statement."""
+    kept = {
+        (listing.program, name): case
+        for program in PROGRAMS
+        for kind in ("reading", "conjecture")
+        for name in names_of(kind, program)
+        for listing, case in _misses([subset(program, "corrected", keep=[name])])
+    }
+    readings = {("two-term", "c1-for-c"), ("runge-kutta", "do-variable")}
+    conjectures = itertools.product(PROGRAMS, names_of("conjecture"))
+    assert set(kept) == {*readings, *conjectures}
+
+
+def test_languages_agree_bit_for_bit_on_all_of_them() -> None:
+    """Fortran, twin and JavaScript; of Case 7 the sines of JavaScript may be others."""
+    cells = list(itertools.product(ASSUMED, case_numbers()))
+    given = b"".join(request(case_scene(case), _listing(each)) + b"\n" for each, case in cells)
+    done = subprocess.run(
+        [engine(), str(WEB / "port.js")], input=given, capture_output=True, check=True
+    )
+    answers = done.stdout.splitlines()
+    assert len(answers) == len(cells)
+    for (assumed, case), line in zip(cells, answers, strict=True):
+        scene, listing = case_scene(case), _listing(assumed)
+        fortran, twin = (run_program(scene, listing, each) for each in ("fortran", "python"))
+        assert not differences(fortran, twin), (assumed, case)
+        rows = read_answer(line, scene.steps).rows
+        assert fortran.velocity is not None
+        wanted = np.column_stack([fortran.recorded_time, fortran.omega, fortran.velocity])
+        if case == 7:
+            np.testing.assert_allclose(rows, wanted, rtol=1e-12, atol=1e-14)
+        else:
+            assert rows.tobytes() == wanted.tobytes(), (assumed, case)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_laboratory_has_the_same_listing(program: str) -> None:
+    """Its words are those of the command line, and so is what they mean."""
+    words = [
+        f"program={program}&listing=corrected"
+        + (f"&reading={','.join(readings)}" if readings else "")
+        + f"&conjecture={','.join(conjectures) or 'none'}"
+        for name, readings, conjectures in ASSUMED
+        if name == program
+    ]
+    from pyharness.edition.laboratory import data
+
+    script = (
+        f"import {{ stateFrom }} from {json.dumps(str(WEB / 'laboratory/state.js'))};"
+        "import { readFileSync } from 'node:fs';"
+        "const { data, words } = JSON.parse(readFileSync(0));"
+        "console.log(JSON.stringify(words.map((each) => stateFrom(data, each))));"
+    )
+    done = subprocess.run(
+        [engine(), "--input-type=module", "--eval", script],
+        input=json.dumps({"data": data(), "words": words}), capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    for found in json.loads(done.stdout):
+        assert found["problems"] == []
+        assert Listing(program, found["state"]["active"]) == corrected(program)
+
+
+@pytest.mark.parametrize("case", case_numbers())
+def test_compare_judges_them_and_says_what_was_asked_for_in_vain(
+    case: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = "--listing corrected --reading do-variable,c1-for-c --conjecture initial-torque"
+    assert main(["compare", "--case", str(case), *words.split(), "--format", "json"]) == 0
+    told = capsys.readouterr()
+    orders = [each["order"] for each in json.loads(told.out)["programs"]]
+    assert len(orders) == 3
+    # Case 1 is solved to rounding at every step.
+    assert case == 1 or all(each is not None for each in orders)
+    for name in ("c1-for-c", "do-variable", "initial-torque"):
+        assert f"'{name}'; --keep {name}" in told.err

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from itertools import zip_longest
 from typing import Any
 
+from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, counted, words
@@ -111,11 +112,11 @@ def classes_report() -> Report:
     told = ", ".join(f"{number} {certainty}" for certainty, number in sure)
     return Report(
         "cards",
-        [head, principles, [table], [f"{len(entries)} entries: {told}"]],
+        [head, principles, [table], [f"{len(entries)} entries: {told}; text {text_digest()}"]],
         record=lambda: {
             "classes": [dict(zip(_CLASSES_NAMES, row, strict=True)) for row in rows],
             "certainty": dict(sure), "witnesses": edition["witness"],
-            "principles": edition["principles"],
+            "principles": edition["principles"], "text": text_digest(),
         },
         data=table,
     )  # fmt: skip

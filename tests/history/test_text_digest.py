@@ -1,0 +1,88 @@
+"""The digest of the text: cards and apparatus alone move it."""
+
+import copy
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.history.tei import tei_document
+from pyharness.history.text_digest import TABLES, text_digest
+from pyharness.model.facts import facts, shipped
+from pyharness.original import cards
+
+
+@pytest.fixture
+def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Give a copy of the port that the cards are held against."""
+    folder = tmp_path / "original"
+    shutil.copytree(shipped("fortran/original"), folder)
+    monkeypatch.setattr(cards, "shipped", lambda _: folder)
+    cards.deck.cache_clear()
+    yield folder
+    cards.deck.cache_clear()
+
+
+def test_a_comment_in_the_port_moves_the_places_and_not_the_text(port: Path) -> None:
+    before = tei_document(), text_digest()
+    for file in port.glob("*.fypp"):
+        file.write_text(f"! A comment.\n{file.read_text()}")
+    for cached in (cards.deck, cards._lines):
+        cached.cache_clear()
+    after = tei_document(), text_digest()
+    assert after[0] != before[0]
+    assert after[1] == before[1]
+
+
+def _changed(name: str, content: Any) -> Iterator[Any]:
+    """Give copies of a table, each with one change."""
+    rows = content["entry"] if name == "apparatus" else list(content["cards"].values())
+    for index in (0, len(rows) // 2, len(rows) - 1):
+        for key, value in rows[index].items():
+            again = copy.deepcopy(content)
+            row = (again["entry"] if name == "apparatus" else list(again["cards"].values()))[index]
+            row[key] = [*value, "x"] if isinstance(value, list) else f"{value}x"
+            yield again
+    again = copy.deepcopy(content)
+    if name == "apparatus":
+        del again["entry"][1]
+    else:
+        del again["cards"][next(iter(again["cards"]))]
+    yield again
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_card_and_every_entry_moves_it(name: str) -> None:
+    found = {text_digest()}
+    count = 1
+    for again in _changed(name, facts(name)):
+        found.add(text_digest(lambda table, again=again: again if table == name else facts(table)))
+        count += 1
+    assert len(found) == count >= 5
+
+
+def test_nothing_else_has_a_part_in_it() -> None:
+    asked: list[str] = []
+
+    def table(name: str) -> Any:
+        asked.append(name)
+        return facts(name)
+
+    assert text_digest(table) == text_digest()
+    assert asked == [*TABLES]
+
+
+def test_pages_and_verb_cite_by_it(
+    built_site: dict[str, bytes], capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = f"text {text_digest()}"
+    assert told in built_site["listing/index.html"].decode()
+    for program in ("two-term", "four-term", "runge-kutta"):
+        page = built_site[f"listing/{program}.html"].decode()
+        assert set(re.findall(r"text [0-9a-f]{12}\b", page)) == {told}
+    assert main(["cards", "--classes"]) == 0
+    assert told in capsys.readouterr().out

@@ -1,6 +1,9 @@
 """Sweep files of the tests."""
 
+import time
 from pathlib import Path
+
+from pyharness.ensembles.sweep import Arrays, Sweep, solve_chunk
 
 BASE = """
 [scene.body]
@@ -58,3 +61,9 @@ def files(store: Path) -> dict[str, bytes]:
     """Return the content of every file of a store, by its path in it."""
     found = (each for each in store.rglob("*") if each.is_file())
     return {str(each.relative_to(store)): each.read_bytes() for each in found}
+
+
+def quick_and_slow(sweep: Sweep, chunk: int) -> Arrays:
+    """Compute the first chunk at once, and all others after an hour."""
+    time.sleep(3600.0 if chunk else 0.0)
+    return solve_chunk(sweep, chunk)

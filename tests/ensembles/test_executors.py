@@ -1,10 +1,12 @@
 """Executors: the same bytes from each, and from those whose workers die."""
 
+import multiprocessing
 import os
 import signal
 import socket
 import time
 from collections.abc import Iterator
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep import Sweep, solve_chunk
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
-from tests.ensembles.sweeps import PROGRAM, files, written
+from tests.ensembles.sweeps import PROGRAM, files, quick_and_slow, written
 
 distributed = pytest.importorskip("distributed")
 
@@ -80,8 +82,6 @@ def test_processes_are_started_once(sweep: Sweep, monkeypatch: pytest.MonkeyPatc
 
 
 def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:
-    import multiprocessing
-
     found = {}
     with engine("processes", 2) as own:
         results = own.computed(sweep, list(range(sweep.n_chunks)))
@@ -96,6 +96,52 @@ def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:
     for chunk, arrays in found.items():
         for name, values in solve_chunk(sweep, chunk).items():
             assert values.tobytes() == arrays[name].tobytes()
+
+
+def test_chunks_whose_processes_die_are_tried_three_times(
+    sweep: Sweep, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three deaths in a row end it; a chunk in between shows that there is memory enough."""
+    started: list[int] = []
+    done = iter([1, 0, 2, 0, 0])
+
+    def dying(sweep: Sweep, chunks: list[int], workers: int) -> Any:
+        started.append(len(chunks))
+        # After so many deaths it would go on for ever; then all are done.
+        yield from ((chunk, {}) for chunk in chunks[: next(done, len(chunks))])
+        if chunks:
+            raise BrokenProcessPool
+
+    monkeypatch.setattr(executors, "_by_pool", dying)
+    found = []
+    with (
+        pytest.raises(InputError, match="a process died 3 times; is there enough memory"),
+        engine("processes", 2) as own,
+    ):
+        for chunk, _ in own.computed(sweep, [0, 1, 2, 3]):
+            found.append(chunk)
+    assert found == [0, 1, 2]
+    # One chunk and a death, a second death; two chunks and a first death again, and two more.
+    assert started == [4, 3, 3, 1, 1]
+
+
+def test_a_chunk_at_work_does_not_outlive_its_sweep(
+    sweep: Sweep, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(executors, "solve_chunk", quick_and_slow)
+    before = set(multiprocessing.active_children())
+    with engine("processes", 2) as own:
+        results: Any = own.computed(sweep, [0, 1, 2])
+        assert next(results)[0] == 0
+        workers = set(multiprocessing.active_children()) - before
+        results.close()
+    assert len(workers) == 2
+    ended = []
+    for worker in workers:
+        worker.join(10.0)
+        ended.append(worker.exitcode is not None)
+        worker.kill()
+    assert all(ended)
 
 
 def test_address_where_nobody_answers_is_refused_soon(sweep: Sweep, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Reductions: each against the motion itself, solved one scene at a time."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from pyharness.ensembles.solved import many_rows
 from pyharness.ensembles.sweep import Sweep, points, solve_chunk
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
 from tests.ensembles.claims import CLAIMS
 from tests.ensembles.sweeps import PROGRAM, TILT, text, written
@@ -200,3 +201,32 @@ def test_every_reduction_has_words_for_people() -> None:
         assert reduction.title
         assert reduction.units
         assert bool(reduction.labels) == bool(reduction.dimension)
+
+
+def test_error_is_relative_to_the_largest_component_up_to_there(tmp_path: Path) -> None:
+    """From rest a torque makes omega, so that the start alone would be no scale."""
+    scene = _COARSE.replace("[0.0, 1.0, 0.0]", "[0.0, 1e-3, 0.0]").replace(
+        "[scene.run]", "[scene.torque]\nconstant = [0.1, -0.2, 0.3]\n[scene.run]"
+    )
+    top = 'reductions = ["end", {name = "error", samples = 4, as = "on-the-way"}]'
+    axis = '[[axis]]\nfield = "method"\nvalues = ["improved-euler"]'
+    _, found = _found(tmp_path, text(axis, top=top, scene=scene))
+    torque = TorqueLaw((0.1, -0.2, 0.3))
+    body = Scene("", (0.0, 1e-3, 0.0), moments=(1, 2, 3), torque=torque, step_size=0.2, steps=50)
+    times = [2.5, 5.0, 7.5, 10.0]
+    rows = solve(body, times, "improved-euler", 1.0).omega
+    truth = solve(body, times, "reference", 1e-12).omega
+    assert np.abs(truth).max() > 100.0 * 1e-3
+    wanted = np.abs(rows - truth).max() / np.abs(truth).max()
+    assert found["on-the-way"][0] == pytest.approx(wanted, rel=0.2)
+
+
+def test_what_is_no_number_is_no_flip() -> None:
+    """A component that changes its sign twice, and leaves the range of numbers below 0."""
+    middle = np.array([-1.0, 1.0, -1.0, np.nan, np.nan])
+    rows = np.stack([middle * 0.0, middle, middle * 0.0], axis=1)[None, :, :]
+    solved = SimpleNamespace(
+        omega0=rows[:, 0], rows=lambda samples: rows[:, 1 : 1 + samples],
+        load=SimpleNamespace(bodies=np.array([[1.0, 2.0, 3.0]])),
+    )  # fmt: skip
+    assert REDUCTIONS["flips"].compute(solved, {"samples": 4}).tolist() == [2]  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ import errno
 import os
 import subprocess
 import sys
+import tracemalloc
 import warnings
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.store import opened
+from pyharness.ensembles.sweep import solve_chunk
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from tests.ensembles.killed import kill_and_resume
@@ -157,6 +159,39 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     with pytest.raises(InputError, match="of memory at once"):
         run_sweep(small, str(tmp_path / "store"))
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
+
+
+def test_memory_is_refused_where_the_half_of_it_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = read_sweep(written(tmp_path, text(TILT)))
+    estimate = run_sweep(sweep, str(tmp_path / "store")).estimate
+    assert estimate is not None
+    # Pages of one byte: the half of the memory, and two bytes less.
+    for number, refused in ((2 * estimate.memory, False), (2 * estimate.memory - 2, True)):
+        sizes = {"SC_PHYS_PAGES": number, "SC_PAGE_SIZE": 1}
+        monkeypatch.setattr(os, "sysconf", sizes.__getitem__)
+        if refused:
+            with pytest.raises(InputError, match="of memory at once"):
+                run_sweep(sweep, str(tmp_path / "refused"))
+        else:
+            run_sweep(sweep, str(tmp_path / "kept"))
+
+
+@pytest.mark.parametrize("samples", [1, 40])
+def test_memory_of_the_estimate_is_what_a_chunk_takes(samples: int, tmp_path: Path) -> None:
+    top = f'chunk = 20000\nreductions = ["end", "status", {{name = "flips", samples = {samples}}}]'
+    axis = '[[axis]]\nfield = "tilt"\nfrom = 0.1\nto = 1.0\ncount = 20000'
+    sweep = read_sweep(written(tmp_path, text(axis, top=top)))
+    estimate = run_sweep(sweep, str(tmp_path / "store")).estimate
+    assert estimate is not None
+    tracemalloc.start()
+    try:
+        solve_chunk(sweep, 0)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak <= estimate.memory <= 8 * peak
 
 
 def test_what_is_not_computed_yet_is_no_number(tmp_path: Path) -> None:

@@ -223,3 +223,11 @@ def test_drawn_value_never_leaves_the_ends_of_its_axis() -> None:
         "to = 1.7976931348623157e308\ncount = 9\nseed = 1"
     )
     assert set(axis_of(tomllib.loads(table), 1).coordinates().tolist()) == {1.7976931348623157e308}
+
+
+def test_two_axes_of_one_seed_have_numbers_of_their_own() -> None:
+    table = {"draw": "uniform", "from": 0.0, "to": 1.0, "count": 2000, "seed": 3}
+    first, second = (
+        axis_of({**table, "field": f"omega.{axis}"}, 1).coordinates() for axis in (1, 2)
+    )
+    assert abs(np.corrcoef(first, second)[0, 1]) < 0.1

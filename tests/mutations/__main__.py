@@ -1,141 +1,179 @@
-"""`make mutate`: put one fault at a time into a copy of the checkout, and see what catches it.
+"""`make mutate`: change one line at a time in a copy of the checkout, and see what catches it.
 
-Nothing in the checkout is changed but the record, and that only by --update. 0 where every row is
-caught, or has a reason why it is not.
+Exit status 0 if enough of the mutations were caught, 1 if not, 2 for wrong usage, 130 if interrupted.
 """
 
 import argparse
+import json
 import signal
 import sys
-import tempfile
 import time
-import zlib
-from collections import deque
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 
-from tests.mutations.table import Row, chosen, page, rows, update
-from tests.mutations.tree import Processes, Stopped, Tree
-from tests.mutations.trial import Verdict, attempt, false_killers
+from tests.mutations.ci import run_planted
+from tests.mutations.reach import reach
+from tests.mutations.sample import Mutation, draw, equivalent, stale
+from tests.mutations.tree import PLACE, Processes, Stopped, Tree
+from tests.mutations.trial import Verdict, attempt
 
-# Two of each language, from rooms far apart, that one short test each catches.
-CI = (
-    "fortran/modern/taylor_series/rescaled-sum",
-    "fortran/original/runge_kutta/second-stage-base",
-    "pyharness/compare/agreement/tolerance-sense",
-    "pyharness/model/scene_file/inertia-order",
-)
-FEW = 4
+ENOUGH = 0.85
+COUNTED = ("caught", "lives", "equivalent", "same binary")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Try the rows asked for, and say what became of each."""
+    """Try a sample of mutations and report what became of each."""
     options = _options(arguments)
-    table = rows()
-    asked = [row for row in table if row.id in CI] if options.ci else chosen(table, options.rows)
-    if not options.ci and not options.rows and options.survivors == "skip":
-        asked = [row for row in asked if row.lives is None]
-    if not asked:
-        print(f"{' '.join(options.rows)}: no such row", file=sys.stderr)
-        return 2
-    if options.page:
-        print(page(table), end="")
-        return 0
-    begin = time.perf_counter()
     processes = Processes()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    if options.ci:
+        return run_planted(processes)
+    if entries := stale(equivalent()):
+        print("\n".join(["equivalent.toml names no change that there is:", *entries]), file=sys.stderr)
+        return 2
+    begin = time.perf_counter()
     try:
-        with tempfile.TemporaryDirectory(prefix="mutations-") as folder:
-            verdicts = _all(asked, options, Path(folder), processes)
-    except KeyboardInterrupt:
+        verdicts = _all(options, processes)
+    except (KeyboardInterrupt, Stopped):
         print("interrupted: the checkout is as it was", file=sys.stderr)
         return 130
-    return _score(verdicts, time.perf_counter() - begin)
+    print(table(verdicts))
+    score = caught_share(verdicts)
+    print(f"score {100.0 * score:.1f} %; {(time.perf_counter() - begin) / 60.0:.0f} min")
+    return 0 if score >= ENOUGH else 1
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.mutations", description=__doc__)
-    parser.add_argument("rows", nargs="*", help="parts of names, * for anything (default: all)")
-    parser.add_argument("--jobs", type=int, default=2, help="side by side (default 2)")
-    parser.add_argument(
-        "--survivors", choices=("skip", "near", "all"), default="near",
-        help="what rows with a reason to live are tried with (default: the tests near to them)",
-    )  # fmt: skip
-    parser.add_argument("--all-checks", action="store_true", help="forget what caught them before")
-    parser.add_argument("--update", action="store_true", help="write down what caught each")
-    parser.add_argument("--page", action="store_true", help="show the score of the record and end")
-    parser.add_argument("--ci", action="store_true", help="four rows, for the gate")
+    parser.add_argument("--sample", type=int, default=300, help="how many (default: 300)")
+    parser.add_argument("--seed", default="1", help="of the draw (default: 1)")
+    parser.add_argument("--jobs", type=int, default=2, help="how many at a time (default: 2)")
+    parser.add_argument("--only", default="", help="files with this in their names alone")
+    parser.add_argument("--again", action="store_true", help="try those that lived, or all anew")
+    parser.add_argument("--ci", action="store_true", help="four planted faults alone, for the gate")
     return parser.parse_args(arguments)
 
 
-def _all(
-    asked: list[Row], options: argparse.Namespace, folder: Path, processes: Processes
-) -> list[Verdict]:
-    """Try them, some side by side; one job begins with what is compiled, the next with the rest."""
-    if options.all_checks:
-        asked = [replace(row, killer=None) for row in asked]
-    # In an order that has nothing to do with the outcome: those tried first are a fair sample.
-    queue = deque(sorted(asked, key=lambda row: (not row.compiled, zlib.crc32(row.id.encode()))))
-    known = [row.killer for row in asked if row.killer]
-    unchanged = Tree(folder / "unchanged", processes)
+def _all(options: argparse.Namespace, processes: Processes) -> list[Verdict]:
+    """Try the sample; verdicts of the same draw that are on record are taken from there."""
+    checks = reach(processes, options.jobs)
+    known = equivalent()
+    record = Record(PLACE / f"seed-{options.seed}.json", options.again)
+    unchanged = Tree("unchanged", processes)
+    drawn = (each for each in draw(options.seed) if options.only in each.file)
     lock = Lock()
     verdicts: list[Verdict] = []
 
+    def next_one() -> Mutation | None:
+        # A draw that does not count is replaced: so many begin as are still missing.
+        with lock:
+            counted = sum(each.outcome in COUNTED for each in verdicts) + len(running)
+            if counted >= options.sample:
+                return None
+            mutation = next(drawn)
+            running.add(mutation.file + mutation.id)
+            return mutation
+
+    running: set[str] = set()
+
     def work(job: int) -> None:
-        tree = Tree(folder / str(job), processes)
-        if job == 0 and (false := false_killers(unchanged, known)):
-            raise SystemExit(f"fails though nothing is changed: {', '.join(false)}")
-        while True:
-            with lock:
-                # For the last few a build of its own does not pay.
-                if not queue or (job and queue[-1].compiled and len(queue) <= FEW):
-                    return
-                row = queue.popleft() if job % 2 == 0 else queue.pop()
+        tree = Tree(f"changed-{job}", processes)
+        while (mutation := next_one()) is not None:
             begin = time.perf_counter()
-            killer = attempt(tree, unchanged, row, options.survivors if row.lives else "all")
-            verdict = Verdict(row, killer, time.perf_counter() - begin)
+            if (mutation.file, mutation.id) in known:
+                found = Verdict(mutation, "equivalent", known[mutation.file, mutation.id])
+            else:
+                found = record.of(mutation) or attempt(mutation, tree, unchanged, checks)
+            if not found.seconds:
+                seconds = round(time.perf_counter() - begin, 1)
+                found = Verdict(mutation, found.outcome, found.by, seconds)
             with lock:
-                verdicts.append(verdict)
-                _say(verdict)
-                if options.update:
-                    update({row.id: killer})
+                running.discard(mutation.file + mutation.id)
+                verdicts.append(found)
+                record.write(verdicts)
+                print(_line(found, len(verdicts)), flush=True)
 
     with ThreadPoolExecutor(options.jobs) as pool:
-        jobs = [pool.submit(work, job) for job in range(min(options.jobs, len(queue)))]
+        jobs = [pool.submit(work, job) for job in range(options.jobs)]
         try:
             for each in jobs:
                 each.result()
-        except BaseException as stop:
+        except BaseException:
             processes.end()
-            queue.clear()
-            if isinstance(stop, Stopped):
-                raise KeyboardInterrupt from stop
             raise
     return verdicts
 
 
-def _say(verdict: Verdict) -> None:
-    row = verdict.row
-    if verdict.killer:
-        what = f"caught  {verdict.seconds:6.1f} s  {row.id}: {verdict.killer}"
-        what += "  (it had a reason to live)" if row.lives else ""
-    else:
-        what = f"LIVES   {verdict.seconds:6.1f} s  {row.id}: {row.lives or 'and should not'}"
-    print(what, flush=True)
+class Record:
+    """The verdicts of a seed, in a file: an interrupted run continues where it was."""
+
+    def __init__(self, path: Path, again: bool) -> None:
+        self._path = path
+        rows = json.loads(path.read_text())["mutations"] if path.exists() else []
+        kept = [row for row in rows if not again or row["outcome"] not in ("lives", "equivalent")]
+        self._rows = {(row["file"], row["id"]): row for row in kept}
+
+    def of(self, mutation: Mutation) -> Verdict | None:
+        """Return the verdict on record."""
+        row = self._rows.get((mutation.file, mutation.id))
+        # What was equivalent by the list and is there no more is tried.
+        if row is None or row["outcome"] == "equivalent":
+            return None
+        return Verdict(mutation, row["outcome"], row["by"], row["seconds"])
+
+    def write(self, verdicts: list[Verdict]) -> None:
+        """Write these."""
+        rows = dict(self._rows)
+        for each in verdicts:
+            mutation = each.mutation
+            rows[mutation.file, mutation.id] = {
+                "file": mutation.file, "id": mutation.id, "line": mutation.line,
+                "language": mutation.language, "operator": mutation.operator,
+                "outcome": each.outcome, "by": each.by, "seconds": each.seconds,
+                "diff": mutation.diff(),
+            }  # fmt: skip
+        self._path.write_text(json.dumps({"schema": 1, "mutations": list(rows.values())}, indent=1))
 
 
-def _score(verdicts: list[Verdict], seconds: float) -> int:
-    caught = sum(v.killer is not None for v in verdicts)
-    alive = [v.row.id for v in verdicts if v.killer is None and v.row.lives is None]
-    print(
-        f"{caught} of {len(verdicts)} caught ({100.0 * caught / max(1, len(verdicts)):.1f} %), "
-        f"{len(verdicts) - caught - len(alive)} live for a reason, {len(alive)} without; "
-        f"{seconds / 60.0:.1f} min"
-    )
-    return 1 if alive else 0
+def _line(verdict: Verdict, number: int) -> str:
+    mutation = verdict.mutation
+    said = f"{number:4} {verdict.outcome:18} {verdict.seconds:6.1f} s  {mutation.file}"
+    if verdict.outcome == "lives":
+        return f"{said}  {mutation.id}\n{mutation.diff()}"
+    return f"{said}:{mutation.line}  {mutation.operator}" + (f": {verdict.by}" if verdict.by else "")
+
+
+def caught_share(verdicts: Sequence[Verdict]) -> float:
+    """Return the share of the caught among those that change something."""
+    outcomes = Counter(each.outcome for each in verdicts)
+    return outcomes["caught"] / max(1, outcomes["caught"] + outcomes["lives"])
+
+
+def table(verdicts: Sequence[Verdict]) -> str:
+    """Return the outcomes by language and operator."""
+    heads = ("caught", "lives", "equivalent", "not counted", "s each")
+    lines = [f"{'':46}" + "".join(f"{head:>12}" for head in heads)]
+    for name, group in _groups(verdicts):
+        outcomes = Counter(each.outcome for each in group)
+        same = outcomes["equivalent"] + outcomes["same binary"]
+        rest = len(group) - same - outcomes["caught"] - outcomes["lives"]
+        numbers = [outcomes["caught"], outcomes["lives"], same, rest]
+        mean = sum(each.seconds for each in group) / len(group)
+        lines.append(f"{name:46}" + "".join(f"{n:12}" for n in numbers) + f"{mean:12.1f}")
+    return "\n".join(lines)
+
+
+def _groups(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, list[Verdict]]]:
+    if verdicts:
+        yield "all", list(verdicts)
+    for language in sorted({each.mutation.language for each in verdicts}):
+        of_language = [each for each in verdicts if each.mutation.language == language]
+        yield language, of_language
+        for operator in sorted({each.mutation.operator for each in of_language}):
+            yield f"  {operator}", [e for e in of_language if e.mutation.operator == operator]
 
 
 if __name__ == "__main__":

@@ -1,83 +1,173 @@
-"""The table of single changes: every row still applies, and nothing lives without a reason."""
+"""The tool that changes the sources: its operators, its draws, and the list of what is equivalent."""
 
-import tomllib
+from collections import Counter
+from itertools import islice
 from pathlib import Path
 
 import pytest
 
-from tests.mutations.__main__ import CI
-from tests.mutations.table import CAUGHT, REASONS, ROOT, Row, chosen, page, rows, update
-
-TABLE = rows()
-
-
-def test_every_row_applies() -> None:
-    """A changed source asks for a changed row: the message says which."""
-    stale = []
-    for row in TABLE:
-        try:
-            changed = row.applied((ROOT / row.file).read_text())
-        except ValueError as error:
-            stale.append(str(error))
-        else:
-            assert row.old != row.new, row.id
-            if row.file.endswith(".py"):
-                compile(changed, row.file, "exec")
-    assert not stale, "\n".join(["rows that no longer apply:", *stale])
+from tests.mutations import python_source, text_source
+from tests.mutations.__main__ import caught_share, table
+from tests.mutations.ci import PLANTED, find
+from tests.mutations.sample import (
+    Mutation,
+    draw,
+    equivalent,
+    files,
+    language_of,
+    lines_of_code,
+    mutations,
+    stale,
+)
+from tests.mutations.text_source import C, FORTRAN, JAVASCRIPT
+from tests.mutations.trial import Verdict
+from tests.mutations.tree import ROOT
 
 
-def test_what_lives_is_little_and_has_a_reason() -> None:
-    assert len({row.id for row in TABLE}) == len(TABLE) >= 220
-    for begin in ("fortran/", "pyharness/"):
-        assert sum(row.file.startswith(begin) for row in TABLE) >= 100
-    for row in TABLE:
-        assert (row.lives or row.killer) is not None, row.id
-        assert row.lives is None or row.lives.startswith(REASONS), row.id
-    faults = [row for row in TABLE if not row.is_equivalent]
-    assert sum(row.killer is not None for row in faults) >= 0.92 * len(faults)
+def _of_text(text: str, language: str) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for _, operator, changed in text_source.changes(text, language):
+        found.setdefault(operator, []).append(changed())
+    return found
 
 
-def test_score_of_the_page_is_that_of_the_record() -> None:
-    """`make mutate ARGS=--page` shows what belongs there."""
-    assert page(TABLE) in (ROOT / "docs" / "stability.md").read_text()
+@pytest.mark.parametrize(
+    ("language", "line", "operator", "wanted"),
+    [
+        (FORTRAN, "x = a - b", "sign", ["x = a + b"]),
+        (FORTRAN, "x = -a", "sign", ["x = a"]),
+        (FORTRAN, "x = a - b", "order of operands", ["x = b - a"]),
+        (FORTRAN, "x = s%a(i, 1)/b(2)", "order of operands", ["x = b(2)/s%a(i, 1)"]),
+        (FORTRAN, "x = a*b**c", "product", ["x = a/b**c"]),
+        (FORTRAN, "if (a < b) x = c", "bound", ["if (a <= b) x = c"]),
+        (FORTRAN, "if (a >= b) x = c", "bound", ["if (a > b) x = c"]),
+        (FORTRAN, "if (a /= b) x = c", "equality", ["if (a == b) x = c"]),
+        (FORTRAN, "if (a < b) x = c", "condition", ["if (.not. (a < b)) x = c"]),
+        (FORTRAN, "if (a < b) x = c", "dropped statement", ["continue"]),
+        (FORTRAN, "y = a .and. .not. b", "logical", ["y = a .or. .not. b", "y = a .and. b"]),
+        (FORTRAN, "x = 1e-3_dp*y", "constant", ["x = 0.01_dp*y"]),
+        (FORTRAN, "real(dp), parameter :: P = 2.0_dp", "constant", [
+            "real(dp), parameter :: P = 2.02_dp"
+        ]),
+        (FORTRAN, "x = y(3)", "constant", ["x = y(4)"]),
+        (FORTRAN, "x = max(y, z)", "min/max", ["x = min(y, z)"]),
+        (FORTRAN, "call f(a, b(1, 2), c)", "swapped arguments", [
+            "call f(b(1, 2), a, c)", "call f(a, c, b(1, 2))", "call f(a, b(2, 1), c)"
+        ]),
+        (FORTRAN, "do i = 1, n", "index", ["do i = 1, n - 1"]),
+        (FORTRAN, "x = y + &\n  z", "dropped statement", ["continue\n"]),
+        (C, "  if (!a && b != c) d = e - 1;", "logical", [
+            "  if (!a || b != c) d = e - 1;", "  if (a && b != c) d = e - 1;"
+        ]),
+        (C, "  f(a, b);", "dropped statement", ["  ;"]),
+        (JAVASCRIPT, "  if (a === b) return;", "equality", ["  if (a !== b) return;"]),
+        (JAVASCRIPT, "  x[i] = Math.floor(y);", "min/max", ["  x[i] = Math.ceil(y);"]),
+    ],
+)  # fmt: skip
+def test_operators_on_text(language: str, line: str, operator: str, wanted: list[str]) -> None:
+    assert sorted(_of_text(line, language)[operator]) == sorted(wanted)
 
 
-def test_record_names_rows_and_checks_that_there_are() -> None:
-    known = {row.id for row in TABLE}
-    for id, killer in tomllib.loads(CAUGHT.read_text()).items():
-        assert id in known, f"{id}: no such row"
-        path, _, name = killer.removeprefix("time-out ").partition("::")
-        if path.startswith("tests/"):
-            function = name.partition("[")[0].rpartition("::")[2]
-            assert f"def {function}(" in (ROOT / path).read_text(), f"{id}: {killer}"
-        else:
-            assert path == "build" or path.startswith("verify"), f"{id}: {killer}"
+@pytest.mark.parametrize(
+    ("language", "text"),
+    [
+        (FORTRAN, "  ! x = 1 - 2\n  use kinds, only : dp\n  real(dp), intent(in) :: x(3)"),
+        (FORTRAN, "  subroutine f(a, b)\n  end subroutine f\n#:if WORD == 3"),
+        (C, "/* x = 1 - 2; */\n// x = 1;\n#define N (3 - 1)"),
+        (JAVASCRIPT, "// x = 1 - 2;\nimport { a } from './b.js';"),
+    ],
+)
+def test_nothing_but_code_is_changed(language: str, text: str) -> None:
+    assert _of_text(text, language) == {}
 
 
-def test_rows_of_the_gate_are_of_both_languages_and_caught() -> None:
-    found = [row for row in TABLE if row.id in CI]
-    assert [row.compiled for row in found].count(True) == 2
-    assert len(found) == 4
-    assert all(row.killer for row in found)
+def _of_python(text: str) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for _, operator, changed in python_source.changes(text):
+        found.setdefault(operator, []).append(changed())
+    return found
 
 
-def test_row_that_stands_twice_or_never_is_refused() -> None:
-    row = Row("a/b", "a.py", "x = 1", "x = 2")
-    assert row.applied("x = 1\n") == "x = 2\n"
-    for text in ("x = 3\n", "x = 1\nx = 1\n"):
-        with pytest.raises(ValueError, match=r"a/b: 'x = 1' stands [02] times in a\.py"):
-            row.applied(text)
+def test_operators_on_python() -> None:
+    found = _of_python("if a < 2.0:\n    f(a - b, c)\n")
+    assert found["mutmut swap op"] == ["if a <= 2.0:\n    f(a - b, c)\n", "if a < 2.0:\n    f(a + b, c)\n"]
+    assert found["constant"] == ["if a < 2.02:\n    f(a - b, c)\n"]
+    assert found["condition"] == ["if not (a < 2.0):\n    f(a - b, c)\n"]
+    assert found["dropped statement"] == ["if a < 2.0:\n    pass\n"]
+    assert found["swapped arguments"] == ["if a < 2.0:\n    f(c, a - b)\n"]
+    assert found["order of operands"] == ["if a < 2.0:\n    f((b) - (a), c)\n"]
+    assert _of_python("x = np.argmin(y)\n")["min/max"] == ["x = np.argmax(y)\n"]
 
 
-def test_rows_are_chosen_by_parts_of_their_names() -> None:
-    assert chosen(TABLE, []) == TABLE
-    found = chosen(TABLE, ["modern/taylor/", "*/cli/main/"])
-    assert {row.file for row in found} == {"fortran/modern/taylor.f90", "pyharness/cli/main.py"}
+def test_what_is_for_readers_of_python_is_left_alone() -> None:
+    text = '"""Text - 1."""\nimport a\n\n# 1 - 2\nclass B:\n    c: int | None\n    """3 - 1"""\n'
+    assert _of_python(text) == {}
+    found = _of_python('raise InputError(f"{a - 1}: no such", "two words", b - 1)\n')
+    assert set(found) == {"dropped statement"}
 
 
-def test_record_is_kept_and_forgets_what_nothing_caught(tmp_path: Path) -> None:
-    path = tmp_path / "caught.toml"
-    test = 'tests/test_x.py::test[a-"b"\\]'
-    update({"a/b": test, "a/c": "build"}, path)
-    update({"a/c": None, "a/d": "verify cells"}, path)
-    assert tomllib.loads(path.read_text()) == {"a/b": test, "a/d": "verify cells"}
+def _drawn(seed: str, n: int) -> list[Mutation]:
+    return list(islice(draw(seed), n))
+
+
+def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
+    first = [(each.file, each.id) for each in _drawn("a", 12)]
+    assert first == [(each.file, each.id) for each in _drawn("a", 12)]
+    assert first != [(each.file, each.id) for each in _drawn("b", 12)]
+    assert len(set(first)) == 12
+
+
+def test_every_language_has_its_share() -> None:
+    lines: Counter[str] = Counter()
+    for file in files():
+        lines[language_of(file)] += lines_of_code(file)
+    assert set(lines) == {"Python", FORTRAN, C, JAVASCRIPT}
+    assert lines["Python"] > lines[FORTRAN] > lines[C]
+    core = {"pyharness/methods/gauss.py", "pyharness/ensembles/store.py", "web/port.js",
+            "pyharness/original/word.py", "fortran/modern/taylor.f90"}  # fmt: skip
+    assert core <= set(files())
+    assert not any("report" in file or "picture" in file for file in files())
+
+
+def test_names_are_unique_and_the_change_is_one() -> None:
+    for file in ("pyharness/methods/gauss.py", "fortran/modern/sphere.f90"):
+        found = mutations(file)
+        assert len({each.id for each in found}) == len(found)
+        for each in found[::50]:
+            assert each.changed() != (ROOT / file).read_text()
+            assert each.diff().startswith(f"@@ -{each.line}")
+
+
+def test_the_function_around_a_mutation_is_known() -> None:
+    for (file, id, _), wanted in zip(PLANTED, ("leqt1f", "", "", ""), strict=True):
+        assert find(file, id).function() == wanted
+
+
+def test_planted_mutations_and_their_tests_are_there() -> None:
+    """The four of `--ci`; a changed line asks for another, with a short test that catches it."""
+    for file, id, test in PLANTED:
+        assert find(file, id).id == id
+        path, _, name = test.partition("::")
+        assert f"def {name}(" in (ROOT / path).read_text()
+
+
+def test_equivalent_ones_are_argued_and_still_there() -> None:
+    known = equivalent()
+    assert stale(known) == []
+    assert all(len(why.split()) >= 4 for why in known.values())
+
+
+def test_a_stale_entry_is_reported(tmp_path: Path) -> None:
+    path = tmp_path / "equivalent.toml"
+    path.write_text('["pyharness/methods/gauss.py"]\n"sign 1: no = such" = "a reason of four words"\n')
+    assert stale(equivalent(path)) == ["pyharness/methods/gauss.py: sign 1: no = such"]
+    path.write_text('["no/such.py"]\n"sign 1: x" = "a reason of four words"\n')
+    assert stale(equivalent(path)) == ["no/such.py: sign 1: x"]
+
+
+def test_score_leaves_out_what_is_equivalent_or_does_not_count() -> None:
+    one = find(*PLANTED[2][:2])
+    outcomes = ["caught"] * 3 + ["lives", "equivalent", "same binary", "does not compile"]
+    verdicts = [Verdict(one, outcome, None, 2.0) for outcome in outcomes]
+    assert caught_share(verdicts) == 0.75
+    assert table(verdicts).splitlines()[1].split() == ["all", "3", "1", "2", "1", "2.0"]

@@ -1,6 +1,7 @@
 """A copy of the checkout that may be changed: its files, its build, and the runs in it."""
 
 import contextlib
+import hashlib
 import os
 import resource
 import shutil
@@ -10,11 +11,8 @@ import sys
 from pathlib import Path
 from threading import Lock
 
-from tests.mutations.table import ROOT, Row
-
-LEFT_OUT = shutil.ignore_patterns(
-    ".git", ".venv", "build", "dist", "__pycache__", ".*_cache", ".hypothesis", "*.so"
-)
+ROOT = Path(__file__).parent.parent.parent
+PLACE = ROOT / "build" / "mutations"
 MEMORY = 12 << 30  # bytes; a loop that gathers for ever must not take the machine along
 
 
@@ -53,6 +51,8 @@ class Processes:
         finally:
             with self._lock:
                 self._running.discard(process)
+            # What a test left behind goes with it.
+            _kill(process)
         if self._ended:
             raise Stopped
         return code, said
@@ -71,81 +71,87 @@ def _kill(process: subprocess.Popen[str]) -> None:
 
 
 class Tree:
-    """A copy of the checkout.
+    """A copy of the checkout in `build/`, brought up to date whenever it is opened.
 
     Python finds the package in it, not the editable one; the compiled extension lies in it.
     """
 
-    def __init__(self, folder: Path, processes: Processes) -> None:
-        self.folder = folder
+    def __init__(self, name: str, processes: Processes, *options: str) -> None:
+        self.folder = PLACE / name
         self._processes = processes
-        self._build = folder / "build" / "mutated"
-        self._stale = False
-        shutil.copytree(ROOT, folder, ignore=LEFT_OUT, symlinks=True)
-        from pyharness import _build, _kernels, _many, _solver
-
-        for module in (_build, _kernels, _many, _solver):
-            shutil.copy(str(module.__file__), folder / "pyharness")
-        # A limit on memory for whatever is run, and the threads of two jobs don't pay.
+        self._build = self.folder / "build" / "mutated"
+        self._options = options
+        self.is_stale = True  # what is compiled is not of the sources
+        # A limit on memory for whatever is run: a loop that gathers for ever must end.
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
         editable = [f._build_path for f in sys.meta_path if hasattr(f, "_build_path")]
         self._environment = {
             **os.environ,
             "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
-            "PYTHONPATH": str(folder),
+            "PYTHONPATH": str(self.folder),
             "MESONPY_EDITABLE_SKIP": os.pathsep.join(editable),
             "COLUMNS": "300",
             # What was said before a crash is not lost.
             "PYTHONUNBUFFERED": "1",
         }
-
-    def run(self, command: list[str], limit: float) -> tuple[int | None, str]:
-        """Run a command in the copy."""
-        return self._processes.run(command, self.folder, self._environment, limit)
-
-    def change(self, row: Row) -> str | None:
-        """Make the change; return what the compiler said where it does not take it."""
-        path = self.folder / row.file
-        path.write_text(row.applied(path.read_text()))
-        if row.compiled:
-            self._stale = True
-            return self._compile()
-        self._forget(row)
-        self.ready()
-        return None
-
-    def restore(self, row: Row) -> None:
-        """Take the change back; what is compiled is built when it is next asked for."""
-        shutil.copyfile(ROOT / row.file, self.folder / row.file)
-        if row.compiled:
-            self._stale = True
-        else:
-            self._forget(row)
-
-    def ready(self) -> None:
-        """Build what was taken back."""
-        if self._stale and (said := self._compile()):
+        self._synchronise()
+        if said := self.compile():
             raise RuntimeError(said)
-        self._stale = False
 
-    def _forget(self, row: Row) -> None:
+    def run(
+        self, command: list[str], limit: float, more: dict[str, str] | None = None
+    ) -> tuple[int | None, str]:
+        """Run a command in the copy, with `more` in its environment."""
+        return self._processes.run(command, self.folder, {**self._environment, **(more or {})}, limit)
+
+    def write(self, file: str, text: str) -> None:
+        """Put another text into a file."""
+        path = self.folder / file
+        path.write_text(text)
+        self.is_stale |= file.startswith("fortran/")
         # Two texts of one length within a second look the same to Python.
-        path = self.folder / row.file
         for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*"):
             compiled.unlink()
 
-    def _compile(self) -> str | None:
+    def compile(self) -> str | None:
+        """Build what changed; return what the compiler said where it does not take it."""
         if not (self._build / "build.ninja").exists():
-            setup = ["meson", "setup", str(self._build), "-Doptimization=2"]
+            # Little optimisation: no result depends on it, and a build takes half the time.
+            setup = ["meson", "setup", str(self._build), "-Doptimization=1", *self._options]
             code, said = self.run(setup, 600)
             if code != 0:
                 raise RuntimeError(said)
-        code, said = self.run(["ninja", "-C", str(self._build)], 600)
+        code, said = self.run(["ninja", "-C", str(self._build)], 900)
         if code != 0:
             return said
-        for path in self._build.glob("_*.so"):
-            # Not over a file that may be mapped.
+        for path in [*self._build.glob("_*.so"), self._build / "_build.py"]:
             place = self.folder / "pyharness" / path.name
-            place.unlink(missing_ok=True)
-            shutil.copy(path, place)
+            if not place.exists() or path.read_bytes() != place.read_bytes():
+                # Not over a file that may be mapped.
+                place.unlink(missing_ok=True)
+                shutil.copy(path, place)
+        self.is_stale = False
         return None
+
+    def binary(self) -> str:
+        """Return a digest of what is compiled."""
+        paths = sorted((self.folder / "pyharness").glob("_*.so"))
+        return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
+
+    def _synchronise(self) -> None:
+        listed = subprocess.run(
+            ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+            cwd=ROOT, capture_output=True, text=True, check=True,
+        ).stdout.splitlines()  # fmt: skip
+        wanted = {Path(name) for name in listed if (ROOT / name).is_file()}
+        for name in wanted:
+            here, place = ROOT / name, self.folder / name
+            if not place.exists() or here.read_bytes() != place.read_bytes():
+                place.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(here, place)
+        kept = {"build", ".hypothesis", "__pycache__"}
+        for place in list(self.folder.rglob("*")):
+            name = place.relative_to(self.folder)
+            if kept.isdisjoint(name.parts) and place.is_file() and name not in wanted:
+                if name.suffix != ".so" and name.name != "_build.py":
+                    place.unlink()

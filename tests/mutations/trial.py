@@ -1,152 +1,155 @@
-"""One row on trial: the check that caught it before, those near to it, then everything."""
+"""One mutation on trial: the tests that enter its function, nearest first, then `verify`."""
 
-import json
 import re
 import sys
-import tomllib
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import PurePosixPath
-from typing import NamedTuple
 
-from tests.mutations.table import FOLDER, ROOT, Row
-from tests.mutations.tree import Tree
+from tests.mutations.reach import Check, command_of, files_of_tests, pytest_command
+from tests.mutations.sample import Mutation
+from tests.mutations.tree import ROOT, Tree
 
-# Random draws of `verify` follow a seed; the week's would give another score each week.
-SEED = "mutations"
-# Not these: they look whether the text still stands, or plant faults in the text themselves; and
-# a browser asks for more address space than a trial has.
-NOT_HERE = ("tests/mutations/test_mutations.py", "tests/browser")
-OF_ONE_CHECK = 180.0  # s
-OF_ALL = 2400.0  # s
-NEAR: dict[str, list[str]] = tomllib.loads((FOLDER / "near.toml").read_text())
-# What `verify` sees of these sooner than the whole suite would.
-SEEN_BY_VERIFY = "random,methods,prepared"
-JUDGES = (
-    "fortran/modern/", "pyharness/verify/", "pyharness/methods/", "pyharness/truth/reference",
-    "pyharness/theory/conditioning", "pyharness/compare/random_scenes",
-)  # fmt: skip
+# Tests of the first tier may take this long together, as recorded; of the second and of `verify`
+# too. What would take longer is not tried, and a mutation that only that would catch lives.
+FIRST, SECOND = 60.0, 600.0  # s
+# Tests that were seen to pass without a mutation, since the run began.
+_PASS: set[str] = set()
+# A trial may take so many times longer than what it runs took when it was recorded.
+SLOWER, START = 6.0, 60.0  # s
 
 
-class Verdict(NamedTuple):
-    """What became of a row: what caught it, None where it lives."""
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a mutation: `outcome` is caught, lives, or why it does not count."""
 
-    row: Row
-    killer: str | None
-    seconds: float
-
-
-def near(row: Row) -> list[str]:
-    """Return the test files that are most likely to catch a change."""
-    for begin, names in NEAR.items():
-        if row.file.startswith(begin):
-            rooms = [name.rpartition("/") for name in names]
-            paths = [f"tests/{room}/test_{name}.py" for room, _, name in rooms]
-            return [path for path in paths if (ROOT / path).exists()]
-    module = ".".join(PurePosixPath(row.file).with_suffix("").parts)
-    package, _, name = module.rpartition(".")
-    uses = re.compile(rf"\b(from|import) {re.escape(module)}\b|from {re.escape(package)} import"
-                      rf" [^\n]*\b{name}\b|tests\.test_{name}\b")  # fmt: skip
-    own = {f"test_{name}", f"test_{package.rpartition('.')[2]}"}
-    found = [path for path in sorted((ROOT / "tests").rglob("test_*.py"))
-             if path.stem in own or uses.search(path.read_text())]  # fmt: skip
-    found.sort(key=lambda path: path.stem not in own)
-    paths = [str(path.relative_to(ROOT)) for path in found]
-    return [path for path in paths if path not in NOT_HERE]
+    mutation: Mutation
+    outcome: str
+    by: str | None
+    seconds: float = 0.0
 
 
-def failing(tree: Tree, names: list[str], limit: float) -> str | None:
-    """Run tests until one fails; return its name, or None."""
-    ignored = [f"--ignore={path}" for path in NOT_HERE]
-    endless = ["-o", f"faulthandler_timeout={OF_ONE_CHECK}",
-               "-o", "faulthandler_exit_on_timeout=true"]  # fmt: skip
-    command = [sys.executable, "-m", "pytest", "-v", "-x", "--no-header", "--tb=no", "-p",
-               "no:cacheprovider", *endless, *ignored, *names]  # fmt: skip
-    code, said = tree.run(command, limit)
-    if code == 0:
-        return None
-    late = code is None or "Timeout (" in said
-    if late or (code is not None and code < 0):
-        begun = re.findall(r"^(tests/\S+::.*?)(?: (?:PASSED|SKIPPED|XFAIL).*)?$", said, re.M)
-        last = re.split(r" (?=Fatal|Timeout|$)", begun[-1])[0].strip() if begun else "tests"
-        return f"time-out {last}" if late else last
-    failed = re.search(r"^(?:FAILED|ERROR) (tests/\S.*?)(?: - .*)?$", said, re.M)
-    if failed:
-        return failed[1].strip()
-    # A name that is no more; or, where none was given, nothing at all could be collected.
-    return None if names and code in (4, 5) else "tests"
+class NotCollected(Exception):
+    """No test began: the mutation may be one that cannot be imported."""
 
 
-def verification(tree: Tree, name: str | None = None, limit: float = OF_ALL) -> str | None:
-    """Run `verify`, one check or all; return the first that failed, or None."""
-    command = [sys.executable, "-m", "pyharness", "verify", "--format", "json"]
-    if name:
-        command += ["--only", name]
-    if not name or "random" in name:
-        command += ["--seed", SEED]
-    code, said = tree.run(command, limit)
-    if code == 0:
-        return None
-    if code is None:
-        return f"time-out verify {name or ''}".strip()
+def attempt(mutation: Mutation, tree: Tree, unchanged: Tree, checks: list[Check]) -> Verdict:
+    """Put a mutation into the tree and try what may catch it; the tree is as before after it."""
     try:
-        found = json.loads(said[said.index("{") :])["checks"]
-        first: str = next(each["id"] for each in found if not each["passed"])
-        return f"verify {first}"
-    except (ValueError, KeyError, StopIteration):
-        # A name that is no more; or a fault that let nothing be said.
-        return None if name and code == 2 else f"verify {name or ''}".strip()
-
-
-def check(tree: Tree, killer: str) -> str | None:
-    """Run the check of that name; return its name where it fails."""
-    name = killer.removeprefix("time-out ")
-    kind, _, id = name.partition(" ")
-    # What never ended is given less time to.
-    limit = OF_ONE_CHECK / 3.0 if name != killer else OF_ONE_CHECK
-    if kind == "verify":
-        found = verification(tree, id or None, limit)
-    else:
-        found = failing(tree, [] if name == "tests" else [name], limit)
-    return killer if found else None
-
-
-def attempt(tree: Tree, unchanged: Tree, row: Row, reach: str) -> str | None:
-    """Return what catches a row; `reach` is "near" or "all".
-
-    What fails in a copy that is `unchanged` too says nothing.
-    """
-    said = tree.change(row)
-    try:
-        if said is not None:
-            return "build"
-        if row.killer and row.killer != "build" and (found := check(tree, row.killer)):
-            return found
-        steps: list[Callable[[], str | None]] = []
-        if names := near(row):
-            steps.append(lambda: failing(tree, names, OF_ALL))
-        if row.file.startswith(JUDGES):
-            steps.append(lambda: verification(tree, SEEN_BY_VERIFY))
-        if reach == "all":
-            steps += [lambda: failing(tree, [], OF_ALL), lambda: verification(tree)]
-        for step in steps:
-            if found := step():
-                if check(unchanged, found) is None:
-                    return found
-                print(f"{row.id}: {found} fails without the change too", file=sys.stderr)
-        return None
+        if why := put_in(mutation, tree):
+            return Verdict(mutation, why, None)
+        if mutation.is_compiled and tree.binary() == unchanged.binary():
+            return Verdict(mutation, "same binary", None)
+        for tier in _tiers(mutation, checks):
+            by = first_failure(tree, tier)
+            if by and (by.name in _PASS or not first_failure(unchanged, [by])):
+                _PASS.add(by.name)
+                return Verdict(mutation, "caught", by.name)
+        return Verdict(mutation, "lives", None)
+    except NotCollected:
+        return Verdict(mutation, *_import(mutation, tree))
     finally:
-        tree.restore(row)
+        take_out(mutation, tree)
 
 
-def false_killers(tree: Tree, killers: list[str]) -> list[str]:
-    """Return the checks that fail though nothing is changed."""
-    names = sorted({each.removeprefix("time-out ") for each in killers} - {"build", "tests"})
-    nodes = [each for each in names if not each.startswith("verify")]
-    ids = [each.partition(" ")[2] for each in names if each.startswith("verify ")]
-    found = []
-    while nodes and (failed := failing(tree, nodes, OF_ALL)):
-        found.append(failed)
-        nodes = [each for each in nodes if each != failed and not failed.startswith(f"{each}[")]
-    if ids and (failed := verification(tree, ",".join(ids))):
-        found.append(failed)
+def take_out(mutation: Mutation, tree: Tree) -> None:
+    """Put the file of the checkout back; it is built with the next mutation that is compiled."""
+    tree.write(mutation.file, (ROOT / mutation.file).read_text())
+
+
+def put_in(mutation: Mutation, tree: Tree) -> str | None:
+    """Write it and build; return why it does not count."""
+    text = mutation.changed()
+    if mutation.language == "Python":
+        try:
+            compile(text, mutation.file, "exec")
+        except SyntaxError:
+            return "does not compile"
+    tree.write(mutation.file, text)
+    if tree.is_stale and tree.compile() is not None:
+        return "does not compile"
+    return None
+
+
+def _import(mutation: Mutation, tree: Tree) -> tuple[str, str]:
+    """Return whether a mutation of which no test began can be imported at all."""
+    module = ".".join(PurePosixPath(mutation.file).with_suffix("").parts)
+    code, _ = tree.run([sys.executable, "-c", f"import pyharness, {module}"], START)
+    return ("caught", "collection") if code == 0 else ("cannot be imported", "import")
+
+
+def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
+    """Return the checks that enter the function around a mutation, or else use its file at all."""
+    function = mutation.function()
+    stem = PurePosixPath(mutation.file).stem
+    if mutation.language == "JavaScript":
+        return [each for each in checks if re.search("javascript|_port.py|laboratory", each.name)]
+    if mutation.language == "Python":
+        begin = f"{mutation.file}:"
+        entered = [each for each in checks if f"{begin}{function}" in each.functions]
+        if not entered:
+            entered = [e for e in checks if any(name.startswith(begin) for name in e.functions)]
+        mention = re.compile(rf"\b{stem}\b")
+    else:
+        found = re.search(r"^\s*module (\w+?)_?(?:\$|$)", (ROOT / mutation.file).read_text(), re.M)
+        module = found[1].lower() if found else ""
+        ends = {f"{module}:{function}", f":{function}"}
+        entered = [each for each in checks if not ends.isdisjoint(each.functions)]
+        if not entered and module:
+            begin = f"{module}:"
+            entered = [e for e in checks if any(name.startswith(begin) for name in e.functions)]
+        mention = re.compile(rf"\btest_{stem}\b")
+    named = {path for path in files_of_tests() if mention.search(path + (ROOT / path).read_text())}
+    chosen = {each.name for each in entered}
+    more = [e for e in checks if e.name.partition("::")[0] in named and e.name not in chosen]
+    # Those of its own name first, then the quickest.
+    own = f"/test_{stem}.py"
+    entered.sort(key=lambda each: (own not in each.name, each.seconds))
+    return [*entered, *sorted(more, key=lambda each: each.seconds)]
+
+
+def _tiers(mutation: Mutation, checks: list[Check]) -> list[list[Check]]:
+    """Return what to run first, and what then, if nothing failed."""
+    found = near(mutation, checks)
+    tests = [each for each in found if not each.name.startswith("verify")]
+    first = _within(tests, FIRST)
+    tried = {each.name for each in first}
+    # Again from the quickest, which are the most.
+    rest = sorted((each for each in tests if each.name not in tried), key=lambda e: e.seconds)
+    kinds = [each for each in found if each.name.startswith("verify")]
+    kinds.sort(key=lambda each: each.seconds)
+    return [first, _within(rest, SECOND), *([kind] for kind in kinds)]
+
+
+def _within(checks: list[Check], limit: float) -> list[Check]:
+    found, total = [], 0.0
+    for each in checks:
+        if total + each.seconds <= limit:
+            found.append(each)
+            total += each.seconds
     return found
+
+
+def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
+    """Run checks until one fails; return it."""
+    if not checks:
+        return None
+    limit = START + SLOWER * sum(each.seconds for each in checks)
+    if checks[0].name.startswith("verify "):
+        kind = checks[0].name.removeprefix("verify ")
+        code, _ = tree.run([sys.executable, "-m", "pyharness", *command_of(kind)], limit)
+        return checks[0] if code != 0 else None
+    names = tree.folder / "build" / "tests"
+    names.write_text("\n".join(each.name for each in checks))
+    code, said = tree.run([*pytest_command("-v"), "-x", f"@{names}"], limit)
+    if code == 0:
+        return None
+    by_name = {each.name: each for each in checks}
+    failed = re.findall(r"^(?:FAILED|ERROR) (tests/\S.*?)(?: - .*)?$", said, re.M)
+    if failed and failed[0] in by_name:
+        return by_name[failed[0]]
+    if failed or code in (2, 3, 4):
+        raise NotCollected
+    # It crashed, or never ended.
+    begun = re.findall(r"^(tests/\S+::.*?)(?: (?:PASSED|FAILED|ERROR|SKIPPED).*)?$", said, re.M)
+    last = next((by_name[name.strip()] for name in reversed(begun) if name.strip() in by_name), None)
+    return last or checks[0]

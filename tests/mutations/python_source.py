@@ -1,0 +1,117 @@
+"""Single changes to Python: mutmut's operators, and some of our own, on libcst's nodes."""
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import libcst as cst
+from libcst.metadata import MetadataWrapper, PositionProvider
+from mutmut.mutation.mutators import mutation_operators
+
+from tests.mutations.text_source import PAIRS, constant
+
+# One line of the source, the operator, and what returns the whole text with the change in it.
+Change = tuple[int, str, Callable[[], str]]
+# Nothing in these is changed: what only a type checker or a reader looks at, what is imported,
+# and the message of an error.
+_LEFT_ALONE = (
+    cst.Annotation, cst.Import, cst.ImportFrom, cst.Decorator, cst.FormattedString, cst.Raise,
+    cst.TypeAlias, cst.ConcatenatedString, cst.Assert,
+)  # fmt: skip
+# A text that is a key or a name may decide something; all others are for readers.
+_KEY = re.compile(r"[\"'][\w.-]+[\"']")
+_MESSAGE = re.compile(r"\w*(Error|Refused|warn|progress|Note)")
+
+
+def changes(text: str) -> Iterator[Change]:
+    """Return the changes of a file in its order."""
+    wrapper = MetadataWrapper(cst.parse_module(text), unsafe_skip_copy=True)
+    lines = wrapper.resolve(PositionProvider)
+
+    def replaced(old: cst.CSTNode, new: cst.CSTNode) -> Callable[[], str]:
+        return lambda: str(wrapper.module.deep_replace(old, new).code)
+
+    def visit(node: cst.CSTNode) -> Iterator[Change]:
+        for operator, new in _of_node(node):
+            yield lines[node].start.line, operator, replaced(node, new)
+        if not isinstance(node, _LEFT_ALONE) and not _is_for_readers(node):
+            for child in node.children:
+                yield from visit(child)
+
+    yield from sorted(visit(wrapper.module), key=lambda change: change[0])
+
+
+def _is_for_readers(node: cst.CSTNode) -> bool:
+    if isinstance(node, cst.Expr):
+        return isinstance(node.value, cst.BaseString)
+    if isinstance(node, cst.SimpleString):
+        return _KEY.fullmatch(node.value) is None
+    if isinstance(node, cst.If):
+        return isinstance(node.test, cst.Name) and node.test.value == "TYPE_CHECKING"
+    if isinstance(node, cst.Call):
+        name = node.func.attr if isinstance(node.func, cst.Attribute) else node.func
+        return isinstance(name, cst.Name) and _MESSAGE.fullmatch(name.value) is not None
+    return False
+
+
+def _of_node(node: cst.CSTNode) -> Iterator[tuple[str, cst.CSTNode]]:
+    if not isinstance(node, _LEFT_ALONE) and not _is_for_readers(node):
+        for kind, operator in mutation_operators:
+            if isinstance(node, kind):
+                name = operator.__name__.removeprefix("operator_").replace("_", " ")
+                yield from ((f"mutmut {name}", new) for new in operator(node))
+    for name, own in _OWN.items():
+        yield from ((name, new) for new in own(node))
+
+
+def _dropped(node: Any) -> Iterable[cst.CSTNode]:
+    """Drop a call, an update or a refusal."""
+    if isinstance(node, cst.SimpleStatementLine) and len(node.body) == 1:
+        (statement,) = node.body
+        is_call = isinstance(statement, cst.Expr) and isinstance(statement.value, cst.Call)
+        if is_call or isinstance(statement, cst.AugAssign | cst.Raise):
+            yield node.with_changes(body=[cst.Pass()])
+
+
+def _swapped(node: Any) -> Iterable[cst.CSTNode]:
+    """Swap two arguments that stand side by side."""
+    if isinstance(node, cst.Call):
+        for i, (a, b) in enumerate(zip(node.args, node.args[1:], strict=False)):
+            if a.keyword is None and b.keyword is None and not a.star and not b.star:
+                pair = [a.with_changes(value=b.value), b.with_changes(value=a.value)]
+                yield node.with_changes(args=[*node.args[:i], *pair, *node.args[i + 2 :]])
+
+
+def _order(node: Any) -> Iterable[cst.CSTNode]:
+    """Swap the operands of a difference or a quotient."""
+    if isinstance(node, cst.BinaryOperation):
+        if isinstance(node.operator, cst.Subtract | cst.Divide | cst.FloorDivide | cst.Power):
+            yield node.with_changes(left=_enclosed(node.right), right=_enclosed(node.left))
+
+
+def _enclosed(node: cst.BaseExpression) -> cst.BaseExpression:
+    return node.with_changes(lpar=[cst.LeftParen(), *node.lpar], rpar=[*node.rpar, cst.RightParen()])
+
+
+def _constant(node: Any) -> Iterable[cst.CSTNode]:
+    if isinstance(node, cst.Float):
+        yield node.with_changes(value=constant(node.value))
+
+
+def _condition(node: Any) -> Iterable[cst.CSTNode]:
+    """Take the other way."""
+    if isinstance(node, cst.If | cst.While) and not _is_for_readers(node):
+        yield node.with_changes(test=cst.UnaryOperation(cst.Not(), _enclosed(node.test)))
+
+
+def _pair(node: Any) -> Iterable[cst.CSTNode]:
+    if isinstance(node, cst.Call):
+        name = node.func.attr if isinstance(node.func, cst.Attribute) else node.func
+        if isinstance(name, cst.Name) and name.value in PAIRS:
+            yield node.with_deep_changes(name, value=PAIRS[name.value])
+
+
+_OWN = {
+    "dropped statement": _dropped, "swapped arguments": _swapped, "order of operands": _order,
+    "constant": _constant, "condition": _condition, "min/max": _pair,
+}  # fmt: skip

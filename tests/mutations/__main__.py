@@ -1,6 +1,6 @@
 """`make mutate`: change one line at a time in a copy of the checkout, and see what catches it.
 
-Exit status 0 if enough of the mutations were caught, 1 if not, 2 for wrong usage, 130 if interrupted.
+Exit status 0 if enough mutations were caught, 1 if not, 2 for wrong usage, 130 if interrupted.
 """
 
 import argparse
@@ -32,7 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.ci:
         return run_planted(processes)
     if entries := stale(equivalent()):
-        print("\n".join(["equivalent.toml names no change that there is:", *entries]), file=sys.stderr)
+        print(
+            "\n".join(["equivalent.toml names no change that there is:", *entries]), file=sys.stderr
+        )
         return 2
     begin = time.perf_counter()
     try:
@@ -143,7 +145,9 @@ def _line(verdict: Verdict, number: int) -> str:
     said = f"{number:4} {verdict.outcome:18} {verdict.seconds:6.1f} s  {mutation.file}"
     if verdict.outcome == "lives":
         return f"{said}  {mutation.id}\n{mutation.diff()}"
-    return f"{said}:{mutation.line}  {mutation.operator}" + (f": {verdict.by}" if verdict.by else "")
+    return f"{said}:{mutation.line}  {mutation.operator}" + (
+        f": {verdict.by}" if verdict.by else ""
+    )
 
 
 def caught_share(verdicts: Sequence[Verdict]) -> float:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import libcst as cst
@@ -76,7 +77,7 @@ def _dropped(node: Any) -> Iterable[cst.CSTNode]:
 def _swapped(node: Any) -> Iterable[cst.CSTNode]:
     """Swap two arguments that stand side by side."""
     if isinstance(node, cst.Call):
-        for i, (a, b) in enumerate(zip(node.args, node.args[1:], strict=False)):
+        for i, (a, b) in enumerate(pairwise(node.args)):
             if a.keyword is None and b.keyword is None and not a.star and not b.star:
                 pair = [a.with_changes(value=b.value), b.with_changes(value=a.value)]
                 yield node.with_changes(args=[*node.args[:i], *pair, *node.args[i + 2 :]])
@@ -84,13 +85,15 @@ def _swapped(node: Any) -> Iterable[cst.CSTNode]:
 
 def _order(node: Any) -> Iterable[cst.CSTNode]:
     """Swap the operands of a difference or a quotient."""
-    if isinstance(node, cst.BinaryOperation):
-        if isinstance(node.operator, cst.Subtract | cst.Divide | cst.FloorDivide | cst.Power):
-            yield node.with_changes(left=_enclosed(node.right), right=_enclosed(node.left))
+    ordered = cst.Subtract | cst.Divide | cst.FloorDivide | cst.Power
+    if isinstance(node, cst.BinaryOperation) and isinstance(node.operator, ordered):
+        yield node.with_changes(left=_enclosed(node.right), right=_enclosed(node.left))
 
 
 def _enclosed(node: cst.BaseExpression) -> cst.BaseExpression:
-    return node.with_changes(lpar=[cst.LeftParen(), *node.lpar], rpar=[*node.rpar, cst.RightParen()])
+    return node.with_changes(
+        lpar=[cst.LeftParen(), *node.lpar], rpar=[*node.rpar, cst.RightParen()]
+    )
 
 
 def _constant(node: Any) -> Iterable[cst.CSTNode]:

@@ -102,7 +102,7 @@ def lines_of_code(file: str) -> int:
 
 
 def draw(seed: int | str) -> Iterator[Mutation]:
-    """Draw changes without end: a file by its lines of code, a line, an operator, one of its places.
+    """Draw changes without end: a file by its lines of code, a line, an operator, a place.
 
     So languages come in proportion to their lines of code, and an operator with many variants is
     no likelier than one with few.
@@ -152,7 +152,9 @@ def _python_function(text: str, line: int) -> str | None:
 
 
 _BEGIN = {
-    text_source.FORTRAN: re.compile(r"^\s*(?!end )[\w() =,]*?\b(?:subroutine|function) (\w+)", re.I),
+    text_source.FORTRAN: re.compile(
+        r"^\s*(?!end )[\w() =,]*?\b(?:subroutine|function) (\w+)", re.I
+    ),
     text_source.C: re.compile(r"^(?:[\w*]+ )+\*?(\w+)\([^;]*$"),
     text_source.JAVASCRIPT: re.compile(r"^(?:export )?function (\w+)"),
 }

@@ -2,27 +2,26 @@
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import PurePosixPath
 
+# A function, and the one that is put in its place.
 PAIRS = {
-    a: b
-    for pair in (
-        "min max", "floor ceil", "floor ceiling", "sin cos", "any all", "minimum maximum",
-        "argmin argmax", "minval maxval", "minloc maxloc", "iand ior", "fmin fmax", "sine cosine",
-        "isnan isinf", "fmin fmax", "sum max", "hypot min", "sqrt abs",
-    )
-    for a, b in (pair.split(), pair.split()[::-1])
-    if a not in ("max", "abs") or (a, b) == ("max", "min")
+    "min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "minval": "maxval",
+    "maxval": "minval", "minloc": "maxloc", "maxloc": "minloc", "argmin": "argmax",
+    "argmax": "argmin", "fmin": "fmax", "fmax": "fmin", "floor": "ceil", "ceil": "floor",
+    "ceiling": "floor", "sin": "cos", "cos": "sin", "sine": "cosine", "cosine": "sine",
+    "any": "all", "all": "any", "iand": "ior", "ior": "iand", "isnan": "isinf", "isinf": "isnan",
+    "sum": "max", "hypot": "min", "sqrt": "abs",
 }  # fmt: skip
 FORTRAN, C, JAVASCRIPT = "Fortran", "C", "JavaScript"
 _LANGUAGES = {".f90": FORTRAN, ".fypp": FORTRAN, ".c": C, ".js": JAVASCRIPT}
 _STRINGS = r"\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*'"
 _NOT_CODE = {
-    FORTRAN: re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|!.*|^\s*#.*", re.M),
-    C: re.compile(rf"{_STRINGS}|//.*|/\*.*?\*/|^\s*#(?:.*\\\n)*.*", re.M | re.S),
-    JAVASCRIPT: re.compile(rf"{_STRINGS}|`[^`]*`|//[^\n]*|/\*.*?\*/", re.M | re.S),
+    FORTRAN: re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|!.*|^[ \t]*#.*", re.M),
+    C: re.compile(rf"{_STRINGS}|//.*|/\*[\s\S]*?\*/|^[ \t]*#(?:.*\\\n)*.*", re.M),
+    JAVASCRIPT: re.compile(rf"{_STRINGS}|`[^`]*`|//.*|/\*[\s\S]*?\*/", re.M),
 }
-_NOT_CODE[C] = re.compile(rf"{_STRINGS}|//[^\n]*|/\*[\s\S]*?\*/|^\s*#(?:[^\n]*\\\n)*[^\n]*", re.M)
 # Declarations, and what only divides the text.
 _NO_STATEMENT = {
     FORTRAN: re.compile(
@@ -34,13 +33,11 @@ _NO_STATEMENT = {
     C: re.compile(r"\s*(static|extern|typedef|struct|enum|goto|case|default|\}|PyObject \*\w+;)"),
     JAVASCRIPT: re.compile(r"\s*(import|case|default|\}$)"),
 }
-_REAL = re.compile(r"(?<![\w.])\d+\.\d*(?:[ed][+-]?\d+)?|(?<![\w.])\d+[ed][+-]?\d+", re.I)
-_OPERAND = r"[A-Za-z_][\w%.]*(?:\([^()]*\)|\[[^\[\]]*\])*"
-_EQUAL = {"==": "!=", "!=": "==", "===": "!==", "!==": "==="}
+_DECLARES = re.compile(r"(const|let|var|double|int|size_t|Py_ssize_t|char|void|long|return) ")
 
 
 def constant(text: str) -> str:
-    """Return another number: ten times a limit, written as a power of ten; else a hundredth more."""
+    """Return ten times a limit that is written as a power of ten; else a hundredth more."""
     number = float(text.lower().replace("d", "e").replace("_", ""))
     factor = 10.0 if "e" in text.lower() or "d" in text.lower() else 1.01
     return repr(number * factor if number else 0.01)
@@ -86,9 +83,9 @@ def _statement_end(plain: list[str], i: int, language: str) -> int | None:
         if i and plain[i - 1].rstrip().endswith("&"):
             return None
         guarded = re.sub(r"^if \(.*?\) (?=call |\w+ = |return|exit|cycle)", "", line)
-        if not re.match(r"call \w|[\w%]+(\([^=]*\))?(%\w+(\([^=]*\))?)* = ", guarded):
-            if guarded == line or not re.match(r"return|exit|cycle", guarded):
-                return None
+        is_step = re.match(r"call \w|[\w%]+(\([^=]*\))?(%\w+(\([^=]*\))?)* = ", guarded)
+        if not is_step and (guarded == line or not re.match(r"return|exit|cycle", guarded)):
+            return None
         while plain[i].rstrip().endswith("&"):
             i += 1
         return i + 1
@@ -96,53 +93,67 @@ def _statement_end(plain: list[str], i: int, language: str) -> int | None:
     if not before.endswith((";", "{", "}")) and before:
         return None
     is_update = re.match(r"[\w.>\[\]\s*+-]+\s[-+*/|&^]?= |[\w.]+\(|if \(.*\) [^{]*;$", line)
-    declares = re.match(r"(const|let|var|double|int|size_t|Py_ssize_t|char|void|long|return) ", line)
-    return i + 1 if line.endswith(";") and is_update and not declares else None
+    return i + 1 if line.endswith(";") and is_update and not _DECLARES.match(line) else None
 
 
-def _of_line(line: str, language: str) -> Iterator[tuple[str, int, int, str]]:
-    for found in re.finditer(r"(?<=[\w)\]}$]) ([+-])(?= \S)", line):
-        yield "sign", found.start(1), found.end(1), "-" if found[1] == "+" else "+"
-    for found in re.finditer(r"(?<=[=(,\[?:&]) ?(-)(?=[\w(])", line):
-        yield "sign", found.start(1), found.end(1), ""
-    for found in re.finditer(r"(?<=[\w)\]]) ?(?<!\*)([*/])(?![*/=)]) ?(?=[\w($])", line):
-        yield "product", found.start(1), found.end(1), "*" if found[1] == "/" else "/"
-    for found in re.finditer(r"(?<![<>=!/-])(<=|>=|<|>)(?![<>=])", line):
-        yield "bound", found.start(), found.end(), found[1][0] if "=" in found[1] else found[1] + "="
-    for found in re.finditer(r"[=!]==?|/=(?= )", line):
-        if language == FORTRAN and found[0] in ("==", "/="):
-            yield "equality", found.start(), found.end(), "/=" if found[0] == "==" else "=="
-        elif found[0] in _EQUAL and language != FORTRAN:
-            yield "equality", found.start(), found.end(), _EQUAL[found[0]]
-    for found in re.finditer(rf"(?<![\w.%*])(?=({_OPERAND})( - |/| / )({_OPERAND}))", line):
-        swapped = f"{found[3]}{found[2]}{found[1]}"
-        yield "order of operands", found.start(1), found.end(3), swapped
-    for found in _REAL.finditer(line):
-        yield "constant", found.start(), found.end(), constant(found[0])
-    for found in re.finditer(r"(?<![\w.$%])\d+(?![\w.$]|\.)", line):
-        yield "constant", found.start(), found.end(), str(int(found[0]) + 1)
-    for old, new in ((".and.", ".or."), ("&&", "||"), (".true.", ".false."), ("true", "false")):
-        for a, b in ((old, new), (new, old)):
-            pattern = re.escape(a) if "." in a or "&" in a or "|" in a else rf"(?<![.\w]){a}(?![.\w])"
-            for found in re.finditer(pattern, line):
-                yield "logical", found.start(), found.end(), b
-    for found in re.finditer(r"\.not\. ?|(?<![\w!])!(?=[\w(])", line):
-        yield "logical", found.start(), found.end(), ""
-    for found in re.finditer(r"\b([A-Za-z_]+)(?=\()", line):
-        if found[1] in PAIRS:
-            other = "ceil" if found[1] == "floor" and language != FORTRAN else PAIRS[found[1]]
-            yield "min/max", found.start(), found.end(), other
+_OPERAND = r"[A-Za-z_][\w%.]*(?:\([^()]*\)|\[[^\[\]]*\])*"
+_OTHER = {
+    "+": "-", "-": "+", "*": "/", "/": "*", "<": "<=", "<=": "<", ">": ">=", ">=": ">",
+    "==": "!=", "!=": "==", "===": "!==", "!==": "===", ".and.": ".or.", ".or.": ".and.",
+    "&&": "||", "||": "&&", ".true.": ".false.", ".false.": ".true.", "true": "false",
+    "false": "true", **PAIRS,
+}  # fmt: skip
+_REAL = r"(?<![\w.])(?:\d+\.\d*(?:[eEdD][+-]?\d+)?|\d+[eEdD][+-]?\d+)"
+# An operator, what it changes, and what it puts there: a text, or what makes it.
+_TOKENS: list[tuple[str, re.Pattern[str], Callable[[str], str]]] = [
+    (operator, re.compile(pattern), new)
+    for operator, pattern, new in (
+        ("sign", r"(?<=[\w)\]}$] )[+-](?= \S)", _OTHER.__getitem__),
+        ("sign", r"(?:(?<=[=(,\[?:&])|(?<=[=(,\[?:&] ))-(?=[\w(])", lambda _: ""),
+        (
+            "product",
+            r"(?:(?<=[\w)\]])|(?<=[\w)\]] ))[*/](?![*/=)])(?= ?[\w($])",
+            _OTHER.__getitem__,
+        ),
+        ("bound", r"(?<![<>=!/-])(?:<=|>=|<|>)(?![<>=])", _OTHER.__getitem__),
+        ("constant", _REAL, lambda text: constant(text)),
+        ("constant", r"(?<![\w.$%])\d+(?![\w.$])", lambda text: str(int(text) + 1)),
+        ("logical", r"\.and\.|\.or\.|&&|\|\||\.true\.|\.false\.", _OTHER.__getitem__),
+        ("logical", r"(?<![.\w])(?:true|false)(?![.\w])", _OTHER.__getitem__),
+        ("logical", r"\.not\. ?|(?<![\w!])!(?=[\w(])", lambda _: ""),
+        ("min/max", rf"\b(?:{'|'.join(PAIRS)})(?=\()", _OTHER.__getitem__),
+    )
+]
+_EQUALITY = {
+    FORTRAN: re.compile(r"==|/=(?= )"),
+    C: re.compile(r"[=!]="),
+    JAVASCRIPT: re.compile(r"[=!]==?"),
+}
+_DIFFERENCE = re.compile(rf"(?<![\w.%*])(?=({_OPERAND})( - |/| / )({_OPERAND}))")
+_IF = re.compile(r"\s*(?:(?:\} else |else )?if|while) (?=\()")
+_LOOP = re.compile(r"\s*(?:\w+: )?do \w+ = [^,]+, ([^,&]+?)\s*$")
+_NO_CALL = re.compile(r"\b(if|for|while|switch|real|integer|character|do)\($")
+
+Piece = tuple[str, int, int, str]  # the operator, where it changes the line, and what stands there
+
+
+def _of_line(line: str, language: str) -> Iterator[Piece]:
+    for operator, pattern, new in _TOKENS:
+        yield from ((operator, *each.span(), new(each[0])) for each in pattern.finditer(line))
+    for each in _EQUALITY[language].finditer(line):
+        other = {"==": "/=", "/=": "=="} if language == FORTRAN else _OTHER
+        yield "equality", *each.span(), other[each[0]]
+    for each in _DIFFERENCE.finditer(line):
+        yield "order of operands", each.start(1), each.end(3), each[3] + each[2] + each[1]
     for begin, end in _calls(line):
         inside = _split(line, begin, end)
-        for (a, b), (c, d) in zip(inside, inside[1:], strict=False):
+        for (a, b), (c, d) in pairwise(inside):
             if "=" not in line[a:b] + line[c:d] and line[a:b] != line[c:d]:
                 yield "swapped arguments", a, d, line[c:d] + line[b:c] + line[a:b]
-    if found := re.match(r"\s*(?:\} else |else )?if (?=\()|\s*while (?=\()", line):
-        if end := _closing(line, found.end()):
-            not_ = ".not. " if language == FORTRAN else "!"
-            inner = line[found.end() : end]
-            yield "condition", found.end(), end, f"({not_}{inner})"
-    if language == FORTRAN and (found := re.match(r"\s*(?:\w+: )?do \w+ = [^,]+, ([^,&]+?)\s*$", line)):
+    if (found := _IF.match(line)) and (last := _closing(line, found.end())):
+        negation = ".not. " if language == FORTRAN else "!"
+        yield "condition", found.end(), last, f"({negation}{line[found.end() : last]})"
+    if language == FORTRAN and (found := _LOOP.match(line)):
         yield "index", found.end(1), found.end(1), " - 1"
 
 
@@ -157,10 +168,11 @@ def _closing(line: str, begin: int) -> int | None:
 
 
 def _calls(line: str) -> Iterator[tuple[int, int]]:
+    """Return where the arguments of calls, or the indices of arrays, begin and end."""
     for found in re.finditer(r"(?<=\w)\((?=.)", line):
-        if not re.search(r"\b(if|for|while|switch|real|integer|character|do)\($", line[: found.end()]):
-            if end := _closing(line, found.start()):
-                yield found.end(), end - 1
+        last = _closing(line, found.start())
+        if last and not _NO_CALL.search(line[: found.end()]):
+            yield found.end(), last - 1
 
 
 def _split(line: str, begin: int, end: int) -> list[tuple[int, int]]:

@@ -102,7 +102,9 @@ class Tree:
         self, command: list[str], limit: float, more: dict[str, str] | None = None
     ) -> tuple[int | None, str]:
         """Run a command in the copy, with `more` in its environment."""
-        return self._processes.run(command, self.folder, {**self._environment, **(more or {})}, limit)
+        return self._processes.run(
+            command, self.folder, {**self._environment, **(more or {})}, limit
+        )
 
     def write(self, file: str, text: str) -> None:
         """Put another text into a file."""
@@ -152,6 +154,6 @@ class Tree:
         kept = {"build", ".hypothesis", "__pycache__"}
         for place in list(self.folder.rglob("*")):
             name = place.relative_to(self.folder)
-            if kept.isdisjoint(name.parts) and place.is_file() and name not in wanted:
-                if name.suffix != ".so" and name.name != "_build.py":
-                    place.unlink()
+            made = name.suffix == ".so" or name.name == "_build.py" or kept & {*name.parts}
+            if place.is_file() and name not in wanted and not made:
+                place.unlink()

@@ -151,5 +151,5 @@ def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
         raise NotCollected
     # It crashed, or never ended.
     begun = re.findall(r"^(tests/\S+::.*?)(?: (?:PASSED|FAILED|ERROR|SKIPPED).*)?$", said, re.M)
-    last = next((by_name[name.strip()] for name in reversed(begun) if name.strip() in by_name), None)
-    return last or checks[0]
+    known = [by_name[name.strip()] for name in begun if name.strip() in by_name]
+    return known[-1] if known else checks[0]

@@ -1,6 +1,7 @@
 module scaled_motion
   !! Unknowns scaled so that every product has the coefficient 1 or -1, and the integral of the
   !! torque in them; waves that are fast and weak are averaged, to second order.
+  use, intrinsic :: iso_fortran_env, only: int64
   use two_words, only: sine_cosine_of
   use kinds, only: dp
   use problem, only: problem_t
@@ -16,6 +17,7 @@ module scaled_motion
 
   ! An exponent beyond which no amplification says more.
   real(dp), parameter :: MOST_EXPONENT = 300.0_dp
+  real(dp), parameter :: LOG2_E = 1.4426951_dp
 
   type, public :: motion_t
     real(dp) :: scale(3)     ! angular velocity is scale times unknown, rad/s
@@ -240,7 +242,9 @@ contains
       exponent = exponent + 2.0_dp*abs(t_end)*size_of(motion, n)
     end do
     exponent = min(MOST_EXPONENT, exponent)
-    bound = exp(exponent)*(maxval(abs(motion%scale))/minval(abs(motion%scale)))
+    ! A power of two no less than the exponential, from its bits, costs no call.
+    bound = transfer(ishft(1024_int64 + int(LOG2_E*exponent, int64), 52), bound) &
+            *(maxval(abs(motion%scale))/minval(abs(motion%scale)))
   end subroutine amplification
 
   pure elemental real(dp) function versine(angle)

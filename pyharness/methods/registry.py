@@ -163,7 +163,7 @@ REGISTRY = {
             "quick",
             "Runge-Kutta in scaled unknowns, for few digits at the end",
             "fortran/modern/scaled_runge_kutta.f90",
-            # Below it the rounding of its many steps would count, which it does not see.
+            # Below it the rounding of its many steps would count.
             1e-12,
             _DEFAULT,
             _no_rows,

@@ -373,7 +373,8 @@ def test_attitude_must_be_asked_for(method: str) -> None:
 def test_full_inertia_takes_the_torque_as_it_is() -> None:
     """The same body about its principal axes, with its attitude, moves alike in space."""
     scene = SCENES["full, axes of space"]
-    moments, axes = principal_axes(scene.inertia or ())
+    assert scene.inertia is not None
+    moments, axes = principal_axes(scene.inertia)
     x, y, z, w = Rotation.from_matrix(axes).as_quat()
     start = axes.T @ np.array(scene.omega)
     other = replace(scene, inertia=None, moments=moments, omega=start, attitude=(w, x, y, z))

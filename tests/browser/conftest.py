@@ -46,8 +46,8 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     # A named driver: none is looked for, and none is fetched.
     chrome = Chrome(options=options, service=Service(executable_path=driver))
-    # axe-core takes seconds for the longest page, and minutes where other work has the processors.
-    chrome.set_script_timeout(300)
+    # axe-core takes seconds for the longest page, and a minute where other work has the processors.
+    chrome.set_script_timeout(100)
     yield chrome
     chrome.quit()
 

@@ -1,6 +1,7 @@
 """The package for others: types that accept what runs, what it shows, how it is cited."""
 
 import inspect
+import os
 import re
 import shutil
 import subprocess
@@ -101,6 +102,39 @@ def test_what_the_package_shows() -> None:
     assert dir(pyharness) == sorted([*pyharness.__all__, "__version__"])
     for name in dir(pyharness):
         assert getattr(pyharness, name) is not None
+
+
+def test_a_job_runs_with_the_newest_of_everything() -> None:
+    (workflow,) = (ROOT / ".github/workflows").glob("*.y*ml")
+    job = yaml.safe_load(workflow.read_text())["jobs"]["run"]
+    newest = [each for each in job["strategy"]["matrix"]["include"] if "newest" in each]
+    assert [(each["python"], each["newest"]) for each in newest] == [("3.x", "required")]
+    (step,) = (each for each in job["steps"] if each.get("run") == "bash .ci/run")
+    assert step["env"]["PYHARNESS_NEWEST"] == "${{ matrix.newest }}"
+    assert not job["strategy"]["fail-fast"]
+
+
+@pytest.mark.external
+@pytest.mark.parametrize(("newest", "code"), [("required", 1), ("", 0)])
+def test_what_was_not_tested_is_said(tmp_path: Path, newest: str, code: int) -> None:
+    """The index has a newer NumPy than the one here, as where Python is old."""
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(ROOT / ".ci/newest", tmp_path / ".ci")
+    python = tmp_path / ".venv/bin/python"
+    python.parent.mkdir(parents=True)
+    python.write_text(
+        f'#!/bin/sh\n[ "$2" = pip ] && echo "$5 (99.0)" || exec {sys.executable} "$@"\n'
+    )
+    python.chmod(0o755)
+    environment = {**os.environ, "NEWEST": "no", "PYHARNESS_NEWEST": newest}
+    done = subprocess.run(
+        [".ci/newest", sys.executable],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    here = "{}.{}".format(*sys.version_info)
+    assert f"NOT TESTED with a Python newer than {here} (NEWEST=no)" in done.stdout
+    assert f"NOT TESTED with numpy 99.0: {np.__version__} is" in done.stdout
+    assert done.returncode == code, done.stderr
 
 
 def test_lower_bounds_are_what_the_landing_script_installs() -> None:

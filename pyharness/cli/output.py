@@ -235,10 +235,10 @@ def check_tree(path: str, mark: str, option: str) -> None:
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
-    new, old = _beside(folder)
+    new, _ = _beside(folder)
     try:
-        # Both names will be needed, and a file in the first.
-        reason = _why_not_anew(folder, mark) or _why_not_made(old)
+        reason = _why_not_anew(folder, mark)
+        # No permission tells of a name that is too long, or of a file system that takes no file.
         if not reason:
             new.mkdir()
             try:

@@ -383,3 +383,16 @@ def test_full_inertia_takes_the_torque_as_it_is() -> None:
         wanted.angular_momentum("space"), rel=1e-12
     )
     assert found.omega[0] == pytest.approx(axes @ wanted.omega[0], abs=1e-12)
+
+
+def test_the_scale_is_the_largest_omega_on_the_way() -> None:
+    """Of a body that hardly turns at first the tolerance is relative to what the torque makes."""
+    law = TorqueLaw((0.3, -0.2, 0.1), frame="space")
+    slow, fast = (
+        Scene("", omega, moments=(3.0, 2.0, 4.0), torque=law)
+        for omega in ((1e-9, 0.0, 0.0), (0.5, 0.3, 0.2))
+    )
+    of_slow, of_fast = (solve(each, [8.0], attitude=True, tolerance=1e-10) for each in (slow, fast))
+    assert of_slow.error is not None
+    assert of_slow.error <= 1e-10
+    assert of_slow.evaluations <= 2 * of_fast.evaluations

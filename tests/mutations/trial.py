@@ -90,13 +90,13 @@ def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
             entered = [e for e in checks if any(name.startswith(begin) for name in e.functions)]
         mention = re.compile(rf"\b{stem}\b")
     else:
+        # What is written out for each instruction set has its library's name after its own.
         found = re.search(r"^\s*module (\w+?)_?(?:\$|$)", (ROOT / mutation.file).read_text(), re.M)
-        module = found[1].lower() if found else ""
-        ends = {f"{module}:{function}", f":{function}"}
+        modules = {f"{found[1].lower()}{of}" for of in ("", "_bodies", "_many")} if found else set()
+        ends = {f"{module}:{function}" for module in (*modules, "")}
         entered = [each for each in checks if not ends.isdisjoint(each.functions)]
-        if not entered and module:
-            begin = f"{module}:"
-            entered = [e for e in checks if any(name.startswith(begin) for name in e.functions)]
+        if not entered:
+            entered = [e for e in checks if modules & {n.partition(":")[0] for n in e.functions}]
         mention = re.compile(rf"\btest_{stem}\b")
     named = {path for path in files_of_tests() if mention.search(path + (ROOT / path).read_text())}
     chosen = {each.name for each in entered}
@@ -145,8 +145,9 @@ def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
         return None
     by_name = {each.name: each for each in checks}
     failed = re.findall(r"^(?:FAILED|ERROR) (tests/\S.*?)(?: - .*)?$", said, re.M)
-    if failed and failed[0] in by_name:
-        return by_name[failed[0]]
+    for name in failed[:1]:
+        if found := by_name.get(name) or by_name.get(name.partition("::")[0]):
+            return Check(name, found.seconds, found.functions)
     if failed or code in (2, 3, 4):
         raise NotCollected
     # It crashed, or never ended.

@@ -6,6 +6,7 @@ import random
 import shlex
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ from mpmath import mp
 
 from pyharness import run_program
 from pyharness.compare.random_scenes import draw
-from pyharness.model.listing import PROGRAMS
+from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.verify.port import differences, port
 from pyharness.verify.port_process import PortProcess
 from pyharness.verify.port_protocol import ENDINGS, read_answer, request
@@ -36,6 +38,24 @@ def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
             seen.add((drawn.listing.program, twin.ended))
     assert {ended for program, ended in seen if program == "runge-kutta"} == set(ENDINGS)
     assert {program for program, _ in seen} == set(PROGRAMS)
+
+
+@pytest.mark.parametrize("waves", ["sines", "cosines"])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_torque_of_waves_alone_acts(program: str, waves: str) -> None:
+    """No case has a torque of cosines alone, and the random scenes above have none of either."""
+    wave: Wave = ((0.3, -0.2, 0.5), 1.7)
+    law = TorqueLaw(**{waves: [wave]})  # type: ignore[arg-type]
+    scene = Scene("waves", (0.1, 0.2, 0.3), moments=(3, 2, 4), torque=law, step_size=0.1, steps=20)
+    for listing in (original(program), corrected(program)):
+        twin = run_program(scene, listing, "python", may_stop=False)
+        with PortProcess(node(WEB)) as process:
+            line = process.ask(request(scene, listing, may_stop=False))
+        found = read_answer(line, scene.steps)
+        idle = run_program(replace(scene, torque=TorqueLaw()), listing, "python", may_stop=False)
+        assert abs(twin.omega - idle.omega).max() > 0.01
+        # Here a sine may have another last bit than the twin's.
+        assert abs(found.rows[:, 1:4] - twin.omega).max() < 1e-13
 
 
 # File, what stands there, the fault, and in which of the programs it shows.

@@ -34,6 +34,7 @@ class Engine(NamedTuple):
 
     workers: int
     computed: Callable[[Sweep, list[int]], Results]
+    is_here: bool = False  # whether the process that keeps the results computes them too
 
 
 @contextlib.contextmanager
@@ -45,7 +46,7 @@ def engine(
     Its results raise InputError where nobody is left to compute them.
     """
     if executor == "here":
-        yield Engine(1, _here)
+        yield Engine(1, _here, is_here=True)
     elif executor == "processes":
         count = workers or _processors()
         yield Engine(count, partial(_by_processes, count))

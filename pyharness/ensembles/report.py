@@ -7,7 +7,8 @@ import numpy as np
 
 from pyharness.ensembles.fields import units_of
 from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.run import Outcome, duration, said
+from pyharness.ensembles.forecast import duration, said
+from pyharness.ensembles.run import Outcome
 from pyharness.ensembles.store import Store
 from pyharness.ensembles.sweep import Asked, Sweep
 from pyharness.model.report import Column, Report, Table, digits, words
@@ -103,6 +104,7 @@ def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
             "scenes": sweep.n_scenes,
             "chunks": sweep.n_chunks,
             "computed": outcome.computed,
+            "repaired": outcome.repaired,
             "seconds": outcome.seconds,
             "axes": [dict(zip(_AXIS_KEYS, row, strict=True)) for row in axes],
             "reductions": [each._asdict() for each in found],
@@ -120,7 +122,8 @@ def _did(outcome: Outcome) -> str:
     if not outcome.computed:
         return f"all {total} chunks were there"
     there = f", {outcome.before} were there" if outcome.before else ""
-    return f"{outcome.computed} chunks in {duration(outcome.seconds)}{there}"
+    repaired = f", {outcome.repaired} of them damaged before" if outcome.repaired else ""
+    return f"{outcome.computed} chunks in {duration(outcome.seconds)}{repaired}{there}"
 
 
 def _axis_row(sweep: Sweep, number: int) -> tuple[Any, ...]:

@@ -1,56 +1,39 @@
 """Run a sweep: estimate, refuse, compute what is missing, keep it."""
 
+import contextlib
 import math
 import os
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from pyharness.ensembles.executors import Engine, engine
-from pyharness.ensembles.loads import looped_fields
+from pyharness.ensembles.forecast import Estimate, byte_count, duration, forecast, short_count
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import Store, check_store, opened
-from pyharness.ensembles.sweep import Indices, Sweep, solve_points, spread
+from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
 
-# Of a sample: scenes from all over the grid, first a few.
-_SAMPLES = (8, 256, 2048, 8192)
-_ENOUGH = 0.2  # s
-# A larger sample is taken beyond that where it is a small part of the sweep, and takes at most so
-# long: what a load takes whatever its size would else count as its scenes'.
-_PART = 0.01
-_LONGEST = 60.0  # s
-_PLACES = 5  # of the sample, along what scenes of one load share
-_PACE = 3e8  # bytes that are compressed and written in a second
 # Chunks that a process holds at once, with what it takes to compute them.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """What a sweep is going to take: bytes before compression, seconds of what is missing."""
-
-    n_scenes: int
-    n_chunks: int
-    n_missing: int
-    n_bytes: int
-    memory: int
-    seconds: float
-
-
-@dataclass(frozen=True)
 class Outcome:
-    """What a call did: chunks that were there before, chunks computed, and how long it took."""
+    """What a call did.
+
+    `before` counts the chunks that were there, `computed` those that were computed in `seconds`, and
+    `repaired` those among them that were damaged.
+    """
 
     estimate: Estimate | None
     before: int
     computed: int
     seconds: float
+    repaired: int = 0
 
 
 def bytes_per_scene(sweep: Sweep) -> int:
@@ -65,11 +48,11 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     refused at once.
     """
     n_bytes = sweep.n_scenes * bytes_per_scene(sweep) * missing // sweep.n_chunks
-    shown = f"{_count(sweep.n_scenes)} scenes in {_count(sweep.n_chunks)} chunks"
+    shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"
     free = shutil.disk_usage(Path(path).absolute().parent).free
     if n_bytes > free:
         raise InputError(
-            f"{shown} take up to {_bytes(n_bytes)}, and where '{path}' goes {_bytes(free)} are "
+            f"{shown} take up to {byte_count(n_bytes)}, and where '{path}' goes {byte_count(free)} are "
             "free; take a smaller grid, or fewer reductions"
         )
     if sweep.n_chunks > _MOST_CHUNKS:
@@ -82,8 +65,8 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > memory // 2:
         raise InputError(
-            f"{shown} take {_bytes(needed)} of memory at once, and the half of it that is theirs "
-            f"is {_bytes(memory // 2)}; take smaller chunks, fewer workers or samples"
+            f"{shown} take {byte_count(needed)} of memory at once, and the half of it that is theirs "
+            f"is {byte_count(memory // 2)}; take smaller chunks, fewer workers or samples"
         )
     return n_bytes, needed
 
@@ -93,31 +76,35 @@ def _scene_memory(sweep: Sweep) -> int:
     return _COPIES * (bytes_per_scene(sweep) + 8 * len(sweep.axes)) + 24 * 3 * samples
 
 
-def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the time of a scene, by a sample from all over the grid; of this process alone."""
-    seconds = math.nan
-    for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
-        where = _together(sweep, spread(sweep, count))
-        begin = time.perf_counter()
-        solve_points(sweep, where)
-        took = time.perf_counter() - begin
-        seconds = took / len(where[0])
-        is_small = larger <= _PART * sweep.n_scenes and larger * seconds <= _LONGEST
-        if len(where[0]) < count or (took > _ENOUGH and not is_small):
-            break
-    return seconds
+@contextlib.contextmanager
+def swept(
+    sweep: Sweep,
+    path: str,
+    executor: str = "here",
+    workers: int | None = None,
+    address: str | None = None,
+    before: Callable[[Estimate], None] = lambda estimate: None,
+    progress: Callable[[str], None] = lambda text: None,
+    repair: bool = False,
+) -> Iterator[tuple[Store, Outcome]]:
+    """Compute what a store lacks of a sweep, and yield the store, open, and what was done.
 
-
-def _together(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Move a sample to a few of the places that scenes of one load share, as a chunk has many."""
-    shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
-    found = []
-    for (name, count), places in zip(sweep.dimensions.items(), where, strict=True):
-        if name in shared and count > _PLACES:
-            part = np.rint(places * ((_PLACES - 1) / (count - 1))) / (_PLACES - 1)
-            places = np.rint(part * (count - 1)).astype(np.int64)
-        found.append(places)
-    return found
+    The parameters and errors are those of `run_sweep`.
+    """
+    is_there = check_store(sweep, path)
+    check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
+    with contextlib.ExitStack() as stack:
+        try:
+            # Whoever does not answer is found out before anything is made.
+            with engine(executor, workers, address) as own:
+                store = stack.enter_context(opened(sweep, path, repair))
+                outcome = _completed(store, own, before, progress)
+        except OSError as error:
+            raise InputError(
+                f"--out '{path}': {error.strerror or error}; what is done stays, and the same "
+                "command goes on from there"
+            ) from None
+        yield store, outcome
 
 
 def run_sweep(
@@ -128,6 +115,7 @@ def run_sweep(
     address: str | None = None,
     before: Callable[[Estimate], None] = lambda estimate: None,
     progress: Callable[[str], None] = lambda text: None,
+    repair: bool = False,
 ) -> Outcome:
     """Compute what a store lacks of a sweep.
 
@@ -147,27 +135,21 @@ def run_sweep(
         Is told the estimate, before anything is computed.
     progress : callable
         Is told how far it is.
+    repair : bool
+        Compute damaged chunks again, and write damaged metadata again, instead of an error.
 
     Raises
     ------
     InputError
-        For a store of another sweep, a size that disk or memory can't hold, a disk that is full, a
-        cluster that does not answer. What was computed stays, and the next call goes on from it.
+        For a store of another sweep, a damaged store, a size that disk or memory can't hold, a disk
+        that is full, a cluster that does not answer. What was computed stays, and the next call
+        goes on from it.
     """
-    is_there = check_store(sweep, path)
-    check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
-    try:
-        # Whoever does not answer is found out before anything is made.
-        with engine(executor, workers, address) as own, opened(sweep, path) as store:
-            return _filled(store, own, before, progress)
-    except OSError as error:
-        raise InputError(
-            f"--out '{path}': {error.strerror or error}; what is done stays, and the same command "
-            "goes on from there"
-        ) from None
+    with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
+        return outcome
 
 
-def _filled(
+def _completed(
     store: Store,
     own: Engine,
     before: Callable[[Estimate], None],
@@ -179,8 +161,7 @@ def _filled(
     if not missing:
         return Outcome(None, n_before, 0, 0.0)
     size = check_size(sweep, str(store.folder), own.workers, len(missing))
-    share = len(missing) / sweep.n_chunks
-    seconds = seconds_per_scene(sweep) * sweep.n_scenes * share / own.workers + size[0] / _PACE
+    seconds = forecast(sweep, str(store.folder), len(missing), own)
     estimate = Estimate(sweep.n_scenes, sweep.n_chunks, len(missing), *size, seconds)
     before(estimate)
     begin = time.monotonic()
@@ -196,39 +177,4 @@ def _filled(
         close = getattr(results, "close", None)
         if close is not None:
             close()
-    return Outcome(estimate, n_before, len(missing), time.monotonic() - begin)
-
-
-def said(estimate: Estimate) -> str:
-    """Say an estimate in a line."""
-    missing = estimate.n_missing
-    rest = "" if missing == estimate.n_chunks else f", {_count(missing)} of them missing"
-    return (
-        f"{_count(estimate.n_scenes)} scenes in {_count(estimate.n_chunks)} chunks{rest}: about "
-        f"{duration(estimate.seconds)}, up to {_bytes(estimate.n_bytes)} on disk, "
-        f"{_bytes(estimate.memory)} of memory"
-    )
-
-
-def duration(seconds: float) -> str:
-    """Say a time as people do."""
-    for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
-        if seconds < limit:
-            return (
-                f"{seconds / unit:.2g} {name}"
-                if seconds < 100.0
-                else f"{seconds / unit:.0f} {name}"
-            )
-    return f"{seconds / 86400.0:.0f} days"
-
-
-def _count(number: int) -> str:
-    return str(number) if number < 10**7 else f"{float(number):.4g}"
-
-
-def _bytes(number: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if number < 1000.0:
-            return f"{number:.3g} {unit}"
-        number /= 1000.0
-    return f"{float(number):.3g} PB"
+    return Outcome(estimate, n_before, len(missing), time.monotonic() - begin, store.repaired)

@@ -1,30 +1,48 @@
 """The store of a sweep: a Zarr group in a folder, one array for each reduction.
 
-A chunk of the grid is one file of each array. Zarr writes a file under another name and renames it,
-so that a chunk whose files are all there is done, whenever and however the writing ended.
+A chunk of the grid is one file of each array, and a file of their checksums, which is written last.
+Every file is written under another name and renamed, so that a chunk whose checksums are there is
+done, whenever and however the writing ended; and its checksums tell whether it still is what was
+written.
 """
 
 import contextlib
 import errno
 import fcntl
 import os
-import shutil
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pyharness.ensembles.fields import units_of
+from pyharness.ensembles.checksums import (
+    DamageError,
+    Label,
+    check_files,
+    checksum_text,
+    clear,
+    exists,
+    place,
+)
 from pyharness.ensembles.reductions import REDUCTIONS
+from pyharness.ensembles.store_layout import (
+    CHECKSUMS,
+    LARGEST_METADATA,
+    METADATA,
+    SCHEMA,
+    filled,
+    label,
+    labels,
+    largest_chunk,
+    metadata_files,
+)
 from pyharness.ensembles.sweep import Arrays, Sweep
-from pyharness.model.distribution import install_command, version
+from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
+from pyharness.model.schema import check_schema
 
-_SCHEMA = 1
 _UNFINISHED = "*.partial"  # what Zarr calls a file that it has not renamed yet
 _SAME_SWEEP = "give another --out, or remove it"
+_REPAIR = "'pyharness sweep' with --repair"
 
 
 def check_zarr() -> None:
@@ -36,31 +54,72 @@ def check_zarr() -> None:
 
 
 class Store:
-    """The store of one sweep, opened by `opened`."""
+    """The store of one sweep, opened by `opened`.
+
+    Attributes
+    ----------
+    sweep : Sweep
+        What it holds.
+    folder : Path
+        Where it is.
+    repaired : int
+        How many damaged chunks were removed when it was opened, to be computed again.
+    """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
         """Open what is there."""
         import zarr
 
-        self.sweep, self.folder = sweep, folder
+        self.sweep, self.folder, self.repaired = sweep, folder, 0
         group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
         # A chunk may hold nothing but what stands for nothing, and is kept all the same.
         with zarr.config.set({"array.write_empty_chunks": True}):
             self._arrays: dict[str, Any] = {
                 asked.name: group[asked.name] for asked in sweep.reductions
             }
+        self._limit = largest_chunk(sweep)
+        self._done = [False] * sweep.n_chunks
+
+    def check(self, repair: bool = False) -> None:
+        """Find out which chunks are done, and compare each with its checksums.
+
+        InputError where one is damaged; with `repair` it is removed instead.
+        """
+        damages = {}
+        for chunk in range(self.sweep.n_chunks):
+            try:
+                self._done[chunk] = self._is_done(chunk)
+            except DamageError as damage:
+                damages[chunk] = damage
+        if damages and not repair:
+            chunk, damage = next(iter(damages.items()))
+            total = self.sweep.n_chunks
+            which = f"chunk {chunk + 1} of {total} is damaged"
+            if len(damages) > 1:
+                which = f"{len(damages)} of {total} chunks are damaged, first chunk {chunk + 1}"
+            them = "it" if len(damages) == 1 else "them"
+            raise InputError(
+                f"--out '{self.folder}': {which}: {damage}; {_REPAIR} computes {them} again"
+            )
+        for chunk in damages:
+            for name in (self._checksums(chunk), *self._files(chunk)):
+                clear(self.folder, name)
+        self.repaired = len(damages)
 
     def done(self) -> list[bool]:
         """Return for each chunk whether it is whole."""
-        return [
-            all(file.exists() for file in self._files(chunk))
-            for chunk in range(self.sweep.n_chunks)
-        ]
+        return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
         """Keep a chunk; OSError where the disk does not take it, and then it is not done."""
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
+        try:
+            text = checksum_text(*self._described(chunk))
+        except DamageError as damage:
+            raise OSError(errno.EIO, f"{damage}, though it was written now") from None
+        place(self.folder, self._checksums(chunk), text)
+        self._done[chunk] = True
 
     def read(self, name: str, chunk: int) -> Any:
         """Return a chunk of a reduction."""
@@ -70,18 +129,40 @@ class Store:
         """Return the array of a reduction, of which what is asked for is read."""
         return self._arrays[name]
 
-    def _files(self, chunk: int) -> Iterator[Path]:
-        place = self.sweep.place(chunk)
+    def _is_done(self, chunk: int) -> bool:
+        """Return whether a chunk is whole; DamageError where it is not what was written."""
+        checksums = self._checksums(chunk)
+        if exists(self.folder, checksums):
+            check_files(*self._described(chunk), checksums)
+            return True
+        # It was not finished: what is there is written over, where that is possible.
+        for name in self._files(chunk):
+            if exists(self.folder, name) and not (self.folder / name).is_file():
+                raise DamageError(f"'{name}' is no ordinary file")
+        return False
+
+    def _described(self, chunk: int) -> tuple[Label, str, Path, list[str], int]:
+        part = f"chunk {'/'.join(map(str, self.sweep.place(chunk)))}"
+        return label(self.sweep), part, self.folder, self._files(chunk), self._limit
+
+    def _checksums(self, chunk: int) -> str:
+        return "/".join([CHECKSUMS, "c", *map(str, self.sweep.place(chunk))])
+
+    def _files(self, chunk: int) -> list[str]:
+        found = []
         for asked in self.sweep.reductions:
             more = (0,) if REDUCTIONS[asked.reduction].labels else ()
-            yield self.folder.joinpath(asked.name, "c", *map(str, (*place, *more)))
+            found.append("/".join([asked.name, "c", *map(str, (*self.sweep.place(chunk), *more))]))
+        return found
 
 
 @contextlib.contextmanager
-def opened(sweep: Sweep, path: str) -> Iterator[Store]:
-    """Make or open the store of a sweep; no other process has it meanwhile.
+def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
+    """Make or open the store of a sweep, and check all of it; no other process has it meanwhile.
 
-    InputError for a store of another sweep, or a folder that is none; both stay as they were.
+    InputError for a store of another sweep, a folder that is none, or a store that is damaged; all
+    stay as they were. With `repair`, what is damaged is removed, and is as if it had not been
+    computed yet.
     """
     check_zarr()
     folder = Path(path)
@@ -94,10 +175,20 @@ def opened(sweep: Sweep, path: str) -> Iterator[Store]:
         except OSError as error:
             # A file system that knows no locks has none to respect.
             if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
-                raise InputError(f"--out '{path}': another sweep is writing to it") from None
-        for left in folder.rglob(_UNFINISHED):
-            left.unlink()
-        yield Store(sweep, folder)
+                raise InputError(
+                    f"--out '{path}': another sweep is writing to it; wait for its end, or give "
+                    "another --out"
+                ) from None
+        try:
+            _check_metadata(sweep, folder, repair)
+            for left in folder.rglob(_UNFINISHED):
+                if left.is_file() or left.is_symlink():
+                    left.unlink()
+            store = Store(sweep, folder)
+            store.check(repair)
+        except OSError as error:
+            raise InputError(f"--out '{path}': {error.strerror or error}") from None
+        yield store
     finally:
         os.close(handle)
 
@@ -122,96 +213,59 @@ def check_store(sweep: Sweep, path: str) -> bool:
             return False
     except OSError as error:
         raise InputError(f"--out '{path}': {error.strerror or error}") from None
-    try:
-        import json
-
-        attributes = json.loads((folder / "zarr.json").read_text())["attributes"]
-        made_by = attributes["sweep_sha256"], attributes["pyharness_version"]
-    except (OSError, ValueError, LookupError, TypeError):
+    ours, known = label(sweep), labels(folder)
+    if not known:
         raise InputError(
             f"--out '{path}': is not empty, and no store of a sweep; give a new name"
-        ) from None
-    if made_by[0] != sweep.fingerprint:
-        raise InputError(
-            f"--out '{path}': is the store of another sweep file (SHA-256 {made_by[0]:.12}, and "
-            f"this one's is {sweep.fingerprint:.12}); {_SAME_SWEEP}"
         )
-    if made_by[1] != version():
+    # Either may be damaged, which is found out and said when the store is opened.
+    if ours in known:
+        return True
+    found = known[0]
+    check_schema(f"--out '{path}'", "store of a sweep", found.schema, SCHEMA, _SAME_SWEEP)
+    if found.fingerprint != ours.fingerprint:
         raise InputError(
-            f"--out '{path}': was made by pyharness {made_by[1]}, and this is "
-            f"{version()}, whose results may differ; {_SAME_SWEEP}"
+            f"--out '{path}': is the store of another sweep file (SHA-256 {found.fingerprint:.12}, "
+            f"and this one's is {ours.fingerprint:.12}); {_SAME_SWEEP}"
         )
-    return True
+    raise InputError(
+        f"--out '{path}': was made by pyharness {found.version}, and this is {ours.version}, whose "
+        f"results may differ; {_SAME_SWEEP}"
+    )
+
+
+def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
+    """Compare what no chunk has with its checksums; write it anew where `repair` is given."""
+    files = metadata_files(sweep)
+    try:
+        check_files(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)
+    except DamageError as damage:
+        if not repair:
+            raise InputError(
+                f"--out '{folder}': its metadata are damaged: {damage}; {_REPAIR} writes them again"
+            ) from None
+        with filled(sweep, folder) as new:
+            for name in (*files, METADATA):
+                clear(folder, name)
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                os.replace(new / name, folder / name)
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
     """Make the store beside its place, and rename it: it is there whole or not at all."""
-    new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
-    try:
-        _fill(sweep, new)
-        os.rename(new, folder)
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
+    with filled(sweep, folder) as new:
+        try:
+            os.rename(new, folder)
+        except OSError as error:
+            # Another process was faster: that is a store as any other.
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or not check_store(
+                sweep, str(folder)
+            ):
+                raise
 
 
-def _fill(sweep: Sweep, folder: Path) -> None:
-    import zarr
-
-    fields = [axis.field for axis in sweep.axes if axis.field != axis.dimension]
-    attributes: dict[str, Any] = {
-        "schema": _SCHEMA,
-        "title": sweep.name,
-        "pyharness_version": version(),
-        "sweep": sweep.text,
-        "sweep_sha256": sweep.fingerprint,
-    }
-    if fields:
-        attributes["coordinates"] = " ".join(fields)
-    group = zarr.create_group(folder, zarr_format=3, attributes=attributes)
-    for axis in sweep.axes:
-        values = axis.coordinates()
-        array = group.create_array(
-            axis.field,
-            shape=values.shape,
-            dtype=str if axis.is_choice else values.dtype,
-            dimension_names=[axis.dimension],
-            attributes={"units": units_of(axis.field)} if units_of(axis.field) else {},
-        )
-        array[:] = values
-    for asked in sweep.reductions:
-        _make_array(group, sweep, asked.name, asked.reduction)
-    with warnings.catch_warnings():
-        # xarray looks for it, and warns where it is missing; Zarr warns where it is made.
-        warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
-        zarr.consolidate_metadata(group.store)
-
-
-def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> None:
-    reduction = REDUCTIONS[reduction_name]
-    shape, chunk, dimensions = sweep.shape, sweep.chunk_shape, list(sweep.dimensions)
-    if reduction.labels:
-        shape, chunk = (*shape, len(reduction.labels)), (*chunk, len(reduction.labels))
-        dimensions.append(reduction.dimension)
-        if reduction.dimension not in group:
-            labels = group.create_array(
-                reduction.dimension,
-                shape=(len(reduction.labels),),
-                dtype=str,
-                dimension_names=[reduction.dimension],
-            )
-            labels[:] = np.array(reduction.labels, dtype=object)
-    attributes: dict[str, Any] = {"long_name": reduction.title, "units": reduction.units}
-    if reduction.flags:
-        attributes["flag_values"] = list(reduction.flags)
-        attributes["flag_meanings"] = " ".join(
-            each.replace(" ", "_") for each in reduction.flags.values()
-        )
-    group.create_array(
-        name,
-        shape=shape,
-        chunks=chunk,
-        dtype=reduction.dtype,
-        fill_value=reduction.fill,
-        dimension_names=dimensions,
-        attributes=attributes,
-    )
+@contextlib.contextmanager
+def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
+    """Yield an empty store of a sweep beside a path, to be tried out, and remove it."""
+    with filled(sweep, Path(path)) as new:
+        yield Store(sweep, new)

@@ -205,7 +205,7 @@ def _check_reductions(sweep: Sweep) -> None:
         if names.count(asked.name) > 1:
             raise InputError(f"reductions: two are called {asked.name}; give one another 'as'")
         reduction = REDUCTIONS[asked.reduction]
-        if asked.name in taken or asked.name in ("component", "invariant"):
+        if asked.name in taken or asked.name in ("component", "invariant", "checksums"):
             raise InputError(f"reductions: {asked.name} is the name of an axis; give another 'as'")
         if reduction.dimension in taken:
             raise InputError(f"dimension {reduction.dimension}: {asked.name} has one called so")

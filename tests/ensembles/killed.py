@@ -61,7 +61,7 @@ def kill_and_resume(
         if _killed(_start(path, killed, executor), killed, n_chunks // 2):
             break
     before = {path: path.stat().st_mtime_ns for path in killed.rglob("*") if path.is_file()}
-    done = set.intersection(*({*_done(killed, name)} for name in ("end", "status", "growth")))
+    done = {*_done(killed)}
     _finish(path, killed)
     again = [
         str(path)
@@ -100,9 +100,9 @@ def _finish(path: Path, store: Path) -> None:
         raise AssertionError(f"the sweep of {path} did not end well")
 
 
-def _done(store: Path, name: str = "growth") -> list[tuple[str, ...]]:
-    """Return the places of the chunks of an array that are there."""
-    found = (store / name / "c").rglob("*") if (store / name / "c").is_dir() else ()
+def _done(store: Path) -> list[tuple[str, ...]]:
+    """Return the places of the chunks that are done: their checksums are written last."""
+    found = (store / "checksums" / "c").rglob("*")
     chunks = (each for each in found if each.is_file() and each.suffix != ".partial")
     return [_place(each, store) for each in chunks]
 

@@ -45,7 +45,7 @@ def test_xarray_opens_it_without_a_warning(tmp_path: Path) -> None:
     assert "omega.1" in found.coords
     assert found["omega.1"].attrs["units"] == "rad/s"
     assert found["status"].attrs["flag_meanings"].split()[0] == "complete"
-    assert found.attrs["schema"] == 1
+    assert found.attrs["schema"] == 2
     assert found.attrs["sweep"] == PROGRAM
     one = found["stop-step"].sel(listing="original", step_size=0.01).values
     assert one.shape == (12,)

@@ -76,6 +76,8 @@ def _atlas(options: argparse.Namespace) -> int:
         raise InputError(f"--atlas '{options.atlas}': is not there; 'sweep' makes it")
     axes = {axis.dimension: axis.coordinates() for axis in reversed(sweep.axes)}
     with opened(sweep, options.atlas) as store:
+        if not all(store.done()):
+            raise InputError(f"--atlas '{options.atlas}': is not finished; 'sweep' goes on with it")
         codes = {
             dict(asked.parameters)["id"]: store.array(asked.name)[...]
             for asked in sweep.reductions

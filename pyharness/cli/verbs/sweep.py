@@ -6,8 +6,9 @@ from functools import partial
 from pyharness.cli import options as shared
 from pyharness.cli import say
 from pyharness.ensembles.executors import EXECUTORS, check_dask
-from pyharness.ensembles.run import run_sweep, said
-from pyharness.ensembles.store import check_zarr, opened
+from pyharness.ensembles.forecast import said
+from pyharness.ensembles.run import swept
+from pyharness.ensembles.store import check_zarr
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
@@ -18,6 +19,7 @@ _MOST_WORKERS = 1024
 OPTIONS = {
     "file FILE.toml": "the sweep file: a scene, axes, what solves, reductions",
     "--out STORE": "the store, a folder (Zarr); one that is there goes on where it ended",
+    "--repair": "compute the damaged chunks of the store again, and write its metadata again",
     "--executor E": f"{', '.join(EXECUTORS)} (default: here)",
     "--workers N": "processes, of processes and dask (default: as many as processors)",
     "--scheduler ADDRESS": "of a Dask cluster, as in tcp://host:8786 (default: one of our own)",
@@ -51,7 +53,9 @@ def run(options: argparse.Namespace) -> int:
     elif options.quantity is not None:
         raise InputError("--quantity has no meaning without --plot")
     shared.check_outputs(shown)
-    outcome = run_sweep(
+    from pyharness.ensembles.report import sweep_report
+
+    with swept(
         sweep,
         options.out,
         executor,
@@ -59,11 +63,9 @@ def run(options: argparse.Namespace) -> int:
         options.scheduler,
         before=lambda estimate: say(f"pyharness: {said(estimate)}\n"),
         progress=shared.progress,
-    )
-    shared.progress("")
-    from pyharness.ensembles.report import sweep_report
-
-    with opened(sweep, options.out) as store:
+        repair=options.repair,
+    ) as (store, outcome):
+        shared.progress("")
         report = sweep_report(store, outcome, options.out)
         if quantity is not None:
             from pyharness.ensembles.atlas import atlas_picture

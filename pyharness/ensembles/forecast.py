@@ -1,0 +1,163 @@
+"""Forecast of a sweep: how long it is going to take, by a sample of its scenes and of its files."""
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from pyharness.ensembles.executors import Engine
+from pyharness.ensembles.loads import looped_fields
+from pyharness.ensembles.reductions import empty
+from pyharness.ensembles.store import scratch
+from pyharness.ensembles.sweep import Indices, Sweep, solve_chunk, solve_points, spread
+
+# Of a sample: scenes from all over the grid, first a few.
+_SAMPLES = (8, 256, 2048, 8192)
+_ENOUGH = 0.2  # s
+# A larger sample is taken beyond that where it is a small part of the sweep, and takes at most so
+# long: what a load takes whatever its size would else count as its scenes'.
+_PART = 0.01
+_LONGEST = 60.0  # s
+_PLACES = 5  # of the sample, along what scenes of one load share
+_PACE = 3e8  # bytes that are compressed and written in a second
+_FILES = 20  # chunks that are written and read for a sample, at the most
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a sweep is going to take: bytes before compression, seconds of what is missing."""
+
+    n_scenes: int
+    n_chunks: int
+    n_missing: int
+    n_bytes: int
+    memory: int
+    seconds: float
+
+
+def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
+    """Return the seconds that the missing chunks of a store take: to solve, write and read them.
+
+    The process that writes computes nothing where others compute: the longer of the two counts.
+    """
+    write, read = seconds_of_files(sweep, path)
+    solve = n_missing * seconds_per_chunk(sweep) / own.workers
+    together = solve + n_missing * write if own.is_here else max(solve, n_missing * write)
+    return together + sweep.n_chunks * read
+
+
+def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
+    """Return the times to write and to read the files of a chunk, tried out beside a store."""
+    scenes = math.prod(sweep.chunk_shape)
+    pattern = np.random.default_rng(0)
+    with scratch(sweep, path) as store:
+        found = {}
+        for asked in sweep.reductions:
+            values = empty(asked, scenes)
+            # Bytes as they come: what is all the same would be compressed to nothing.
+            values[...] = pattern.integers(0, 100, values.shape)
+            found[asked.name] = values * 0.1 if values.dtype.kind == "f" else values
+        counts = [0, 0]
+        times = [0.0, 0.0]
+        for chunk in range(min(_FILES, sweep.n_chunks)):
+            box = sweep.box(chunk)
+            shape = tuple(part.stop - part.start for part in box)
+            part = {
+                name: values[: math.prod(shape)].reshape(*shape, *values.shape[1:])
+                for name, values in found.items()
+            }
+            begin = time.perf_counter()
+            store.write(chunk, part)
+            middle = time.perf_counter()
+            for asked in sweep.reductions:
+                store.read(asked.name, chunk)
+            end = time.perf_counter()
+            # The first has to import what Zarr needs.
+            if chunk > 0 or sweep.n_chunks == 1:
+                counts = [each + 1 for each in counts]
+                times = [times[0] + middle - begin, times[1] + end - middle]
+            if sum(times) > _ENOUGH:
+                break
+        return times[0] / counts[0], times[1] / counts[1]
+
+
+def seconds_per_chunk(sweep: Sweep) -> float:
+    """Return the time to solve a chunk, by a sample of scenes or of whole chunks."""
+    scenes = math.prod(sweep.chunk_shape)
+    seconds = scenes * seconds_per_scene(sweep)
+    if seconds > _ENOUGH:
+        return seconds
+    # What a chunk takes whatever its size is seen in whole chunks alone.
+    begin = time.perf_counter()
+    count = min(_FILES, sweep.n_chunks)
+    for i in range(count):
+        solve_chunk(sweep, i * (sweep.n_chunks - 1) // max(1, count - 1))
+        if time.perf_counter() - begin > _ENOUGH:
+            count = i + 1
+            break
+    return (time.perf_counter() - begin) / count
+
+
+def seconds_per_scene(sweep: Sweep) -> float:
+    """Return the time of a scene, by a sample from all over the grid; of this process alone."""
+    seconds = math.nan
+    for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
+        where = _together(sweep, spread(sweep, count))
+        begin = time.perf_counter()
+        solve_points(sweep, where)
+        took = time.perf_counter() - begin
+        seconds = took / len(where[0])
+        is_small = larger <= _PART * sweep.n_scenes and larger * seconds <= _LONGEST
+        if len(where[0]) < count or (took > _ENOUGH and not is_small):
+            break
+    return seconds
+
+
+def _together(sweep: Sweep, where: list[Indices]) -> list[Indices]:
+    """Move a sample to a few of the places that scenes of one load share, as a chunk has many."""
+    shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
+    found = []
+    for (name, count), places in zip(sweep.dimensions.items(), where, strict=True):
+        if name in shared and count > _PLACES:
+            part = np.rint(places * ((_PLACES - 1) / (count - 1))) / (_PLACES - 1)
+            places = np.rint(part * (count - 1)).astype(np.int64)
+        found.append(places)
+    return found
+
+
+def said(estimate: Estimate) -> str:
+    """Say an estimate in a line."""
+    missing = estimate.n_missing
+    rest = "" if missing == estimate.n_chunks else f", {short_count(missing)} of them missing"
+    return (
+        f"{short_count(estimate.n_scenes)} scenes in {short_count(estimate.n_chunks)} chunks{rest}: about "
+        f"{duration(estimate.seconds)}, up to {byte_count(estimate.n_bytes)} on disk, "
+        f"{byte_count(estimate.memory)} of memory"
+    )
+
+
+def duration(seconds: float) -> str:
+    """Say a time as people do."""
+    for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
+        if seconds < limit:
+            return (
+                f"{seconds / unit:.2g} {name}"
+                if seconds < 100.0
+                else f"{seconds / unit:.0f} {name}"
+            )
+    return f"{seconds / 86400.0:.0f} days"
+
+
+def short_count(number: int) -> str:
+    """Write a count: all its digits, or four of a large one."""
+    return str(number) if number < 10**7 else f"{float(number):.4g}"
+
+
+def byte_count(number: float) -> str:
+    """Write a number of bytes with its unit."""
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if number < 1000.0:
+            return f"{number:.3g} {unit}"
+        number /= 1000.0
+    return f"{float(number):.3g} PB"

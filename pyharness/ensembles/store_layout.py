@@ -1,0 +1,169 @@
+"""The layout of a store: its arrays, what describes them, and how it says whose it is."""
+
+import contextlib
+import json
+import math
+import os
+import re
+import shutil
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pyharness.ensembles.checksums import (
+    DamageError,
+    Label,
+    checksum_text,
+    place,
+    read_bounded,
+)
+from pyharness.ensembles.fields import units_of
+from pyharness.ensembles.reductions import REDUCTIONS, empty
+from pyharness.ensembles.sweep import Sweep
+from pyharness.model.distribution import version
+
+SCHEMA = 2
+CHECKSUMS = "checksums"  # the group in a store that holds them; no array may be called so
+METADATA = f"{CHECKSUMS}/metadata"
+LARGEST_METADATA = 1 << 28  # bytes
+_HEAD = re.compile(
+    r"# pyharness sweep store, schema (\d{1,9}), version (\S+), sweep ([0-9a-f]{64}), metadata"
+)
+
+
+def label(sweep: Sweep) -> Label:
+    """Return the identity of a sweep's store."""
+    return Label(SCHEMA, version(), sweep.fingerprint)
+
+
+def labels(folder: Path) -> list[Label]:
+    """Return the identity of a store, as its metadata and as their checksums have it."""
+    found = []
+    with contextlib.suppress(DamageError, OSError, ValueError, LookupError, TypeError, RecursionError):
+        attributes = json.loads(read_bounded(folder, "zarr.json", LARGEST_METADATA))["attributes"]
+        schema, *words = (attributes[key] for key in ("schema", "pyharness_version", "sweep_sha256"))
+        if all(isinstance(each, str) for each in words):
+            found.append(Label(schema, *words))
+    with contextlib.suppress(DamageError, OSError, ValueError):
+        head = read_bounded(folder, METADATA, LARGEST_METADATA).split(b"\n")[0].decode()
+        match = _HEAD.fullmatch(head)
+        if match:
+            found.append(Label(int(match[1]), match[2], match[3]))
+    return found
+
+
+def metadata_files(sweep: Sweep) -> list[str]:
+    """Return the files of a store that no chunk has: descriptions, and the values of the axes."""
+    labels = {
+        reduction.dimension
+        for reduction in (REDUCTIONS[asked.reduction] for asked in sweep.reductions)
+        if reduction.labels
+    }
+    values = [*(axis.field for axis in sweep.axes), *sorted(labels)]
+    described = ["", CHECKSUMS, *values, *(asked.name for asked in sweep.reductions)]
+    return [
+        *(f"{name}/zarr.json".lstrip("/") for name in described),
+        *(f"{name}/c/0" for name in values),
+    ]
+
+
+@contextlib.contextmanager
+def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
+    """Yield a new store beside a folder, and remove what is left of it."""
+    new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
+    try:
+        _fill(sweep, new)
+        yield new
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+
+
+def _fill(sweep: Sweep, folder: Path) -> None:
+    import zarr
+
+    fields = [axis.field for axis in sweep.axes if axis.field != axis.dimension]
+    attributes: dict[str, Any] = {
+        "schema": SCHEMA,
+        "title": sweep.name,
+        "pyharness_version": version(),
+        "sweep": sweep.text,
+        "sweep_sha256": sweep.fingerprint,
+    }
+    if fields:
+        attributes["coordinates"] = " ".join(fields)
+    with zarr.config.set({"array.write_empty_chunks": True}):
+        _fill_group(zarr.create_group(folder, zarr_format=3, attributes=attributes), sweep)
+    with warnings.catch_warnings():
+        # xarray looks for it, and warns where it is missing; Zarr warns where it is made.
+        warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
+        zarr.consolidate_metadata(folder)
+    text = checksum_text(
+        label(sweep), "metadata", folder, metadata_files(sweep), LARGEST_METADATA
+    )
+    place(folder, METADATA, text)
+
+
+def _fill_group(group: Any, sweep: Sweep) -> None:
+    group.create_group(
+        CHECKSUMS,
+        attributes={"long_name": "SHA-256 of each file, as `sha256sum --check` reads it"},
+    )
+    for axis in sweep.axes:
+        values = axis.coordinates()
+        array = group.create_array(
+            axis.field,
+            shape=values.shape,
+            chunks=values.shape,
+            dtype=str if axis.is_choice else values.dtype,
+            dimension_names=[axis.dimension],
+            attributes={"units": units_of(axis.field)} if units_of(axis.field) else {},
+        )
+        array[:] = values
+    for asked in sweep.reductions:
+        _make_array(group, sweep, asked.name, asked.reduction)
+
+
+def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> None:
+    import zarr
+
+    reduction = REDUCTIONS[reduction_name]
+    shape, chunk, dimensions = sweep.shape, sweep.chunk_shape, list(sweep.dimensions)
+    if reduction.labels:
+        shape, chunk = (*shape, len(reduction.labels)), (*chunk, len(reduction.labels))
+        dimensions.append(reduction.dimension)
+        if reduction.dimension not in group:
+            labels = group.create_array(
+                reduction.dimension,
+                shape=(len(reduction.labels),),
+                chunks=(len(reduction.labels),),
+                dtype=str,
+                dimension_names=[reduction.dimension],
+            )
+            labels[:] = np.array(reduction.labels, dtype=object)
+    attributes: dict[str, Any] = {"long_name": reduction.title, "units": reduction.units}
+    if reduction.flags:
+        attributes["flag_values"] = list(reduction.flags)
+        attributes["flag_meanings"] = " ".join(
+            each.replace(" ", "_") for each in reduction.flags.values()
+        )
+    group.create_array(
+        name,
+        shape=shape,
+        chunks=chunk,
+        # Not by Zarr's default, which another version may change: a chunk that is computed again
+        # has the same bytes.
+        compressors=zarr.codecs.ZstdCodec(level=0, checksum=False),
+        dtype=reduction.dtype,
+        fill_value=reduction.fill,
+        dimension_names=dimensions,
+        attributes=attributes,
+    )
+
+
+def largest_chunk(sweep: Sweep) -> int:
+    """Return the most bytes that a file of a chunk can have, compressed or not."""
+    scenes = math.prod(sweep.chunk_shape)
+    return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

@@ -1,0 +1,256 @@
+"""Damaged stores: one line that names what is damaged, and a repair with the same bytes."""
+
+import json
+import os
+import random
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.ensembles import run, store_layout
+from pyharness.ensembles.run import run_sweep
+from pyharness.ensembles.sweep import Sweep, solve_chunk
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.errors import InputError
+from tests.ensembles.sweeps import TILT, files, text, written
+
+SWEEP = text(
+    TILT.replace("count = 6", "count = 40"),
+    '[[axis]]\nfield = "t_end"\nvalues = [1.0, 2.0]',
+    top='chunk = 10\nreductions = ["end", "status"]',
+)
+CHUNK = "status/c/0/0"
+OTHER = "status/c/1/0"
+
+
+@pytest.fixture(scope="module")
+def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a sweep file, `sweep.toml`, and its store, `store`: 8 chunks."""
+    folder = tmp_path_factory.mktemp("intact")
+    run_sweep(read_sweep(written(folder, SWEEP)), str(folder / "store"))
+    return folder
+
+
+@pytest.fixture
+def sweep(intact: Path) -> Sweep:
+    return read_sweep(intact / "sweep.toml")
+
+
+@pytest.fixture
+def store(intact: Path, tmp_path: Path) -> Path:
+    """Return a copy of the store."""
+    return Path(shutil.copytree(intact / "store", tmp_path / "store"))
+
+
+def flip(path: Path, at: int = -1, bit: int = 0) -> None:
+    content = bytearray(path.read_bytes())
+    content[at] ^= 1 << bit
+    path.write_bytes(content)
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def replace_by_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+    (path / "letter").write_text("dear")
+
+
+def replace_by_link(path: Path, target: str) -> None:
+    path.unlink()
+    path.symlink_to(target)
+
+
+def replace_by_pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def enlarge(path: Path) -> None:
+    os.truncate(path, 1 << 40)
+
+
+def swap(one: Path, other: Path) -> None:
+    contents = one.read_bytes(), other.read_bytes()
+    one.write_bytes(contents[1])
+    other.write_bytes(contents[0])
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
+    "flipped bit": (lambda path: flip(path), "differs from its checksum"),
+    "truncated": (truncate, "differs from its checksum"),
+    "empty": (lambda path: path.write_bytes(b""), "differs from its checksum"),
+    "garbage": (lambda path: path.write_bytes(os.urandom(50)), "differs from its checksum"),
+    "longer": (lambda path: path.write_bytes(path.read_bytes() + b"\0"), "differs from its"),
+    "missing": (Path.unlink, "is missing"),
+    "folder": (replace_by_folder, "is a folder"),
+    "pipe": (replace_by_pipe, "is no ordinary file"),
+    "/dev/zero": (lambda path: replace_by_link(path, "/dev/zero"), "is no ordinary file"),
+    "link to itself": (lambda path: replace_by_link(path, path.name), "symbolic links"),
+    "a terabyte": (enlarge, r"has 1099511627776 bytes, and can't have more than \d+"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damaged_chunk_is_one_line_and_is_repaired(
+    name: str, sweep: Sweep, store: Path, intact: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damage, words = DAMAGES[name]
+    damage(store / CHUNK)
+    with pytest.raises(InputError, match=words) as caught:
+        run_sweep(sweep, str(store))
+    message = str(caught.value)
+    assert message.startswith(f"--out '{store}': chunk 1 of 8 is damaged: '{CHUNK}'")
+    assert message.endswith("'pyharness sweep' with --repair computes it again")
+    computed = []
+
+    def solved(sweep: Sweep, chunk: int) -> object:
+        computed.append(chunk)
+        return solve_chunk(sweep, chunk)
+
+    monkeypatch.setattr(run, "forecast", lambda *given: 0.0)
+    monkeypatch.setattr("pyharness.ensembles.executors.solve_chunk", solved)
+    outcome = run_sweep(sweep, str(store), repair=True)
+    assert (computed, outcome.computed, outcome.repaired) == ([0], 1, 1)
+    assert files(store) == files(intact / "store")
+
+
+def test_swapped_chunks_are_seen_with_their_checksums_too(
+    sweep: Sweep, store: Path, intact: Path
+) -> None:
+    swap(store / CHUNK, store / OTHER)
+    assert (store / CHUNK).read_bytes() == (intact / "store" / OTHER).read_bytes()
+    # Two constant chunks may have the same bytes; those of the ends differ.
+    for name in ("end/c/{}/0/0", "checksums/c/{}/0"):
+        swap(store / name.format(0), store / name.format(1))
+    with pytest.raises(InputError, match="2 of 8 chunks are damaged, first chunk 1: 'checksums/c"):
+        run_sweep(sweep, str(store))
+    assert run_sweep(sweep, str(store), repair=True).repaired == 2
+    assert files(store) == files(intact / "store")
+
+
+def test_chunk_of_another_sweep_is_seen(intact: Path, store: Path, tmp_path: Path) -> None:
+    other = read_sweep(written(tmp_path, SWEEP + "\n# another\n"))
+    run_sweep(other, str(tmp_path / "other"))
+    for name in ("end/c/0/0/0", "status/c/0/0", "checksums/c/0/0"):
+        shutil.copy(store / name, tmp_path / "other" / name)
+    with pytest.raises(InputError, match="chunk 1 of 8 is damaged: 'checksums/c/0/0'"):
+        run_sweep(other, str(tmp_path / "other"))
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+@pytest.mark.parametrize(
+    "file", ["zarr.json", "end/zarr.json", "tilt/c/0", "component/c/0", "checksums/metadata"]
+)
+def test_damaged_metadata_are_one_line_and_are_repaired(
+    name: str, file: str, sweep: Sweep, store: Path, intact: Path
+) -> None:
+    DAMAGES[name][0](store / file)
+    with pytest.raises(InputError, match=f"--out '{store}': its metadata are damaged: '"):
+        run_sweep(sweep, str(store))
+    assert run_sweep(sweep, str(store), repair=True).computed == 0
+    assert files(store) == files(intact / "store")
+
+
+def test_another_schema_is_refused_and_stays_as_it_was(
+    sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr(store_layout, "SCHEMA", 3)
+        with store_layout.filled(sweep, tmp_path / "x") as new:
+            shutil.copytree(new, tmp_path / "store")
+    before = files(tmp_path / "store")
+    for repair in (False, True):
+        with pytest.raises(InputError, match="has schema 3; this version reads schema 2: give"):
+            run_sweep(sweep, str(tmp_path / "store"), repair=repair)
+    assert files(tmp_path / "store") == before
+
+
+def test_store_of_the_first_schema_is_refused(sweep: Sweep, store: Path) -> None:
+    # It had no checksums.
+    shutil.rmtree(store / "checksums")
+    described = json.loads((store / "zarr.json").read_text())
+    described["attributes"]["schema"] = 1
+    (store / "zarr.json").write_text(json.dumps(described))
+    with pytest.raises(InputError, match="has schema 1; this version reads schema 2"):
+        run_sweep(sweep, str(store))
+
+
+def test_command_line_repairs(
+    store: Path, intact: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["sweep", str(intact / "sweep.toml"), "--out", str(store)]
+    flip(store / CHUNK)
+    flip(store / OTHER)
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"--out '{store}': 2 of 8 chunks are damaged, first chunk 1: '{CHUNK}'" in said
+    assert main([*command, "--repair"]) == 0
+    assert ", 2 of them damaged before, 6 were there" in capsys.readouterr().out
+    assert main(command) == 0
+    assert "all 8 chunks were there" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(shutil.which("sha256sum") is None, reason="no sha256sum")
+def test_checksums_are_those_of_sha256sum(store: Path) -> None:
+    given = [str(path) for path in (store / "checksums").rglob("*") if path.name != "zarr.json"]
+    command = ["sha256sum", "--check", "--strict", "--quiet"]
+    checked = [path for path in given if Path(path).is_file()]
+    assert len(checked) == 9
+    subprocess.run([*command, *checked], cwd=store, check=True)
+    flip(store / CHUNK)
+    assert subprocess.run([*command, *checked], cwd=store, check=False).returncode == 1
+
+
+def _damaged_at_random(store: Path, draw: random.Random) -> str:
+    """Damage a store in one way and return which."""
+    every = sorted(path for path in store.rglob("*") if path.is_file())
+    path, other = draw.sample(every, 2)
+    while path.read_bytes() == other.read_bytes():
+        path, other = draw.sample(every, 2)
+    size = path.stat().st_size
+    kind = draw.choice([*DAMAGES, "bit", "cut", "zeros", "copy", "swap", "parent", "two"])
+    if kind in DAMAGES:
+        DAMAGES[kind][0](path)
+    elif kind == "bit":
+        flip(path, draw.randrange(size), draw.randrange(8))
+    elif kind == "cut":
+        path.write_bytes(path.read_bytes()[: draw.randrange(size)])
+    elif kind == "zeros":
+        path.write_bytes(bytes(size))
+    elif kind == "copy":
+        shutil.copy(other, path)
+    elif kind == "swap":
+        swap(path, other)
+    elif kind == "parent" and path.parent != store:
+        shutil.rmtree(path.parent)
+        path.parent.write_text("no folder")
+    else:
+        flip(path, draw.randrange(size), draw.randrange(8))
+        flip(other, 0)
+    return f"{kind}: {path.relative_to(store)}, {other.relative_to(store)}"
+
+
+@pytest.mark.parametrize("seed", range(int(os.environ.get("PYHARNESS_DAMAGES", "60"))))
+def test_no_damage_is_believed(
+    seed: int, sweep: Sweep, store: Path, intact: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "forecast", lambda *given: 0.0)
+    what = _damaged_at_random(store, random.Random(seed))
+    try:
+        run_sweep(sweep, str(store))
+    except InputError as error:
+        assert str(error).startswith(f"--out '{store}': "), what
+        assert "damaged" in str(error), what
+    # What was computed again without a question had no checksums any more.
+    else:
+        assert files(store) == files(intact / "store"), what
+    run_sweep(sweep, str(store), repair=True)
+    assert files(store) == files(intact / "store"), what

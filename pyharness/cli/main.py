@@ -5,7 +5,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from pyharness.cli import say, say_again
+from pyharness.cli import say
+from pyharness.cli.interruption import came, report
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
 # Each verb is a module of pyharness.cli.verbs, loaded when it is called for.
@@ -65,8 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _leave_stdout()
         return _complain(f"standard output: {error.strerror or error}", 2)
     except KeyboardInterrupt:
-        say_again("")  # wipes how far it was
-        return _complain("interrupted", 130)
+        return report()
 
 
 def _run(arguments: list[str]) -> int:
@@ -96,6 +96,9 @@ def _leave_stdout() -> None:
 
 
 def _complain(message: str, code: int) -> int:
+    if came():
+        # An interrupt may turn into another error on its way here.
+        return report()
     line = " ".join(message.split())
     say(f"pyharness: {line}\n")
     return code

@@ -6,7 +6,6 @@ import logging
 import multiprocessing
 import os
 import re
-import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from pyharness.ensembles.children import deaf_children, end_with_parent
 from pyharness.ensembles.sweep import Arrays, Sweep, solve_chunk
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
@@ -88,14 +88,15 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
 def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
     # A fork of a process with threads, as those of NumPy and Zarr, may never wake up.
     context = multiprocessing.get_context("spawn")
-    # A Ctrl-C goes to all of them, and is the business of this one.
-    pool = ProcessPoolExecutor(workers, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    pool = ProcessPoolExecutor(workers, context, end_with_parent)
     waiting: dict[Future[Arrays], int] = {}
     rest = iter(chunks)
     try:
         while True:
             while len(waiting) < _AHEAD * workers and (chunk := next(rest, None)) is not None:
-                waiting[pool.submit(solve_chunk, sweep, chunk)] = chunk
+                # It starts processes as long as there are too few.
+                with deaf_children():
+                    waiting[pool.submit(solve_chunk, sweep, chunk)] = chunk
             if not waiting:
                 return
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
@@ -125,25 +126,46 @@ def _client(workers: int, address: str | None) -> Iterator[Any]:
         with _connected(dask, address) as client:
             yield client
         return
-    with _deaf_to_interrupts():
-        cluster = dask.LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
-        )
-    with cluster, dask.Client(cluster) as client:
+    with _local_cluster(dask, workers) as client:
         yield client
 
 
 @contextlib.contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C here, and in every process started meanwhile for as long as it lives."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
+    """Yield a client of a cluster on this machine, which is started while Ctrl-C is heard."""
+    started: list[Any] = []
+    errors: list[Exception] = []
+    wanted = threading.Event()
+    wanted.set()
+
+    def start() -> None:
+        try:
+            with contextlib.ExitStack() as stack, deaf_children():
+                cluster = dask.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+                )
+                stack.callback(cluster.close, timeout=_ANSWER)
+                client = dask.Client(cluster, set_as_default=False)
+                stack.callback(client.close, timeout=_ANSWER)
+                if wanted.is_set():
+                    started.append((client, stack.pop_all()))
+        except Exception as error:
+            errors.append(error)
+
+    # It takes seconds. Threads and processes that it starts hear no Ctrl-C, as this thread does.
+    thread = threading.Thread(target=start, daemon=True)
+    thread.start()
     try:
-        yield
+        while thread.is_alive():
+            thread.join(0.1)
+        if errors:
+            raise errors[0]
+        (client, stack), = started
+        yield client
     finally:
-        signal.signal(signal.SIGINT, before)
+        wanted.clear()
+        for _, stack in started:
+            stack.close()
 
 
 def _connected(dask: Any, address: str) -> Any:

@@ -10,7 +10,7 @@ from pyharness.ensembles.executors import Engine
 from pyharness.ensembles.loads import looped_fields
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import scratch
-from pyharness.ensembles.sweep import Indices, Sweep, solve_chunk, solve_points, spread
+from pyharness.ensembles.sweep import Arrays, Indices, Sweep, solve_chunk, solve_points, spread
 
 # Of a sample: scenes from all over the grid, first a few.
 _SAMPLES = (8, 256, 2048, 8192)
@@ -48,38 +48,41 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the times to write and to read the files of a chunk, tried out beside a store."""
-    scenes = math.prod(sweep.chunk_shape)
-    pattern = np.random.default_rng(0)
-    with scratch(sweep, path) as store:
-        found = {}
-        for asked in sweep.reductions:
-            values = empty(asked, scenes)
-            # Bytes as they come: what is all the same would be compressed to nothing.
-            values[...] = pattern.integers(0, 100, values.shape)
-            found[asked.name] = values * 0.1 if values.dtype.kind == "f" else values
-        counts = [0, 0]
-        times = [0.0, 0.0]
-        for chunk in range(min(_FILES, sweep.n_chunks)):
-            box = sweep.box(chunk)
-            shape = tuple(part.stop - part.start for part in box)
-            part = {
-                name: values[: math.prod(shape)].reshape(*shape, *values.shape[1:])
-                for name, values in found.items()
-            }
-            begin = time.perf_counter()
-            store.write(chunk, part)
-            middle = time.perf_counter()
-            for asked in sweep.reductions:
-                store.read(asked.name, chunk)
-            end = time.perf_counter()
-            # The first has to import what Zarr needs.
-            if chunk > 0 or sweep.n_chunks == 1:
-                counts = [each + 1 for each in counts]
-                times = [times[0] + middle - begin, times[1] + end - middle]
-            if sum(times) > _ENOUGH:
-                break
-        return times[0] / counts[0], times[1] / counts[1]
+    """Return the times to write and to read the files of a chunk, tried out beside a store.
+
+    Both are 0 where the disk takes no file: the sweep itself will say so.
+    """
+    times = []
+    try:
+        with scratch(sweep, path) as store:
+            for chunk in range(min(_FILES, sweep.n_chunks)):
+                part = _pattern(sweep, chunk)
+                begin = time.perf_counter()
+                store.write(chunk, part)
+                middle = time.perf_counter()
+                for asked in sweep.reductions:
+                    store.read(asked.name, chunk)
+                times.append((middle - begin, time.perf_counter() - middle))
+                if sum(map(sum, times)) > _ENOUGH:
+                    break
+    except OSError:
+        return 0.0, 0.0
+    # The first has to import what Zarr needs.
+    write, read = np.mean(times[1:] or times, axis=0)
+    return float(write), float(read)
+
+
+def _pattern(sweep: Sweep, chunk: int) -> Arrays:
+    """Return arrays of a chunk that are not compressed to nothing."""
+    draw = np.random.default_rng(chunk)
+    shape = tuple(part.stop - part.start for part in sweep.box(chunk))
+    found = {}
+    for asked in sweep.reductions:
+        values = empty(asked, math.prod(shape))
+        values[...] = draw.integers(0, 100, values.shape)
+        scaled = values * 0.1 if values.dtype.kind == "f" else values
+        found[asked.name] = scaled.reshape(*shape, *values.shape[1:])
+    return found
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness.ensembles import run
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.store import opened
 from pyharness.ensembles.sweep import solve_chunk
@@ -76,7 +77,7 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
 
     sweep = read_sweep(written(tmp_path, PROGRAM.replace("chunk = 20", "chunk = 4")))
     run_sweep(sweep, str(tmp_path / "whole"))
-    put, room = _local._put, [70]
+    put, room = _local._put, [90]
 
     def full(path: Path, value: Any, *more: Any, **options: Any) -> Any:
         room[0] -= 1
@@ -88,6 +89,7 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
 
     with monkeypatch.context() as patched:
         patched.setattr(_local, "_put", full)
+        patched.setattr(run, "forecast", lambda *given: 0.0)
         with pytest.raises(InputError, match="No space left on device; what is done stays"):
             run_sweep(sweep, str(tmp_path / "full"))
     with opened(sweep, str(tmp_path / "full")) as store:

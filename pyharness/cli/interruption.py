@@ -1,0 +1,146 @@
+"""Ctrl-C on the command line: one line and exit code 130, whenever it comes.
+
+A KeyboardInterrupt can come between any two instructions, and not all code lets it through: an
+import may turn it into another error, a finalizer or a callback drops it. So what counts is that
+the signal came, not which exception arrives; and one that was dropped is raised again.
+"""
+
+import atexit
+import contextlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import Any
+
+from pyharness.cli import say
+
+_AGAIN = 0.25  # s, after which a dropped interrupt is raised again
+_MOST = 3  # of them, by the user, until nothing is waited for any more
+_PATIENCE = 2.0  # s, for what is tidied up when a process ends
+CODE = 130
+LINE = "pyharness: interrupted\n"
+
+
+class _Interruption:
+    """How often the user interrupted, whether that was reported, and what happens when it comes."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.is_reported = False
+
+    def leave(self, *_: object) -> None:
+        """End the process now: nothing was begun that would have to be tidied up."""
+        try:
+            if not self.is_reported:
+                os.write(2, LINE.encode())
+        finally:
+            os._exit(CODE)
+
+    def interrupt(self, number: int, frame: FrameType | None) -> None:
+        """Raise KeyboardInterrupt, and see to it that it is not dropped."""
+        self.count += 1
+        if self.count >= _MOST:
+            self.leave()
+        signal.signal(signal.SIGALRM, self._again)
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN, _AGAIN)
+        raise KeyboardInterrupt
+
+    def _again(self, *_: object) -> None:
+        # Who has another handler for a while is not to be disturbed.
+        is_ours = signal.getsignal(signal.SIGINT) == self.interrupt
+        if is_ours and not self.is_reported and not _is_on_its_way():
+            raise KeyboardInterrupt
+
+
+_STATE = _Interruption()
+
+
+def came() -> bool:
+    """Return whether the user has interrupted this command."""
+    return _STATE.count > 0
+
+
+def leave_when_interrupted() -> bool:
+    """Let Ctrl-C end the process at once, with its line; return False where it is ignored.
+
+    It is for times in which nothing has to be tidied up: while modules are imported, and after the
+    results are written.
+    """
+    # A shell starts what runs in the background with the signal ignored, and so it stays.
+    if not callable(signal.getsignal(signal.SIGINT)):
+        return False
+    signal.signal(signal.SIGINT, _STATE.leave)
+    return True
+
+
+def run_interruptible(main: Callable[[], int]) -> int:
+    """Return the exit code of a command, 130 where the user has interrupted it."""
+    hook = sys.unraisablehook
+    try:
+        sys.unraisablehook = _quiet_of(hook)
+        if callable(signal.getsignal(signal.SIGINT)):
+            signal.signal(signal.SIGINT, _STATE.interrupt)
+        code = main()
+    except BaseException:
+        # What an interrupt became on its way is no error of its own.
+        if not came():
+            raise
+        code = -1
+    leave_when_interrupted()
+    if came():
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        report()
+        return CODE
+    return code
+
+
+def report() -> int:
+    """Say in one line that the command was interrupted, and return its exit code."""
+    if not _STATE.is_reported:
+        _STATE.is_reported = came()
+        # How far it was is in the last line of a terminal.
+        say(f"\r\x1b[K{LINE}" if sys.stderr.isatty() else LINE)
+    return CODE
+
+
+def leave_interrupted() -> None:
+    """End the process: temporary files are removed, and other processes and threads not waited for.
+
+    Python itself would wait for threads, free all memory piece by piece, and where the signal came
+    within an import, die by the signal.
+    """
+    if "multiprocessing" in sys.modules:
+        import multiprocessing
+
+        for child in multiprocessing.active_children():
+            child.kill()
+    tidying = threading.Thread(target=atexit._run_exitfuncs, daemon=True)
+    tidying.start()
+    tidying.join(_PATIENCE)
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(Exception):
+            stream.flush()
+    os._exit(CODE)
+
+
+def _is_on_its_way() -> bool:
+    """Return whether a KeyboardInterrupt is being handled: what runs now is tidying up."""
+    error: BaseException | None = sys.exception()
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__context__
+    return False
+
+
+def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return the hook of errors that nobody can catch, without a word on interrupts."""
+
+    def told(unraisable: Any) -> None:
+        if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
+            hook(unraisable)
+
+    return told

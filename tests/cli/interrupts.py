@@ -1,0 +1,165 @@
+"""Commands interrupted or killed at random moments: ``python -m tests.cli.interrupts 300``."""
+
+import argparse
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from tests.ensembles.sweeps import text
+
+_PATIENCE = 20.0  # s, until a command that was interrupted must have ended
+_MOURNING = 10.0  # s, until the workers of a command that was killed must have ended
+# Long enough for every trial, with chunks short enough that each is soon written.
+SWEEP = text(
+    '[[axis]]\nfield = "tilt"\nfrom = 0.1\nto = 1.0\ncount = 100',
+    '[[axis]]\nfield = "omega.magnitude"\nfrom = 1.0\nto = 2.0\ncount = 10000',
+    top='chunk = 1000\nreductions = ["end", { name = "flips", samples = 50 }]',
+)
+EXECUTORS = ("here", "processes", "dask")
+
+
+class Trial(NamedTuple):
+    """What came of a trial: the command, when the signal was sent (s), and what was wrong."""
+
+    verb: str
+    moment: float
+    to_group: bool
+    seconds: float
+    outcome: str
+    errors: str
+
+
+def commands(folder: Path) -> dict[str, list[str]]:
+    """Return the commands, by a name."""
+    (folder / "sweep.toml").write_text(SWEEP)
+    found = {"compare": ["compare", "--case", "3"], "verify": ["verify"]}
+    for executor in EXECUTORS:
+        found[executor] = ["sweep", str(folder / "sweep.toml"), "--executor", executor]
+        if executor != "here":
+            found[executor] += ["--workers", "2"]
+    return found
+
+
+def interrupted(
+    verb: str, arguments: list[str], moment: float, to_group: bool, sent: signal.Signals
+) -> Trial:
+    """Send a command a signal after some seconds, and say what came of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        if verb in EXECUTORS:
+            arguments = [*arguments, "--out", str(Path(folder) / "store")]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "pyharness", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        time.sleep(moment)
+        was_running = process.poll() is None
+        (os.killpg if to_group else os.kill)(process.pid, sent)
+        begin = time.monotonic()
+        try:
+            _, errors = process.communicate(timeout=_PATIENCE)
+            outcome = _judged(process.returncode, errors, was_running, sent)
+        except subprocess.TimeoutExpired:
+            outcome, errors = "LOST", ""
+        seconds = time.monotonic() - begin
+        if outcome != "LOST" and (left := _left_behind(process.pid)):
+            outcome = f"LEFT {left}"
+        _end(process.pid)
+        process.communicate()
+        return Trial(verb, moment, to_group, seconds, outcome, errors)
+
+
+def _judged(code: int, errors: str, was_running: bool, sent: signal.Signals) -> str:
+    if not was_running:
+        return "had ended"
+    if sent == signal.SIGKILL:
+        return "killed" if code == -signal.SIGKILL else f"CODE {code}"
+    # Until the interpreter has read this project's first file, it is not ours to answer: it dies
+    # by the signal, or with a traceback that has no file of ours in it.
+    if code == -signal.SIGINT and not errors:
+        return "interpreter's"
+    if "Traceback" in errors:
+        ours = re.search(r'File ".*/pyharness/(?!__init__)[\w/]+\.py"', errors)
+        return "TRACEBACK" if ours else "interpreter's"
+    # The forecast of a sweep is a line of its own.
+    lines = [line for line in errors.splitlines() if " scenes in " not in line]
+    if code == 130 and lines == ["pyharness: interrupted"]:
+        return "interrupted"
+    return f"CODE {code}, {len(lines)} lines"
+
+
+def _left_behind(session: int) -> str:
+    """Return the processes that a command leaves behind, after a while."""
+    end = time.monotonic() + _MOURNING
+    while (left := _members(session)) and time.monotonic() < end:
+        time.sleep(0.05)
+    return " ".join(map(str, left))
+
+
+def _members(session: int) -> list[int]:
+    found = subprocess.run(
+        ["ps", "-eo", "pid=,sess=,stat="], capture_output=True, text=True, check=True
+    ).stdout
+    rows = (line.split() for line in found.splitlines())
+    return [int(pid) for pid, sess, state in rows if int(sess) == session and state[0] != "Z"]
+
+
+def _end(session: int) -> None:
+    for pid in _members(session):
+        with_group = os.getpgid(pid)
+        if with_group == session:
+            os.kill(pid, signal.SIGKILL)
+
+
+def trials(
+    count: int, longest: float, seed: int, sent: signal.Signals, verbs: list[str]
+) -> Iterator[Trial]:
+    """Yield trials with moments drawn from 0 to `longest` seconds."""
+    draw = random.Random(seed)
+    with tempfile.TemporaryDirectory() as folder:
+        every = commands(Path(folder))
+        for i in range(count):
+            verb = verbs[i % len(verbs)]
+            # A terminal sends a Ctrl-C to all processes of the group, `kill` to one.
+            to_group = sent == signal.SIGINT and draw.random() < 0.5
+            yield interrupted(verb, every[verb], draw.uniform(0.0, longest), to_group, sent)
+
+
+def main() -> int:
+    """Run trials, say each that went wrong, and count what came of all."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", type=int, nargs="?", default=300)
+    parser.add_argument("--longest", type=float, default=4.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kill", action="store_true")
+    parser.add_argument("--verbs", default="compare,verify,here,processes,dask")
+    chosen = parser.parse_args()
+    sent = signal.SIGKILL if chosen.kill else signal.SIGINT
+    found: Counter[tuple[str, str]] = Counter()
+    slowest = 0.0
+    verbs = chosen.verbs.split(",")
+    for each in trials(chosen.count, chosen.longest, chosen.seed, sent, verbs):
+        found[each.verb, each.outcome.split()[0]] += 1
+        slowest = max(slowest, each.seconds)
+        if each.outcome[:2].isupper():
+            print(f"{each.verb} at {each.moment:.3f} s, group {each.to_group}: {each.outcome}")
+            print(each.errors[-3000:], flush=True)
+    for (verb, outcome), count in sorted(found.items()):
+        print(f"{verb:10s} {outcome:15s} {count}")
+    print(f"slowest end after the signal: {slowest:.2f} s")
+    return int(any(outcome[:2].isupper() for _, outcome in found))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

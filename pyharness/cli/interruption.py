@@ -31,7 +31,7 @@ class _Interruption:
         self.count = 0
         self.is_reported = False
 
-    def leave(self, *_: object) -> None:
+    def leave_at_once(self, *_: object) -> None:
         """End the process now: nothing was begun that would have to be tidied up."""
         try:
             if not self.is_reported:
@@ -43,7 +43,7 @@ class _Interruption:
         """Raise KeyboardInterrupt, and see to it that it is not dropped."""
         self.count += 1
         if self.count >= _MOST:
-            self.leave()
+            self.leave_at_once()
         signal.signal(signal.SIGALRM, self._again)
         signal.setitimer(signal.ITIMER_REAL, _AGAIN, _AGAIN)
         raise KeyboardInterrupt
@@ -72,25 +72,25 @@ def leave_when_interrupted() -> bool:
     # A shell starts what runs in the background with the signal ignored, and so it stays.
     if not callable(signal.getsignal(signal.SIGINT)):
         return False
-    signal.signal(signal.SIGINT, _STATE.leave)
+    signal.signal(signal.SIGINT, _STATE.leave_at_once)
     return True
 
 
 def run_interruptible(main: Callable[[], int]) -> int:
     """Return the exit code of a command, 130 where the user has interrupted it."""
-    hook = sys.unraisablehook
+    hook, escaped, code = sys.unraisablehook, False, CODE
     try:
         sys.unraisablehook = _quiet_of(hook)
         if callable(signal.getsignal(signal.SIGINT)):
             signal.signal(signal.SIGINT, _STATE.interrupt)
         code = main()
-    except BaseException:
+    except BaseException as error:
         # What an interrupt became on its way is no error of its own.
-        if not came():
+        if not came() and not isinstance(error, KeyboardInterrupt):
             raise
-        code = -1
+        escaped = True
     leave_when_interrupted()
-    if came():
+    if came() or escaped:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         report()
         return CODE
@@ -106,24 +106,27 @@ def report() -> int:
     return CODE
 
 
-def leave_interrupted() -> None:
-    """End the process: temporary files are removed, and other processes and threads not waited for.
+def leave(code: int) -> None:
+    """End the process with an exit code; temporary files are removed before.
 
-    Python itself would wait for threads, free all memory piece by piece, and where the signal came
-    within an import, die by the signal.
+    Python itself would wait for threads, free all memory piece by piece, and drop an interrupt, or
+    die by its signal. After an interrupt nothing is waited for, neither processes nor threads.
     """
-    if "multiprocessing" in sys.modules:
-        import multiprocessing
+    if code == CODE:
+        if "multiprocessing" in sys.modules:
+            import multiprocessing
 
-        for child in multiprocessing.active_children():
-            child.kill()
-    tidying = threading.Thread(target=atexit._run_exitfuncs, daemon=True)
-    tidying.start()
-    tidying.join(_PATIENCE)
+            for child in multiprocessing.active_children():
+                child.kill()
+        tidying = threading.Thread(target=atexit._run_exitfuncs, daemon=True)
+        tidying.start()
+        tidying.join(_PATIENCE)
+    else:
+        atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(Exception):
             stream.flush()
-    os._exit(CODE)
+    os._exit(code)
 
 
 def _is_on_its_way() -> bool:

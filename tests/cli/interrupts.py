@@ -1,6 +1,7 @@
 """Commands interrupted or killed at random moments: ``python -m tests.cli.interrupts 300``."""
 
 import argparse
+import contextlib
 import os
 import random
 import re
@@ -49,6 +50,19 @@ def commands(folder: Path) -> dict[str, list[str]]:
     return found
 
 
+@contextlib.contextmanager
+def hearing() -> Iterator[None]:
+    """Let commands started meanwhile hear a Ctrl-C, also where this process ignores it.
+
+    A shell starts what runs in the background so.
+    """
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def interrupted(
     verb: str, arguments: list[str], moment: float, to_group: bool, sent: signal.Signals
 ) -> Trial:
@@ -56,13 +70,14 @@ def interrupted(
     with tempfile.TemporaryDirectory() as folder:
         if verb in EXECUTORS:
             arguments = [*arguments, "--out", str(Path(folder) / "store")]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "pyharness", *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+        with hearing():
+            process = subprocess.Popen(
+                [sys.executable, "-m", "pyharness", *arguments],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+            )
         time.sleep(moment)
         was_running = process.poll() is None
         (os.killpg if to_group else os.kill)(process.pid, sent)
@@ -73,8 +88,8 @@ def interrupted(
         except subprocess.TimeoutExpired:
             outcome, errors = "LOST", ""
         seconds = time.monotonic() - begin
-        if outcome != "LOST" and (left := _left_behind(process.pid)):
-            outcome = f"LEFT {left}"
+        if outcome != "LOST" and (left := left_behind(process.pid)):
+            outcome = f"LEFT {' '.join(map(str, left))}"
         _end(process.pid)
         process.communicate()
         return Trial(verb, moment, to_group, seconds, outcome, errors)
@@ -99,12 +114,12 @@ def _judged(code: int, errors: str, was_running: bool, sent: signal.Signals) -> 
     return f"CODE {code}, {len(lines)} lines"
 
 
-def _left_behind(session: int) -> str:
+def left_behind(session: int) -> list[int]:
     """Return the processes that a command leaves behind, after a while."""
     end = time.monotonic() + _MOURNING
     while (left := _members(session)) and time.monotonic() < end:
         time.sleep(0.05)
-    return " ".join(map(str, left))
+    return left
 
 
 def _members(session: int) -> list[int]:

@@ -1,0 +1,129 @@
+"""Ctrl-C and SIGKILL: one line, exit code 130, nothing left behind, whenever they come."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.cli.interrupts import SWEEP, hearing, left_behind, trials
+
+# A command that interrupts itself, and one of the ways in which an interrupt gets lost.
+SCRIPT = """
+import os, signal, sys, time
+from pyharness.cli import interruption, main
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+
+def waited():
+    time.sleep(5.0)
+    print("went on")
+    return 0
+
+class Finalized:
+    def __del__(self):
+        interrupt()
+
+def command(arguments=None):
+    {body}
+
+interruption.leave_when_interrupted()
+main._run = command
+code = interruption.run_interruptible(main.main)
+print("code", code)
+interruption.leave(code)
+"""
+LOST = {
+    "caught": "try: interrupt()\n    except BaseException: pass\n    return waited()",
+    "dropped by a finalizer": "Finalized()\n    return waited()",
+    "turned into another error": "try: interrupt()\n    except BaseException: raise ImportError",
+    "turned into an error of input": (
+        "from pyharness.model.errors import InputError\n"
+        "    try: interrupt()\n    except BaseException: raise InputError('no zarr')"
+    ),
+    "at the very end": "try: interrupt()\n    except BaseException: return 0",
+    "passed on": "interrupt()\n    return waited()",
+}
+
+
+def run_script(body: str) -> "subprocess.CompletedProcess[str]":
+    with hearing():
+        return subprocess.run(
+            [sys.executable, "-c", SCRIPT.format(body=body)],
+            capture_output=True,
+            text=True,
+            timeout=60.0,
+            check=False,
+        )
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_interrupt_is_not_lost(name: str) -> None:
+    found = run_script(LOST[name])
+    assert (found.returncode, found.stderr) == (130, "pyharness: interrupted\n")
+    assert "went on" not in found.stdout
+
+
+def test_what_tidies_up_is_not_interrupted_again() -> None:
+    body = "try: interrupt()\n    finally:\n        time.sleep(1.0)\n        print('tidy')"
+    found = run_script(body)
+    assert found.stdout.split() == ["tidy", "code", "130"]
+    assert found.stderr == "pyharness: interrupted\n"
+
+
+def test_third_interrupt_waits_for_nothing() -> None:
+    body = (
+        "for _ in range(2):\n        try: interrupt()\n        except BaseException: pass\n"
+        "    try: raise KeyboardInterrupt\n    except BaseException:\n"
+        "        interrupt(); waited()"
+    )
+    found = run_script(body)
+    assert (found.returncode, found.stdout) == (130, "")
+    assert found.stderr == "pyharness: interrupted\n"
+
+
+def test_interrupt_that_the_caller_ignores_stays_ignored() -> None:
+    deaf = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "
+    script = SCRIPT.format(body="interrupt(); return 0")
+    found = subprocess.run(
+        [sys.executable, "-c", deaf + "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])",
+         "-c", script],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (found.stdout, found.stderr) == ("code 0\n", "")
+
+
+def test_commands_interrupted_at_random_moments_end_in_a_line() -> None:
+    verbs = ["compare", "verify", "here", "processes", "dask"]
+    for each in trials(10, 4.0, 2, signal.SIGINT, verbs):
+        assert each.outcome in ("interrupted", "interpreter's", "had ended"), each
+
+
+@pytest.mark.parametrize("executor", ["processes", "dask"])
+def test_workers_end_with_the_process_that_started_them(executor: str, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    (tmp_path / "sweep.toml").write_text(SWEEP)
+    command = ["sweep", str(tmp_path / "sweep.toml"), "--out", str(tmp_path / "store")]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pyharness", *command, "--executor", executor, "--workers", "2"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        end = time.monotonic() + 120.0
+        while not (tmp_path / "store" / "checksums" / "c").exists():
+            assert process.poll() is None
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    finally:
+        process.kill()
+        process.wait()
+    left = left_behind(process.pid)
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    assert left == []

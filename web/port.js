@@ -9,8 +9,14 @@ function exact(key, value) {
   return Number.isFinite(value) ? value : String(value);
 }
 
+const SCHEMA = 1;
+
 for await (const line of createInterface({ input: process.stdin })) {
-  const { program, scene, listing, lipschitz, may_stop: mayStop } = JSON.parse(line);
+  const { schema, program, scene, listing, lipschitz, may_stop: mayStop } = JSON.parse(line);
+  if (schema !== SCHEMA) {
+    process.stderr.write(`port.js: schema ${schema}; this port reads schema ${SCHEMA} of a port request\n`);
+    process.exit(2);
+  }
   const active = new Set([...listing.defects, ...listing.readings, ...listing.conjectures]);
   const run = PROGRAMS[program].run(scene, active, lipschitz, mayStop);
   process.stdout.write(`${JSON.stringify(run, exact)}\n`);

@@ -12,6 +12,7 @@ from typing import Self
 
 from pyharness.model.errors import InputError
 from pyharness.model.pipes import read_input, write_waiting
+from pyharness.model.schema import check_schema
 from pyharness.views.pictures import numbers_beside
 
 _LARGEST_MARK = 1 << 24  # bytes of the file that lists what a verb wrote
@@ -267,10 +268,14 @@ def _why_not_anew(folder: Path, mark: str) -> str:
 
 def _listed(mark: Path) -> Iterable[str]:
     try:
-        files = json.loads(read_input(mark, "--out", _LARGEST_MARK, "a list of files"))["files"]
-    except (OSError, ValueError, TypeError, KeyError):
+        described = json.loads(read_input(mark, "--out", _LARGEST_MARK, "a list of files"))
+        files = described["files"]
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return ()
-    return files if isinstance(files, dict) else ()
+    if not isinstance(files, dict):
+        return ()
+    check_schema(f"'{mark}'", "edition", described.get("schema"), "give a new name")
+    return files
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:

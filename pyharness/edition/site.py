@@ -21,6 +21,7 @@ from pyharness.history.tei import tei_document
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.records import build_record
+from pyharness.model.schema import SCHEMAS
 from pyharness.views.json import json_text
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def build_site(
         content[page.path] = _rendered(page)
         places += page.found
     content |= _assets(places) | documents.files(docs)
-    content[MARK] = json_text(listed(content)).encode()
+    content[MARK] = json_text({"schema": SCHEMAS["edition"], **listed(content)}).encode()
     return content
 
 

@@ -23,14 +23,12 @@ class DamageError(Exception):
 class Label(NamedTuple):
     """The identity of a store: its schema, the version of pyharness, the SHA-256 of its sweep."""
 
-    schema: int
+    schema: object  # a whole number, where it is a store that pyharness wrote
     version: str
     fingerprint: str
 
 
-def checksum_text(
-    label: Label, part: str, folder: Path, names: Sequence[str], limit: int
-) -> bytes:
+def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
     """Return the checksums of files of a store as they are now.
 
     Parameters

@@ -160,7 +160,7 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
             thread.join(0.1)
         if errors:
             raise errors[0]
-        (client, stack), = started
+        ((client, stack),) = started
         yield client
     finally:
         wanted.clear()

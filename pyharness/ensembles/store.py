@@ -28,7 +28,6 @@ from pyharness.ensembles.store_layout import (
     CHECKSUMS,
     LARGEST_METADATA,
     METADATA,
-    SCHEMA,
     filled,
     label,
     labels,
@@ -215,14 +214,12 @@ def check_store(sweep: Sweep, path: str) -> bool:
         raise InputError(f"--out '{path}': {error.strerror or error}") from None
     ours, known = label(sweep), labels(folder)
     if not known:
-        raise InputError(
-            f"--out '{path}': is not empty, and no store of a sweep; give a new name"
-        )
+        raise InputError(f"--out '{path}': is not empty, and no store of a sweep; give a new name")
     # Either may be damaged, which is found out and said when the store is opened.
-    if ours in known:
+    if any(type(each.schema) is int and each == ours for each in known):
         return True
     found = known[0]
-    check_schema(f"--out '{path}'", "store of a sweep", found.schema, SCHEMA, _SAME_SWEEP)
+    check_schema(f"--out '{path}'", "sweep store", found.schema, _SAME_SWEEP)
     if found.fingerprint != ours.fingerprint:
         raise InputError(
             f"--out '{path}': is the store of another sweep file (SHA-256 {found.fingerprint:.12}, "

@@ -24,8 +24,8 @@ from pyharness.ensembles.fields import units_of
 from pyharness.ensembles.reductions import REDUCTIONS, empty
 from pyharness.ensembles.sweep import Sweep
 from pyharness.model.distribution import version
+from pyharness.model.schema import SCHEMAS
 
-SCHEMA = 2
 CHECKSUMS = "checksums"  # the group in a store that holds them; no array may be called so
 METADATA = f"{CHECKSUMS}/metadata"
 LARGEST_METADATA = 1 << 28  # bytes
@@ -36,17 +36,19 @@ _HEAD = re.compile(
 
 def label(sweep: Sweep) -> Label:
     """Return the identity of a sweep's store."""
-    return Label(SCHEMA, version(), sweep.fingerprint)
+    return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 
 def labels(folder: Path) -> list[Label]:
     """Return the identity of a store, as its metadata and as their checksums have it."""
     found = []
-    with contextlib.suppress(DamageError, OSError, ValueError, LookupError, TypeError, RecursionError):
+    with contextlib.suppress(
+        DamageError, OSError, ValueError, LookupError, TypeError, RecursionError
+    ):
         attributes = json.loads(read_bounded(folder, "zarr.json", LARGEST_METADATA))["attributes"]
-        schema, *words = (attributes[key] for key in ("schema", "pyharness_version", "sweep_sha256"))
+        words = [attributes[key] for key in ("pyharness_version", "sweep_sha256")]
         if all(isinstance(each, str) for each in words):
-            found.append(Label(schema, *words))
+            found.append(Label(attributes.get("schema"), *words))
     with contextlib.suppress(DamageError, OSError, ValueError):
         head = read_bounded(folder, METADATA, LARGEST_METADATA).split(b"\n")[0].decode()
         match = _HEAD.fullmatch(head)
@@ -86,7 +88,7 @@ def _fill(sweep: Sweep, folder: Path) -> None:
 
     fields = [axis.field for axis in sweep.axes if axis.field != axis.dimension]
     attributes: dict[str, Any] = {
-        "schema": SCHEMA,
+        "schema": SCHEMAS["sweep store"],
         "title": sweep.name,
         "pyharness_version": version(),
         "sweep": sweep.text,
@@ -100,9 +102,7 @@ def _fill(sweep: Sweep, folder: Path) -> None:
         # xarray looks for it, and warns where it is missing; Zarr warns where it is made.
         warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
         zarr.consolidate_metadata(folder)
-    text = checksum_text(
-        label(sweep), "metadata", folder, metadata_files(sweep), LARGEST_METADATA
-    )
+    text = checksum_text(label(sweep), "metadata", folder, metadata_files(sweep), LARGEST_METADATA)
     place(folder, METADATA, text)
 
 

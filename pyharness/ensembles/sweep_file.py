@@ -23,6 +23,7 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import (
     case_scene,
     check_keys,
+    check_written_schema,
     read_file,
     scene_of,
     scene_of_file,
@@ -30,7 +31,7 @@ from pyharness.model.scene_file import (
 )
 from pyharness.model.values import finite, number, truth, whole
 
-_KEYS = ("name", "scene", "axis", "solve", "reductions", "chunk", "picture")
+_KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk", "picture")
 _SOLVE = (
     *("method", "tolerance", "t_end"),
     *("program", "listing", "reading", "lipschitz", "may_stop"),
@@ -70,6 +71,7 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
 
 
 def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str]) -> Sweep:
+    check_written_schema(data, "sweep file")
     check_keys(data, _KEYS, "top level")
     name = data.get("name", path.stem)
     if not isinstance(name, str):

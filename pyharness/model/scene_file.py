@@ -11,6 +11,7 @@ from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.facts import facts
 from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.model.values import whole
 
 _LARGEST_FILE = 1_000_000
@@ -106,6 +107,7 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     body, values = body_of(scene)
     law = scene.torque
     lines = [f"# {line}" for line in comments]
+    lines.append(f"schema = {SCHEMAS['scene file']}")
     lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
     lines += [f"{body} = {values}"]
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
@@ -132,7 +134,8 @@ def body_of(scene: Scene) -> tuple[str, list[Any]]:
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
     """Return the scene that the content of a file describes; InputError where it describes none."""
-    check_keys(data, ("name", *_TABLES), "top level")
+    check_written_schema(data, "scene file")
+    check_keys(data, ("schema", "name", *_TABLES), "top level")
     tables: dict[str, dict[str, Any]] = {}
     for table, keys in _TABLES.items():
         tables[table] = data.get(table, {})
@@ -179,6 +182,12 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
             if key not in entry:
                 raise InputError(f"{where}: {key} is missing")
     return [(entry["amplitude"], entry["frequency"]) for entry in entries]
+
+
+def check_written_schema(data: dict[str, Any], kind: str) -> None:
+    """Refuse another schema in a file that people write, who may leave the number out."""
+    given = data.get("schema", SCHEMAS[kind])
+    check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:

@@ -1,8 +1,8 @@
 """Vectors: operations of the CDC with their results, word for word, and who computes them.
 
 Those in `data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC
-60463560); a public emulator of its float unit gives the same. A file of that form is a list of
-tables: `name`, `op` (an instruction of `octal.operated`), `x`, `y` and `result`, in octal.
+60463560); a public emulator of its float unit gives the same. A file of that form is a table: its
+`schema`, and `vectors`, a list of tables: `name`, `op` (an instruction of `octal.operated`), `x`, `y` and `result`, in octal.
 """
 
 import json
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.pipes import read_input
+from pyharness.model.schema import check_schema
 from pyharness.original.octal import operated
 
 OURS = Path(__file__).parent.parent / "data" / "words" / "cdc.json"
@@ -48,11 +49,16 @@ def answers(path: str | Path = OURS) -> list[Answer]:
     """
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
-        entries = json.loads(content)
+        data = json.loads(content)
     except (ValueError, RecursionError) as error:
         raise InputError(f"vectors '{path}': no JSON: {error}; give a JSON file") from None
+    allowed = 'allowed: {"schema": 1, "vectors": [...]}'
+    if not isinstance(data, dict):
+        raise InputError(f"vectors '{path}': {kind_of(data)}; {allowed}")
+    check_schema(f"vectors '{path}'", "vector file", data.get("schema"), allowed)
+    entries = data.get("vectors")
     if not isinstance(entries, list) or not entries:
-        raise InputError(f"vectors '{path}': {kind_of(entries)}; allowed: a list of vectors")
+        raise InputError(f"vectors '{path}': vectors is {kind_of(entries)}; {allowed}")
     return [_answer(f"vectors '{path}', entry {n}", each) for n, each in enumerate(entries, 1)]
 
 

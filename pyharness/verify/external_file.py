@@ -15,7 +15,7 @@ from typing import Any
 from pyharness.model.attitude import IDENTITY, Quaternion, of_angles, unit_quaternion
 from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.scene_file import check_keys, read_toml, scene_of
+from pyharness.model.scene_file import check_keys, check_written_schema, read_toml, scene_of
 from pyharness.model.values import number
 
 UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
@@ -115,7 +115,8 @@ def _read(path: str | Path, given: str | None) -> Problem:
 
 
 def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
-    check_keys(data, (*_TEXTS, "unit", "sequence", *_SCENE, "value"), "top level")
+    check_written_schema(data, "external file")
+    check_keys(data, ("schema", *_TEXTS, "unit", "sequence", *_SCENE, "value"), "top level")
     if not re.fullmatch(r"[\w.-]+", name):
         raise InputError("the name of the file names its checks; allowed: letters, digits, - _ .")
     texts = {}

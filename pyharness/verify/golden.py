@@ -26,10 +26,12 @@ from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene, toml_of
+from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.theory.conditioning import conditioning
 from pyharness.verify.selection import RECORD, Selection, replay
 
+_ANEW = "verify --update writes it anew"
 _STEPS = (1, 10)
 _RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
 _TOLERANCE = 1e-9
@@ -139,6 +141,10 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
     for path in sorted(folder.glob("*.toml")):
         try:
             file = toml_of(read_input(path, "file", _LARGEST, "a record"), "file")
+        except InputError as error:
+            raise InputError(f"'{path}': is no record ({error}); {_ANEW}") from None
+        check_schema(f"'{path}'", "golden record", file.get("schema"), _ANEW)
+        try:
             for entry in file["trajectory"]:
                 _rows(entry)
                 _ = [entry[key] for key in _KEYS]
@@ -146,8 +152,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
             found[path.stem] = file
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(
-                f"'{path}': is no record ({' '.join(str(error).split()) or 'empty'}); "
-                "verify --update writes it anew"
+                f"'{path}': is no record ({' '.join(str(error).split()) or 'empty'}); {_ANEW}"
             ) from None
     return found
 
@@ -236,6 +241,7 @@ def _text(name: str, entries: list[dict[str, Any]]) -> str:
     lines = [
         f"# The {kind} {name}: rows are step, time, TIME, omega, velocity (programs).",
         "# Written by: python -m pyharness verify --update",
+        f"schema = {SCHEMAS['golden record']}",
         f'mathematics = "{mathematics()}"',
     ]
     for entry in entries:

@@ -11,6 +11,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.records import listing_record, scene_record
 from pyharness.model.scene import Scene
+from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop
 from pyharness.original.equations import card_torque
 from pyharness.verify.port_process import PortError
@@ -50,7 +51,7 @@ def request(
     `lipschitz` in 1/s, by default that of the decks; without `may_stop` no test ends the run.
     """
     asked = {
-        "schema": 1,
+        "schema": SCHEMAS["port request"],
         "program": listing.program,
         "scene": asked_scene(scene),
         "listing": listing_record(listing),

@@ -15,7 +15,7 @@ from pyharness.edition.libraries import LIBRARIES
 from pyharness.edition.report import MARK
 
 Capture = pytest.CaptureFixture[str]
-LISTED = {"files": {"index.html": 3, "docs/a.html": 1, "docs/old.html": 2}}
+LISTED = {"schema": 1, "files": {"index.html": 3, "docs/a.html": 1, "docs/old.html": 2}}
 FILES = {"index.html": b"<p>", "docs/a.html": b"a", MARK: json.dumps(LISTED).encode()}
 
 

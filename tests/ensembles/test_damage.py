@@ -16,6 +16,7 @@ from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep import Sweep, solve_chunk
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
+from pyharness.model.schema import SCHEMAS
 from tests.ensembles.sweeps import TILT, files, text, written
 
 SWEEP = text(
@@ -162,12 +163,14 @@ def test_another_schema_is_refused_and_stays_as_it_was(
     sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patched:
-        patched.setattr(store_layout, "SCHEMA", 3)
+        patched.setitem(SCHEMAS, "sweep store", 3)
         with store_layout.filled(sweep, tmp_path / "x") as new:
             shutil.copytree(new, tmp_path / "store")
     before = files(tmp_path / "store")
     for repair in (False, True):
-        with pytest.raises(InputError, match="has schema 3; this version reads schema 2: give"):
+        with pytest.raises(
+            InputError, match="schema 3; this version reads schema 2 of a sweep store; give"
+        ):
             run_sweep(sweep, str(tmp_path / "store"), repair=repair)
     assert files(tmp_path / "store") == before
 
@@ -178,7 +181,7 @@ def test_store_of_the_first_schema_is_refused(sweep: Sweep, store: Path) -> None
     described = json.loads((store / "zarr.json").read_text())
     described["attributes"]["schema"] = 1
     (store / "zarr.json").write_text(json.dumps(described))
-    with pytest.raises(InputError, match="has schema 1; this version reads schema 2"):
+    with pytest.raises(InputError, match="schema 1; this version reads schema 2"):
         run_sweep(sweep, str(store))
 
 

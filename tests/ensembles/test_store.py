@@ -1,18 +1,24 @@
 """Stores: the same to the bit whatever interrupts, and nobody else's."""
 
+import contextlib
 import errno
 import os
+import shutil
 import subprocess
 import sys
+import time
 import tracemalloc
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness.ensembles import run
+from pyharness.ensembles import run, store
+from pyharness.ensembles.executors import engine
+from pyharness.ensembles.forecast import forecast
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.store import opened
 from pyharness.ensembles.sweep import solve_chunk
@@ -58,8 +64,10 @@ def test_draws_and_results_do_not_depend_on_the_chunks(tmp_path: Path) -> None:
     for chunk in (20, 7, 1000):
         content = PROGRAM.replace("chunk = 20", f"chunk = {chunk}")
         sweep = read_sweep(written(tmp_path, content))
-        with opened_after(sweep, tmp_path / str(chunk)) as store:
-            found.append({name: store.array(name)[...] for name in ("end", "stop-step", "error")})
+        with opened_after(sweep, tmp_path / str(chunk)) as found_store:
+            found.append(
+                {name: found_store.array(name)[...] for name in ("end", "stop-step", "error")}
+            )
     for other in found[1:]:
         for name, values in found[0].items():
             assert values.tobytes() == other[name].tobytes()
@@ -92,8 +100,8 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
         patched.setattr(run, "forecast", lambda *given: 0.0)
         with pytest.raises(InputError, match="No space left on device; what is done stays"):
             run_sweep(sweep, str(tmp_path / "full"))
-    with opened(sweep, str(tmp_path / "full")) as store:
-        done = store.done()
+    with opened(sweep, str(tmp_path / "full")) as found_store:
+        done = found_store.done()
     assert any(done)
     assert not all(done)
     outcome = run_sweep(sweep, str(tmp_path / "full"))
@@ -143,6 +151,64 @@ def test_two_sweeps_do_not_write_to_one_store(tmp_path: Path) -> None:
         run_sweep(sweep, str(tmp_path / "store"))
     assert run_sweep(sweep, str(tmp_path / "store")).computed == 1
     assert run_sweep(sweep, str(tmp_path / "store")).computed == 0
+
+
+def test_store_that_another_process_makes_meanwhile_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = read_sweep(written(tmp_path, text(TILT)))
+    make, folder = store.filled, tmp_path / "store"
+
+    @contextlib.contextmanager
+    def late(sweep: Any, path: Path) -> Iterator[Path]:
+        with make(sweep, path) as new:
+            shutil.copytree(new, path)
+            yield new
+
+    with monkeypatch.context() as patched:
+        patched.setattr(store, "filled", late)
+        with opened(sweep, str(folder)) as found:
+            assert found.done() == [False]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["store", "sweep.toml"]
+
+
+def test_sweeps_that_start_at_once_leave_one_at_work(tmp_path: Path) -> None:
+    path = written(tmp_path, text(TILT))
+    command = [sys.executable, "-m", "pyharness", "sweep", path, "--out", str(tmp_path / "store")]
+    running = [
+        subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        for _ in range(4)
+    ]
+    ended = [(each.communicate()[1], each.returncode) for each in running]
+    assert 0 in [code for _, code in ended]
+    for errors, code in ended:
+        if code:
+            assert code == 2
+            assert errors.count("\n") == 1
+            assert "another sweep is writing to it; wait for its end" in errors
+    assert run_sweep(read_sweep(path), str(tmp_path / "store")).computed == 0
+
+
+def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    axis = TILT.replace("count = 6", "count = 100000")
+    sweep = read_sweep(written(tmp_path, text(axis, top='chunk = 1\nreductions = ["end"]')))
+    write, read = store.Store.write, store.Store.read
+
+    def slow_write(self: store.Store, chunk: int, found: Any) -> None:
+        time.sleep(0.03)
+        write(self, chunk, found)
+
+    def slow_read(self: store.Store, name: str, chunk: int) -> Any:
+        time.sleep(0.02)
+        return read(self, name, chunk)
+
+    monkeypatch.setattr(store.Store, "write", slow_write)
+    monkeypatch.setattr(store.Store, "read", slow_read)
+    with engine("here") as own:
+        assert 5_000.0 < forecast(sweep, str(tmp_path / "store"), 100_000, own) < 50_000.0
+        # Those that are there are read all the same.
+        assert 2_000.0 < forecast(sweep, str(tmp_path / "store"), 1, own) < 20_000.0
+    assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
 
 
 def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
@@ -198,15 +264,15 @@ def test_memory_of_the_estimate_is_what_a_chunk_takes(samples: int, tmp_path: Pa
 
 def test_what_is_not_computed_yet_is_no_number(tmp_path: Path) -> None:
     sweep = read_sweep(written(tmp_path, PROGRAM))
-    with opened(sweep, str(tmp_path / "store")) as store:
-        assert np.isnan(store.array("end")[...]).all()
-        assert (store.array("status")[...] == -1).all()
-        assert not any(store.done())
+    with opened(sweep, str(tmp_path / "store")) as found_store:
+        assert np.isnan(found_store.array("end")[...]).all()
+        assert (found_store.array("status")[...] == -1).all()
+        assert not any(found_store.done())
 
 
 def test_chunk_without_a_number_in_it_is_done_all_the_same(tmp_path: Path) -> None:
     sweep = read_sweep(written(tmp_path, PROGRAM))
     run_sweep(sweep, str(tmp_path / "store"))
-    with opened(sweep, str(tmp_path / "store")) as store:
-        assert np.isnan(store.array("overflow-time")[...]).all()
-        assert all(store.done())
+    with opened(sweep, str(tmp_path / "store")) as found_store:
+        assert np.isnan(found_store.array("overflow-time")[...]).all()
+        assert all(found_store.done())

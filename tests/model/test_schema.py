@@ -1,0 +1,173 @@
+"""Versions: every file that is written and read again refuses another schema in one line."""
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pyharness.cli.main import main
+from pyharness.cli.output import check_tree
+from pyharness.edition.report import MARK
+from pyharness.ensembles.run import run_sweep
+from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.model.errors import InputError
+from pyharness.model.scene_file import case_scene, read_scene, scene_text
+from pyharness.model.schema import SCHEMAS, check_schema
+from pyharness.original.vectors import OURS, answers
+from pyharness.model.listing import original
+from pyharness.verify.external_file import read_problem
+from pyharness.verify.golden import read_record
+from pyharness.verify.port_protocol import request
+from tests.ensembles.sweeps import TILT, text, written
+
+ROOT = Path(__file__).parent.parent.parent
+EXTERNAL = ROOT / "pyharness" / "data" / "external" / "nasa-brick.toml"
+
+
+class Reader:
+    """A file with a number, and what reads it."""
+
+    def __init__(self, path: Path, read: Callable[[], object], may_lack: bool = False) -> None:
+        self.path, self.read, self.may_lack = path, read, may_lack
+
+    def replace(self, number: str | None) -> None:
+        """Give the file another number, or none."""
+        content = self.path.read_text()
+        pattern = r'(?m)("schema": )\d+(, ?|,?\n|$)|^(schema = )\d+\n'
+        assert re.search(pattern, content)
+        if number is None:
+            self.path.write_text(re.sub(pattern, "", content, count=1))
+        else:
+            changed = re.sub(r'("schema": |^schema = )\d+', rf"\g<1>{number}", content, flags=re.M)
+            self.path.write_text(changed)
+
+
+def sweep_store(folder: Path) -> Reader:
+    sweep = read_sweep(written(folder, text(TILT)))
+    store = folder / "store"
+    run_sweep(sweep, str(store))
+    # A store of another version has checksums of its own: none that this one can read.
+    shutil.rmtree(store / "checksums")
+    return Reader(store / "zarr.json", lambda: run_sweep(sweep, str(store)))
+
+
+def sweep_file(folder: Path) -> Reader:
+    path = Path(written(folder, "schema = 1\n" + text(TILT)))
+    return Reader(path, lambda: read_sweep(path), may_lack=True)
+
+
+def scene_file(folder: Path) -> Reader:
+    path = folder / "scene.toml"
+    path.write_text(scene_text(case_scene(3)))
+    return Reader(path, lambda: read_scene(path), may_lack=True)
+
+
+def external_file(folder: Path) -> Reader:
+    path = folder / "problem.toml"
+    path.write_text("schema = 1\n" + EXTERNAL.read_text())
+    return Reader(path, lambda: read_problem(path), may_lack=True)
+
+
+def vector_file(folder: Path) -> Reader:
+    path = Path(shutil.copy(OURS, folder / "vectors.json"))
+    return Reader(path, lambda: answers(path))
+
+
+def golden_record(folder: Path) -> Reader:
+    path = Path(shutil.copy(ROOT / "tests" / "golden" / "rk4.toml", folder / "rk4.toml"))
+    return Reader(path, lambda: read_record(folder))
+
+
+def edition(folder: Path) -> Reader:
+    path = folder / MARK
+    path.write_text(json.dumps({"schema": SCHEMAS["edition"], "files": {"index.html": 3}}))
+    return Reader(path, lambda: check_tree(str(folder), MARK, "--out"))
+
+
+def port_request(folder: Path) -> Reader:
+    path = folder / "request"
+    path.write_bytes(request(case_scene(1), original("two-term")) + b"\n")
+
+    def read() -> None:
+        with path.open("rb") as asked:
+            found = subprocess.run(
+                ["node", str(ROOT / "web" / "port.js")], stdin=asked, capture_output=True, text=True,
+                check=False,
+            )  # fmt: skip
+        if found.returncode:
+            assert found.stderr.count("\n") == 1, found.stderr
+            raise InputError(found.stderr)
+        assert json.loads(found.stdout)["rows"]
+
+    return Reader(path, read)
+
+
+FILES: dict[str, Callable[[Path], Reader]] = {
+    "sweep store": sweep_store,
+    "sweep file": sweep_file,
+    "scene file": scene_file,
+    "external file": external_file,
+    "vector file": vector_file,
+    "golden record": golden_record,
+    "edition": edition,
+    "port request": port_request,
+}
+
+
+def test_every_kind_is_tried() -> None:
+    assert FILES.keys() == SCHEMAS.keys()
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
+    if kind == "port request" and shutil.which("node") is None:
+        pytest.skip("no node")
+    reader = FILES[kind](tmp_path)
+    content = reader.path.read_text()
+    if kind != "sweep store":  # its checksums are gone
+        reader.read()
+    known = SCHEMAS[kind]
+    for number in (str(known + 1), str(known - 1), "-1", f"{known}.0", '"1"', "true", None):
+        reader.path.write_text(content)
+        reader.replace(number)
+        assert reader.path.read_text() != content
+        if kind == "port request" and number == "1.0":
+            continue  # the same number to JavaScript
+        if number is None and reader.may_lack:
+            reader.read()
+            continue
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        words = rf"schema.*; this (version|port) reads schema {known} of a {kind}"
+        with pytest.raises(InputError, match=words) as caught:
+            reader.read()
+        assert "\n" not in str(caught.value)
+        after = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        assert after == before
+
+
+def test_numbers_are_those_of_the_document() -> None:
+    page = (ROOT / "docs" / "formats.md").read_text()
+    rows = re.findall(r"^\| ([a-z ]+) \| (\d+) \|", page, flags=re.M)
+    assert {kind: int(number) for kind, number in rows} == SCHEMAS
+
+
+def test_number_of_any_kind_is_a_line() -> None:
+    for found in (None, 10**5000, -1, 1.0, True, "1", [1], {"a": 1}, float("nan")):
+        with pytest.raises(InputError, match="^x: schema"):
+            check_schema("x", "scene file", found, "give another")
+    check_schema("x", "scene file", SCHEMAS["scene file"], "give another")
+
+
+def test_command_line_refuses_a_scene_of_another_version(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(case_scene(3)).replace("schema = 1", "schema = 9"))
+    assert main(["run", "--scene", str(path), "--method", "taylor"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"pyharness: scene file '{path}': top level: schema 9; this version")
+    assert said.count("\n") == 1

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 
 
 def _leave(*_: object) -> None:

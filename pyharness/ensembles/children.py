@@ -11,7 +11,7 @@ from multiprocessing import connection, resource_tracker
 
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
-    """Let no process or thread that this thread starts meanwhile hear a Ctrl-C, as long as it lives.
+    """Let no process or thread that this thread starts meanwhile ever hear a Ctrl-C.
 
     A terminal sends it to all processes, and what follows is the business of this one. This thread
     hears it afterwards.

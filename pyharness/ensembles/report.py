@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyharness.ensembles.fields import units_of
-from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.forecast import duration, said
+from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.run import Outcome
 from pyharness.ensembles.store import Store
 from pyharness.ensembles.sweep import Asked, Sweep

@@ -25,8 +25,8 @@ _MOST_CHUNKS = 1_000_000
 class Outcome:
     """What a call did.
 
-    `before` counts the chunks that were there, `computed` those that were computed in `seconds`, and
-    `repaired` those among them that were damaged.
+    `before` counts the chunks that were there, `computed` those that were computed in `seconds`,
+    and `repaired` those among them that were damaged.
     """
 
     estimate: Estimate | None
@@ -52,8 +52,8 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     free = shutil.disk_usage(Path(path).absolute().parent).free
     if n_bytes > free:
         raise InputError(
-            f"{shown} take up to {byte_count(n_bytes)}, and where '{path}' goes {byte_count(free)} are "
-            "free; take a smaller grid, or fewer reductions"
+            f"{shown} take up to {byte_count(n_bytes)}, and where '{path}' goes {byte_count(free)} "
+            "are free; take a smaller grid, or fewer reductions"
         )
     if sweep.n_chunks > _MOST_CHUNKS:
         raise InputError(
@@ -65,8 +65,8 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > memory // 2:
         raise InputError(
-            f"{shown} take {byte_count(needed)} of memory at once, and the half of it that is theirs "
-            f"is {byte_count(memory // 2)}; take smaller chunks, fewer workers or samples"
+            f"{shown} take {byte_count(needed)} of memory at once, and the half of it that is "
+            f"theirs is {byte_count(memory // 2)}; take smaller chunks, fewer workers or samples"
         )
     return n_bytes, needed
 

@@ -89,16 +89,16 @@ class Store:
             try:
                 self._done[chunk] = self._is_done(chunk)
             except DamageError as damage:
-                damages[chunk] = damage
+                damages[chunk] = str(damage)
         if damages and not repair:
-            chunk, damage = next(iter(damages.items()))
+            chunk, reason = next(iter(damages.items()))
             total = self.sweep.n_chunks
             which = f"chunk {chunk + 1} of {total} is damaged"
             if len(damages) > 1:
                 which = f"{len(damages)} of {total} chunks are damaged, first chunk {chunk + 1}"
             them = "it" if len(damages) == 1 else "them"
             raise InputError(
-                f"--out '{self.folder}': {which}: {damage}; {_REPAIR} computes {them} again"
+                f"--out '{self.folder}': {which}: {reason}; {_REPAIR} computes {them} again"
             )
         for chunk in damages:
             for name in (self._checksums(chunk), *self._files(chunk)):

@@ -127,7 +127,7 @@ def _fill_group(group: Any, sweep: Sweep) -> None:
 
 
 def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> None:
-    import zarr
+    from zarr.codecs import ZstdCodec
 
     reduction = REDUCTIONS[reduction_name]
     shape, chunk, dimensions = sweep.shape, sweep.chunk_shape, list(sweep.dimensions)
@@ -155,7 +155,7 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
         chunks=chunk,
         # Not by Zarr's default, which another version may change: a chunk that is computed again
         # has the same bytes.
-        compressors=zarr.codecs.ZstdCodec(level=0, checksum=False),
+        compressors=ZstdCodec(level=0, checksum=False),
         dtype=reduction.dtype,
         fill_value=reduction.fill,
         dimension_names=dimensions,

@@ -2,7 +2,8 @@
 
 Those in `data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC
 60463560); a public emulator of its float unit gives the same. A file of that form is a table: its
-`schema`, and `vectors`, a list of tables: `name`, `op` (an instruction of `octal.operated`), `x`, `y` and `result`, in octal.
+`schema`, and `vectors`, a list of tables: `name`, `op` (an instruction of `octal.operated`), `x`,
+`y` and `result`, in octal.
 """
 
 import json

@@ -83,7 +83,7 @@ def swap(one: Path, other: Path) -> None:
     other.write_bytes(contents[0])
 
 
-DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
+DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
     "flipped bit": (lambda path: flip(path), "differs from its checksum"),
     "truncated": (truncate, "differs from its checksum"),
     "empty": (lambda path: path.write_bytes(b""), "differs from its checksum"),
@@ -250,10 +250,13 @@ def test_no_damage_is_believed(
     try:
         run_sweep(sweep, str(store))
     except InputError as error:
-        assert str(error).startswith(f"--out '{store}': "), what
-        assert "damaged" in str(error), what
+        message = str(error)
     # What was computed again without a question had no checksums any more.
     else:
+        message = ""
         assert files(store) == files(intact / "store"), what
+    if message:
+        assert message.startswith(f"--out '{store}': "), what
+        assert "damaged" in message, what
     run_sweep(sweep, str(store), repair=True)
     assert files(store) == files(intact / "store"), what

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.ensembles import run, store
+from pyharness.ensembles import run, store, store_layout
 from pyharness.ensembles.executors import engine
 from pyharness.ensembles.forecast import forecast
 from pyharness.ensembles.run import run_sweep
@@ -157,7 +157,7 @@ def test_store_that_another_process_makes_meanwhile_is_taken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sweep = read_sweep(written(tmp_path, text(TILT)))
-    make, folder = store.filled, tmp_path / "store"
+    make, folder = store_layout.filled, tmp_path / "store"
 
     @contextlib.contextmanager
     def late(sweep: Any, path: Path) -> Iterator[Path]:

@@ -15,10 +15,10 @@ from pyharness.edition.report import MARK
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
+from pyharness.model.listing import original
 from pyharness.model.scene_file import case_scene, read_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.original.vectors import OURS, answers
-from pyharness.model.listing import original
 from pyharness.verify.external_file import read_problem
 from pyharness.verify.golden import read_record
 from pyharness.verify.port_protocol import request
@@ -94,10 +94,10 @@ def port_request(folder: Path) -> Reader:
 
     def read() -> None:
         with path.open("rb") as asked:
+            command = ["node", str(ROOT / "web" / "port.js")]
             found = subprocess.run(
-                ["node", str(ROOT / "web" / "port.js")], stdin=asked, capture_output=True, text=True,
-                check=False,
-            )  # fmt: skip
+                command, stdin=asked, capture_output=True, text=True, check=False
+            )
         if found.returncode:
             assert found.stderr.count("\n") == 1, found.stderr
             raise InputError(found.stderr)
@@ -157,7 +157,7 @@ def test_numbers_are_those_of_the_document() -> None:
 
 def test_number_of_any_kind_is_a_line() -> None:
     for found in (None, 10**5000, -1, 1.0, True, "1", [1], {"a": 1}, float("nan")):
-        with pytest.raises(InputError, match="^x: schema"):
+        with pytest.raises(InputError, match=r"^x: schema"):
             check_schema("x", "scene file", found, "give another")
     check_schema("x", "scene file", SCHEMAS["scene file"], "give another")
 

@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable
 from types import FrameType
 from typing import Any
@@ -56,6 +57,7 @@ class _Interruption:
 
 
 _STATE = _Interruption()
+_SHOW_WARNING = warnings.showwarning
 
 
 def came() -> bool:
@@ -81,6 +83,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
     hook, escaped, code = sys.unraisablehook, False, CODE
     try:
         sys.unraisablehook = _quiet_of(hook)
+        warnings.showwarning = _show_warning
         if callable(signal.getsignal(signal.SIGINT)):
             signal.signal(signal.SIGINT, _STATE.interrupt)
         code = main()
@@ -113,6 +116,9 @@ def leave(code: int) -> None:
     die by its signal. After an interrupt nothing is waited for, neither processes nor threads.
     """
     if code == CODE:
+        # The line is written; what threads and finalizers have to say of their end is no news.
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         if "multiprocessing" in sys.modules:
             import multiprocessing
 
@@ -137,6 +143,12 @@ def _is_on_its_way() -> bool:
             return True
         error = error.__context__
     return False
+
+
+def _show_warning(*warning: Any) -> None:
+    # Other threads may go on a little, and what was begun is not finished: no news to the user.
+    if not came():
+        _SHOW_WARNING(*warning)
 
 
 def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:

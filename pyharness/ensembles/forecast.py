@@ -136,9 +136,9 @@ def said(estimate: Estimate) -> str:
     missing = estimate.n_missing
     rest = "" if missing == estimate.n_chunks else f", {short_count(missing)} of them missing"
     return (
-        f"{short_count(estimate.n_scenes)} scenes in {short_count(estimate.n_chunks)} chunks{rest}: "
-        f"about {duration(estimate.seconds)}, up to {byte_count(estimate.n_bytes)} on disk, "
-        f"{byte_count(estimate.memory)} of memory"
+        f"{short_count(estimate.n_scenes)} scenes in {short_count(estimate.n_chunks)} chunks"
+        f"{rest}: about {duration(estimate.seconds)}, up to {byte_count(estimate.n_bytes)} on "
+        f"disk, {byte_count(estimate.memory)} of memory"
     )
 
 

@@ -46,6 +46,10 @@ LOST = {
         "    try: interrupt()\n    except BaseException: raise InputError('no zarr')"
     ),
     "at the very end": "try: interrupt()\n    except BaseException: return 0",
+    "with a warning": (
+        "import asyncio, warnings\n    begun = asyncio.sleep(1.0)\n"
+        "    try: interrupt()\n    finally:\n        del begun; warnings.warn('left', UserWarning)"
+    ),
     "passed on": "interrupt()\n    return waited()",
 }
 

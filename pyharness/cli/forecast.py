@@ -25,7 +25,7 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 def check_count(option: str, count: int, least: int, cost: Cost) -> None:
     """Refuse a number of draws that no one waits for; say a forecast of one that takes long."""
-    from pyharness.ensembles.run import duration
+    from pyharness.ensembles.forecast import duration
 
     if not least <= count <= cost.most:
         shown = str(count) if abs(count) < 10**18 else "a number of more than 18 digits"

@@ -14,9 +14,9 @@ import threading
 import warnings
 from collections.abc import Callable
 from types import FrameType
-from typing import Any
+from typing import Any, TextIO
 
-from pyharness.cli import say
+from pyharness.cli import say, say_again
 
 _AGAIN = 0.25  # s, after which a dropped interrupt is raised again
 _MOST = 3  # of them, by the user, until nothing is waited for any more
@@ -104,8 +104,8 @@ def report() -> int:
     """Say in one line that the command was interrupted, and return its exit code."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
-        # How far it was is in the last line of a terminal.
-        say(f"\r\x1b[K{LINE}" if sys.stderr.isatty() else LINE)
+        say_again("")  # wipes how far it was
+        say(LINE)
     return CODE
 
 
@@ -145,10 +145,17 @@ def _is_on_its_way() -> bool:
     return False
 
 
-def _show_warning(*warning: Any) -> None:
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
     # Other threads may go on a little, and what was begun is not finished: no news to the user.
     if not came():
-        _SHOW_WARNING(*warning)
+        _SHOW_WARNING(message, category, filename, lineno, file, line)
 
 
 def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -1,4 +1,4 @@
-"""Three 1982 FORTRAN programs for Euler's rigid body equations: original, corrected, checked."""
+"""Three FORTRAN programs of a thesis of 1982 on rigid bodies: original, corrected, checked."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

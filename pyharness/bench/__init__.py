@@ -1,1 +1,1 @@
-"""Run time against error: ours, the programs of 1982, and other people's integrators."""
+"""Run time against error: ours, the programs of the thesis, and other people's integrators."""

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
+from pyharness.edition.markdown import inline
 from pyharness.history.ablation import effects_of, entries
 from pyharness.history.apparatus_report import FIELDS, entry_report
 from pyharness.history.claims.evidence import evidence
@@ -12,6 +13,7 @@ from pyharness.history.claims.evidence_report import evidence_report
 from pyharness.history.claims.ledger import Judgement, claims, judge
 from pyharness.history.claims.report import claims_report, explanation
 from pyharness.history.claims.sentences import Sentence, sentences
+from pyharness.model.facts import facts
 from pyharness.views import html
 
 
@@ -45,6 +47,13 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
             sum(each.corrected.verdict == verdict for each in judged),
         )
     return found
+
+
+def account() -> dict[str, Markup]:
+    """Return the statements that pages and documents share, and what each defect does in them."""
+    texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
+    texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
+    return {name: inline(text) for name, text in texts.items()}
 
 
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:

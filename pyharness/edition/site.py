@@ -8,7 +8,6 @@ import json
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
-from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,6 +17,7 @@ from pyharness.edition.markdown import inline
 from pyharness.edition.report import MARK, listed
 from pyharness.history.claims.report import written
 from pyharness.history.tei import tei_document
+from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.records import build_record
@@ -93,7 +93,8 @@ def _pages(
 ) -> Iterator[Page]:
     progress("claims")
     judged = ledger.judgements()
-    yield Page("index.html", "Rigid bodies, 1982", "index.html", {"counts": ledger.counts(judged)})
+    context = {"counts": ledger.counts(judged), "account": ledger.account()}
+    yield Page("index.html", "Rigid bodies: a thesis of 1982", "index.html", context)
     progress("listing")
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
@@ -176,7 +177,7 @@ def _rendered(page: Page) -> bytes:
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": page.menu or page.path,
-         "build": build_record(), "digest": _tei()[1], **page.context}
+         "build": build_record(), "digest": text_digest(), **page.context}
     )  # fmt: skip
     return html.encode()
 
@@ -197,7 +198,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
     content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
     content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
-    content["listing/edition.xml"], _ = _tei()
+    content["listing/edition.xml"] = tei_document()
     return content
 
 
@@ -212,13 +213,6 @@ def vendor() -> list[dict[str, Any]]:
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]
     return packages
-
-
-@cache
-def _tei() -> tuple[bytes, str]:
-    """Return the edition as TEI, and what names its text in a citation."""
-    document = tei_document()
-    return document, sha256(document).hexdigest()[:12]
 
 
 @cache

@@ -2,7 +2,7 @@
 
 Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one record: its length in bytes, seven binary64 numbers,
 the length again, all little-endian; today's Fortran compilers and `scipy.io.FortranFile` read it.
-The tape of 1982 had 60-bit words and marks of its own.
+The author's tape had words of 60 bits, as is inferred, and marks of its own.
 """
 
 import numpy as np

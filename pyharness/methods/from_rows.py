@@ -1,4 +1,4 @@
-"""Attitude of a table of omega, as a program of 1982 leaves one."""
+"""Attitude of a table of omega, as a program of the thesis leaves one."""
 
 import math
 

@@ -1,8 +1,8 @@
-"""The printer page: a trajectory in, the lines of the 1982 line printer out.
+"""The printer page: a trajectory in, the lines of a line printer out.
 
 The page is what paper showed: the first character of each record, the carriage control, is
 taken off. It is always a blank (`data/printer.toml` has the FORMATs and what is conjecture).
-FORMATs are written by a library; FORTRAN 77 and the paper of 1982 have two words of their own.
+FORMATs are written by a library; FORTRAN 77 and a page of that time have two words of their own.
 """
 
 import math

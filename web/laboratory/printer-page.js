@@ -1,4 +1,4 @@
-// The page that the line printer of 1982 did, by the FORMATs of the deck: the same text as
+// The page that a line printer did, by the FORMATs of the deck: the same text as
 // `pyharness run --format printer`.
 //
 // The first character of each record, the carriage control, is taken off.

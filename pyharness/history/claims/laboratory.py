@@ -51,11 +51,8 @@ class Laboratory:
             return corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
         assumed = self.assumptions.conjectures
-        return subset(program, "original", self.fixed_in(program), (), readings, assumed)
-
-    def fixed_in(self, program: str) -> frozenset[str]:
-        """Return which of the `fixed` names the program has."""
-        return self.fixed & set(switchable(program))
+        fixed = self.fixed & set(switchable(program))
+        return subset(program, "original", fixed, (), readings, assumed)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return a case under the assumptions, with `parts` in steps so much smaller."""

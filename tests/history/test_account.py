@@ -1,0 +1,188 @@
+"""The account: what pages and documents say of the thesis is in them word for word, and is so."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from pyharness.compare.orders import measured_order
+from pyharness.history.ablation import entries, entry
+from pyharness.history.claims.laboratory import Assumptions, Laboratory
+from pyharness.history.claims.ledger import claim, claims, outcome
+from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, REPRODUCED
+from pyharness.history.limits import limit
+from pyharness.model.facts import facts, shipped
+from pyharness.model.listing import Listing, names_of, original, switches
+from pyharness.model.scene_file import case_scene
+from pyharness.original.cells import subsets
+from pyharness.original.programs import PROGRAM_REGISTRY, run_program
+from pyharness.truth.reference import reference
+
+ROOT = Path(__file__).parents[2]
+ACCOUNT = facts("account")
+STATEMENTS = {each["id"]: each for each in ACCOUNT["statement"]}
+PARTS = {each["id"]: each["part"] for each in entries() if "part" in each}
+MECHANISM = ACCOUNT["mechanism"]
+TEXTS = [
+    *(ROOT / "README.md", ROOT / "CITATION.cff"),
+    *(ROOT / "docs").rglob("*.md"),
+    *(ROOT / "pyharness/edition/templates").glob("*.html"),
+    *(ROOT / "pyharness/data").rglob("*.toml"),
+]
+
+
+def _words(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _document(name: str) -> str:
+    return _words((ROOT / name).read_text())
+
+
+def test_every_statement_is_in_its_documents_word_for_word() -> None:
+    for each in STATEMENTS.values():
+        for name in each["where"]:
+            assert each["text"] in _document(name), (each["id"], name)
+    assert set(PARTS) == set(MECHANISM["alone"])
+    for part in PARTS.values():
+        for name in MECHANISM["documents"]:
+            assert part in _document(name), (part, name)
+
+
+def test_home_page_takes_its_sentences_from_the_data() -> None:
+    page = (ROOT / "pyharness/edition/templates/index.html").read_text()
+    used = set(re.findall(r"account(?:\.|\[\")([a-z-]+)", page))
+    assert used == {"work", "conclusion", "each-alone", "together", "stop", *PARTS}
+
+
+def test_dates_are_those_of_the_title_page_and_the_foreword() -> None:
+    work = ACCOUNT["work"]
+    text = STATEMENTS["work"]["text"]
+    for name in ("began", "ended", "submitted", "published"):
+        assert work[name] in text
+    printed = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
+    if printed.exists():
+        thesis = _words(printed.read_text())
+        assert f"during the period {work['began']} to {work['ended']}" in thesis
+        assert f"submitted by the author in {work['submitted']}" in thesis
+        assert work["published"] in thesis
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_no_text_dates_the_work_otherwise(path: Path) -> None:
+    """Published in March 1982: nothing was done, compiled or printed in that year."""
+    text = _words(path.read_text()).replace("a thesis of 1982", "").replace("seed of 1982", "")
+    assert not re.findall(r"\b(?:[Ii]n|[Oo]f|[Tt]he|[Tt]hree) (?:1979|198[0-2])\b.{20}", text)
+
+
+def _run_and_truth(name: str, case: int) -> tuple[float | None, int]:
+    scene = case_scene(case)
+    program = PROGRAM_REGISTRY[MECHANISM["program"]]
+    found = measured_order(
+        scene, replace(program, order=1), Listing(program.name, [name]),
+        reference(scene, scene.times()),
+    )  # fmt: skip
+    return found.value, found.due
+
+
+@pytest.mark.parametrize("name", MECHANISM["alone"])
+@pytest.mark.parametrize("case", [2, 3, 5])
+def test_each_defect_alone_costs_the_order(name: str, case: int) -> None:
+    order, _ = _run_and_truth(name, case)
+    assert order == pytest.approx(MECHANISM["alone"][name], abs=0.1)
+    assert name in PARTS[name]
+    why = entry(name)["why"]
+    assert f"Alone it costs the order: {MECHANISM['alone'][name]} in place of 4." in why
+
+
+@pytest.mark.parametrize("case", [2, 3, 5])
+def test_both_together_tend_to_the_limit_that_is_told(case: int) -> None:
+    found = limit(MECHANISM["program"], case_scene(case))
+    assert found.tends_to.startswith(MECHANISM["limit"])
+    assert found.order == pytest.approx(1.0, abs=0.1)
+    assert MECHANISM["limit"] in STATEMENTS["together"]["text"]
+    assert MECHANISM["limit"] in entry("base-not-restored")["why"]
+    # Neither is enough: with one of them corrected the program comes to the solution.
+    for name in MECHANISM["alone"]:
+        others = set(switches(MECHANISM["program"])) - {name}
+        finer = replace(case_scene(case), step_size=1e-4, steps=1000)
+        run = run_program(finer, Listing(MECHANISM["program"], others), may_stop=False)
+        truth = reference(finer, finer.times())
+        assert np.abs(run.omega - truth.omega).max() < 2e-2 * np.abs(truth.omega).max()
+
+
+def test_the_run_that_the_thesis_reports_is_stopped_by_a_velocity() -> None:
+    stop = run_program(case_scene(MECHANISM["case"]), original(MECHANISM["program"])).stop
+    assert stop is not None
+    assert {"step": stop.step, "variable": stop.variable} == MECHANISM["stopped"]
+    assert stop.variable in STATEMENTS["stop"]["text"]
+
+
+RESET = "            point[1] = result\n"
+
+
+@pytest.mark.parametrize(
+    ("reset", "step", "exceeds"),
+    [
+        ("[*result[:3], *point[1][3:]]", 25, False),
+        ("[*point[1][:3], *result[3:]]", 29, True),
+        ("result", 13, False),
+    ],
+    ids=["U alone", "V alone", "both"],
+)
+def test_only_growing_beyond_the_sine_tells_that_u_is_not_set_back(
+    reset: str, step: int, exceeds: bool
+) -> None:
+    source = (ROOT / "pyharness/original/runge_kutta.py").read_text()
+    assert source.count(RESET) == 1
+    altered = ModuleType("altered")
+    exec(source.replace(RESET, RESET.replace("result\n", f"{reset}\n")), vars(altered))
+    listing = Listing("runge-kutta", set(switches("runge-kutta")) - {"base-not-restored"})
+    run = altered.run(case_scene(2), listing)
+    assert run.stop.step == step
+    assert bool((run.omega[:, 0] > np.sin(5.0 * run.time) + 1e-3).any()) == exceeds
+    told = entry("base-not-restored")["evidence"]
+    assert {"result": "of both at step 13"}.get(reset, f"step {step}") in told
+    assert "Case 2 stops at step 25 too" in STATEMENTS["growing"]["text"]
+
+
+def test_the_conclusion_rests_on_the_faults_under_every_reading_and_conjecture() -> None:
+    entry_ = {**claim("vi-superior"), "parameters": {"cases": [2, 3, 4, 5, 6]}}
+    for readings in subsets((*names_of("reading"),)):
+        for conjectures in subsets(names_of("conjecture")):
+            chosen = Assumptions(readings=readings, conjectures=conjectures)
+            found = [outcome(entry_, Laboratory(each, chosen)) for each in (True, False)]
+            assert [each.verdict for each in found] == [REPRODUCED, FALSE]
+    assert "in each of Cases 2 to 6" in STATEMENTS["conclusion"]["text"]
+
+
+def test_findings_have_the_numbers_of_the_claims() -> None:
+    ratios = outcome(claim("vi-superior"), Laboratory(False)).numbers
+    shares = [x for name, x in ratios.items() if name.startswith("case ")]
+    told = f"Runge-Kutta is {min(shares):.0f} to {max(shares):,.0f} times more accurate"
+    assert told in _document("docs/findings.md")
+
+
+def test_of_the_lost_programs_nothing_is_said_to_be_known() -> None:
+    lost = [each for each in claims() if each["id"].startswith("iv2-others")]
+    assert outcome(lost[0], Laboratory(True)).verdict == NOT_TESTABLE
+    for path in TEXTS:
+        text = _words(path.read_text()).lower()
+        assert "it was not rounding" not in text, path.name
+        assert "it was the defects" not in text, path.name
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_the_machine_is_inferred_wherever_it_is_named(path: Path) -> None:
+    text = _words(path.read_text())
+    for stale in ("thesis ran on a CDC", "arithmetic of the machine is not emulated", "dot-matrix"):
+        assert stale not in text
+
+
+def test_emulated_words_are_told_of_where_they_are_had() -> None:
+    assert "--word cdc48" in _document("docs/reconstruction.md")
+    assert entry("dialect-cdc")["certainty"] == "probable"
+    assert (shipped("docs") / "words.md").exists()

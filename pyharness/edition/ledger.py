@@ -11,7 +11,7 @@ from pyharness.history.apparatus_report import FIELDS, entry_report
 from pyharness.history.claims.evidence import evidence
 from pyharness.history.claims.evidence_report import evidence_report
 from pyharness.history.claims.ledger import Judgement, claims, judge
-from pyharness.history.claims.report import claims_report, explanation
+from pyharness.history.claims.report import claims_report, explanation, kinds_table
 from pyharness.history.claims.sentences import Sentence, sentences
 from pyharness.model.facts import facts
 from pyharness.views import html
@@ -36,7 +36,8 @@ def judgements() -> list[Judgement]:
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return by verdict how many claims have it: of the original programs, and corrected."""
+    """Return by verdict how many results have it: of the original programs, and corrected."""
+    judged = [each for each in judged if each.claim["kind"] == "result"]
     found: dict[str, tuple[int, int]] = {}
     for each in judged:
         for verdict in (each.original.verdict, each.corrected.verdict):
@@ -47,6 +48,11 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
             sum(each.corrected.verdict == verdict for each in judged),
         )
     return found
+
+
+def kinds(judged: Sequence[Judgement]) -> Markup:
+    """Return the verdicts by kind of claim as a table."""
+    return Markup(html.table(kinds_table(judged), "verdicts by kind of claim"))
 
 
 def account() -> dict[str, Markup]:
@@ -68,6 +74,7 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
         stories.append((each, Markup(html.sections(story))))
     return {
         "table": Markup(html.table(table, "all claims", links)),
+        "kinds": kinds(judged),
         "stories": stories,
         "evidence": Markup(html.write(evidence_report(list(evidence())))),
     }

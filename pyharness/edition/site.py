@@ -93,7 +93,10 @@ def _pages(
 ) -> Iterator[Page]:
     progress("claims")
     judged = ledger.judgements()
-    context = {"counts": ledger.counts(judged), "account": ledger.account()}
+    context = {
+        "counts": ledger.counts(judged), "kinds": ledger.kinds(judged),
+        "account": ledger.account(),
+    }  # fmt: skip
     yield Page("index.html", "Rigid bodies: a thesis of 1982", "index.html", context)
     progress("listing")
     yield from _listing()

@@ -19,6 +19,8 @@ from pyharness.model.listing import PROGRAMS, names_of
 
 POINTS = {REPRODUCED: 1.0, IN_PART: 0.5}
 STEPS = (100, 300)
+KINDS = ("result", "design")
+"""The kinds of claims that are about the programs."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ def evidence() -> Iterator[Combination]:
     for assumptions in combinations():
         verdicts = {}
         for entry in claims():
+            if entry["kind"] not in KINDS:
+                continue
             verdict = _verdict(entry["id"], _relevant(entry, assumptions))
             if verdict != NOT_TESTABLE:
                 verdicts[entry["id"]] = verdict
@@ -68,10 +72,9 @@ def evidence_rule() -> str:
     """Say how a combination is scored."""
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
-        "readings, conjectures and steps, scored by the claims about the original programs: 1 for "
-        "each reproduced, 1/2 in part, 0 otherwise; not testable ones do not count. No weights: "
-        "abstract-superior and vi-superior are one measure, v2-case-2-growing and "
-        "v2-case-2-no-error turn against each other."
+        "readings, conjectures and steps, scored by the claims about results and design of the "
+        "original programs: 1 for each reproduced, 1/2 in part, 0 otherwise; not testable ones do "
+        "not count. No weights: abstract-superior and vi-superior are one measure."
     )
 
 

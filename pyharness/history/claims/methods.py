@@ -35,18 +35,21 @@ from pyharness.original.operations import operations_per_step
 _OTHERS = WEIGHTINGS[1:]
 
 
-def superior(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Hold collocation against Runge-Kutta, at the steps that all of them ran."""
+def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
+    """Compare collocation with Runge-Kutta, at the steps that all of them ran.
+
+    The cases `shown` have their numbers and do not count.
+    """
     numbers, wins = {}, 0
-    for case in cases:
+    for case in (*cases, *shown):
         runs = [lab.run(program, case) for program in PROGRAMS]
         common = min(run.steps for run in runs)
         truth = lab.truth(case).omega
         two, four, third = (distance(run.omega[:common], truth) for run in runs)
-        wins += max(two, four) < third
+        wins += case in cases and max(two, four) < third
         ratio = max(two, four) / third
         numbers[f"case {case}: error of collocation over that of Runge-Kutta"] = ratio
-    numbers["cases won by collocation"] = wins
+    numbers[f"of {len(cases)} cases, won by collocation"] = wins
     return graded(numbers, wins == len(cases), wins > 0, FALSE)
 
 
@@ -72,12 +75,16 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     return graded(numbers, worst <= 1.05, worst <= 2.0, FALSE)
 
 
-def higher_powers(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Measure what four terms gain over two."""
+def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
+    """Measure what models of more terms gain over four."""
     numbers = {}
     for case in cases:
-        gain = lab.error("two-term", case) / lab.error("four-term", case)
-        numbers[f"case {case}: error of two terms over that of four"] = gain
+        truth = lab.truth(case).omega
+        four, *more = (float(np.abs(lab.models(case, n) - truth).max()) for n in (4, *terms))
+        for n, error in zip(terms, more, strict=True):
+            # An overflow is no gain.
+            gain = four / error if math.isfinite(error) else 0.0
+            numbers[f"case {case}: error of four terms over that of {n}"] = gain
     most = max(numbers.values())
     return graded(numbers, most <= 2.0, most <= 10.0)
 
@@ -285,19 +292,18 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Hold the corrected programs against one prediction and one correction of the family."""
+    """Compare the corrected programs with one prediction and one correction of the family."""
     best = Laboratory(False, lab.assumptions)
-    numbers, same = {}, True
+    numbers = {}
     for case in cases:
         for program, terms in zip(COLLOCATION, (2, 4), strict=True):
             member = run(lab.scene(case), Member("collocation", terms))
             apart = distance(best.run(program, case).omega, member.omega)
             numbers[f"case {case}, {program}: distance from one correction (rad/s)"] = apart
-            same &= apart < 1e-11 * largest(lab.truth(case))
         for corrections in (0, 1, 2, 3):
             error = _error(lab, case, Member("collocation", 4, corrections=corrections))
             numbers[f"case {case}, 4 terms, {corrections} corrections: error (rad/s)"] = error
-    return graded(numbers, not same, otherwise=FALSE)
+    return Judged(NOT_TESTABLE, numbers)
 
 
 def _error(lab: Laboratory, case: int, member: Member) -> float:

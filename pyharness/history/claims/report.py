@@ -24,28 +24,56 @@ def _verdict(verdict: str) -> str:
 
 
 _LEDGER = (
-    *words("claim where"), Column("original", _verdict, left=True),
-    Column("corrected", _verdict, left=True), Column("hangs on", left=True, fit="wrap"),
+    *words("claim where"),
+    Column("original", _verdict, left=True), Column("corrected", _verdict, left=True),
+    Column("hangs on", left=True, fit="wrap"),
 )  # fmt: skip
+_DATA = (*_LEDGER[:1], *words("kind"), *_LEDGER[1:])
+KINDS = {
+    "result": "what the programs gave, and what is concluded of it",
+    "theory": "equations, methods and their errors, whoever runs them",
+    "design": "how programs and cases were made",
+    "history": "what others did, and what the author did",
+    "recommendation": "neither true nor false, and so not testable",
+}
+"""The kinds of claims, and what they are about."""
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
     """Report the ledger, one line for each claim."""
     rows = [
         [
-            each.claim["id"], each.claim["where"], each.original.verdict, each.corrected.verdict,
-            ", ".join(_hangs_on(each)) or "-",
+            each.claim["id"], each.claim["kind"], each.claim["where"], each.original.verdict,
+            each.corrected.verdict, ", ".join(_hangs_on(each)) or "-",
         ]
         for each in judgements
     ]  # fmt: skip
-    told = []
-    for verdict, (_, name) in _VERDICTS.items():
-        before, after = (sum(row[k] == verdict for row in rows) for k in (2, 3))
-        told.append(f"{name}: {before} original, {after} corrected")
+    text: list[Section] = []
+    for kind, about in KINDS.items():
+        if of_kind := [[name, *rest] for name, its, *rest in rows if its == kind]:
+            text.append([f"{kind}: {about}", Table(_LEDGER, of_kind)])
+    legend = "; ".join(name for _, name in _VERDICTS.values())
     note = "`claims --explain ID` tells the story with its numbers."
-    table = Table(_LEDGER, rows)
-    text: list[Section] = [[table], ["; ".join(told), note]]
-    return Report("claims", text, record=lambda: _record(judgements), data=table)
+    text.append([f"Verdicts by kind, original / corrected ({legend}):", kinds_table(judgements)])
+    text.append([note])
+    data = Table(_DATA, rows)
+    return Report("claims", text, record=lambda: _record(judgements), data=data)
+
+
+def kinds_table(judgements: Sequence[Judgement]) -> Table:
+    """Return how many claims of each kind have each verdict: original / corrected."""
+    columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
+    rows = []
+    for kind in KINDS:
+        of_kind = [each for each in judgements if each.claim["kind"] == kind]
+        pairs = [
+            [sum(getattr(each, state).verdict == verdict for each in of_kind)
+             for state in ("original", "corrected")]
+            for verdict in _VERDICTS
+        ]  # fmt: skip
+        told = ["-" if pair == [0, 0] else f"{pair[0]} / {pair[1]}" for pair in pairs]
+        rows.append([kind, len(of_kind), *told])
+    return Table(columns, rows)
 
 
 def explanation(judgement: Judgement) -> Report:
@@ -53,7 +81,11 @@ def explanation(judgement: Judgement) -> Report:
     entry = judgement.claim
     text: list[Section] = [
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
-        [Field("says  ", entry["statement"]), Field("rule  ", entry["rule"])],
+        [
+            Field("kind  ", entry["kind"]), Field("says  ", entry["statement"]),
+            Field("rule  ", entry["rule"]),
+            *([Field("by    ", entry["source"])] if "source" in entry else []),
+        ],  # fmt: skip
     ]
     for title, outcome in (("original", judgement.original), ("corrected", judgement.corrected)):
         width = max(map(len, outcome.numbers), default=0)
@@ -101,7 +133,7 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
 def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
     entries = [
         {
-            **{name: each.claim[name] for name in ("id", "where", "quote")},
+            **{name: each.claim[name] for name in ("id", "kind", "where", "quote")},
             "original": each.original.verdict,
             "corrected": each.corrected.verdict,
             "numbers": {"original": each.original.numbers, "corrected": each.corrected.numbers},

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
-from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, Judged, graded
+from pyharness.history.claims.verdicts import FALSE, REPRODUCED, Judged, graded
 from pyharness.history.family.members import Member, run
 from pyharness.methods.linearised import jacobians
 from pyharness.methods.solve import solve
@@ -36,9 +36,9 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
     return graded(numbers, not known, otherwise=FALSE)
 
 
-def history_only(lab: Laboratory) -> Judged:
-    """Leave a statement of history to its sources."""
-    return Judged(NOT_TESTABLE, {})
+def by_sources(lab: Laboratory, holds: bool) -> Judged:
+    """Judge a statement of history, which no run can test, as its sources do."""
+    return Judged(REPRODUCED if holds else FALSE, {})
 
 
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:

@@ -155,14 +155,13 @@ def growing(lab: Laboratory, case: int) -> Judged:
     return graded(numbers, value > 1.0 and value > solution * 1.001)
 
 
-def no_error(lab: Laboratory, case: int) -> Judged:
-    """Measure what correcting everything gains at the steps that were run."""
+def search(lab: Laboratory, case: int) -> Judged:
+    """Measure what there was to find: what correcting everything gains at the steps that were run."""
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
     truth = lab.truth(case).omega[: run.steps]
     gain = distance(run.omega, truth) / distance(best.omega[: run.steps], truth)
-    numbers = {"error over that of the corrected program": gain}
-    return graded(numbers, gain <= 2.0, gain <= 10.0, FALSE)
+    return Judged(NOT_TESTABLE, {"error over that of the corrected program": gain})
 
 
 def concur(lab: Laboratory, case: int, share: float) -> Judged:

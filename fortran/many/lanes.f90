@@ -68,7 +68,7 @@ contains
     b%DT = b%step
     b%TIME = 0.0_dp
     b%ier = 0
-    call accelerations(scene, b%ACL1, b%ACL2, b%ACL3)
+    call accelerations(scene, e%listing, b%ACL1, b%ACL2, b%ACL3)
     if (.not. scene%torque_varies) then
       call set_torque(scene, b, b%TIME, 1)
       call spread_torque(b)

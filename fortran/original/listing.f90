@@ -16,6 +16,7 @@ module listing_flags
     logical :: c1_for_c
     logical :: do_variable
     logical :: initial_torque
+    logical :: three_masses
   end type listing_t
 
   public :: listing_from_bits
@@ -37,6 +38,7 @@ contains
     listing%c1_for_c = btest(bits, 8)
     listing%do_variable = btest(bits, 9)
     listing%initial_torque = btest(bits, 10)
+    listing%three_masses = btest(bits, 11)
   end function listing_from_bits
 
 end module listing_flags

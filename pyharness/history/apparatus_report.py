@@ -8,6 +8,7 @@ from itertools import zip_longest
 from typing import Any
 
 from pyharness.history.ablation import CaseEffects, Effect, switched
+from pyharness.model.facts import facts
 from pyharness.model.records import listing_record, scene_record
 from pyharness.model.report import (
     Column,
@@ -23,7 +24,7 @@ from pyharness.model.report import (
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
 
-FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "why")
+FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "grounds", "why")
 _ENTRIES = (*words("name kind certainty flag"), Column("what it is", left=True, fit="wrap"))
 _LISTINGS = ("original", "corrected_alone", "kept_alone", "corrected")
 _EFFECTS = words("case")
@@ -52,7 +53,9 @@ def entry_report(
 ) -> Report:
     """Report one entry with these of its `FIELDS`, and its effect by program and case."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
-    values = {**entry, "cards": cards}
+    what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
+    grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
+    values = {**entry, "cards": cards, "grounds": grounds}
     fields = [Field(f"{name:10s} ", values[name]) for name in names if values.get(name)]
     text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
     if "original" in entry:

@@ -66,7 +66,7 @@ def scan_report(
         f"in {pairs} places, {sum(each.printed is not None for each in cards)} in their number; "
         f"the scan has {counted(lines, 'line')}"
     )
-    read = next(each["sha256"] for each in facts("cards/scan")["witness"] if "sha256" in each)
+    (read,) = (each["sha256"] for each in facts("cards/scan")["witness"])
     told += (
         "; it is " + ("the text that was read" if digest == read else "another text") + " (SHA-256)"
     )
@@ -108,14 +108,16 @@ def classes_report() -> Report:
     table = Table(_CLASSES, rows)
     edition = facts("cards/scan")
     head = [Field(f"{each['siglum']}  ", each["what"]) for each in edition["witness"]]
+    grounds = [Field(f"{each['siglum']}  ", each["what"]) for each in edition["ground"]]
     principles = [Field(f"{name:12s}", f"{text}") for name, text in edition["principles"].items()]
     told = ", ".join(f"{number} {certainty}" for certainty, number in sure)
     return Report(
         "cards",
-        [head, principles, [table], [f"{len(entries)} entries: {told}; text {text_digest()}"]],
+        [["witness:", *head], ["grounds of the entries:", *grounds], principles, [table], [f"{len(entries)} entries: {told}; text {text_digest()}"]],
         record=lambda: {
             "classes": [dict(zip(_CLASSES_NAMES, row, strict=True)) for row in rows],
             "certainty": dict(sure), "witnesses": edition["witness"],
+            "grounds": edition["ground"],
             "principles": edition["principles"], "text": text_digest(),
         },
         data=table,

@@ -31,7 +31,10 @@ _KINDS = {
     "reading": "the reading that is not adopted, where the scan leaves two open",
     "conjecture": "what is assumed where no card exists",
     "misreading": "characters or numbers that the scan has wrong",
-    "dead code": "a card that has no effect",
+    "normalization": "a name made uniform, where that of the scan is legal and computes the same",
+    "redundant": "cards that compute what is known already, or what no result needs",
+    "unread": "what is set or declared, and read by no card",
+    "unreachable": "the aim of a jump that no card makes",
     "missing text": "cards that the scan or the report does not have",
     "dialect": "what only the FORTRAN of the machine explains",
 }
@@ -98,9 +101,8 @@ def _header(root: xml.Element) -> None:
     _said(printed, "biblScope", "appendix", unit="section")
     witnesses = xml.SubElement(source, "listWit")
     for each in edition["witness"]:
-        if _is_read(each):
-            witness = _said(witnesses, "witness", each["what"], id=each["siglum"])
-            _said(witness, "idno", each["sha256"], type="SHA-256")
+        witness = _said(witnesses, "witness", each["what"], id=each["siglum"])
+        _said(witness, "idno", each["sha256"], type="SHA-256")
 
     encoding = xml.SubElement(header, "encodingDesc")
     declared = xml.SubElement(encoding, "editorialDecl")
@@ -122,9 +124,8 @@ def _header(root: xml.Element) -> None:
     _taxonomy(classes, "kind", "kinds of entries", _KINDS.items())
     sure = _CERTAINTY.items()
     _taxonomy(classes, "certainty", "how sure an entry is, and its value of cert", sure)
-    # One text was read; the others are what an emendation rests on.
-    grounds = [(each["siglum"], each["what"]) for each in edition["witness"] if not _is_read(each)]
-    _taxonomy(classes, "ground", "grounds of emendation, no witnesses of the text", grounds)
+    grounds = [(each["siglum"], each["what"]) for each in edition["ground"]]
+    _taxonomy(classes, "ground", "grounds of an entry, no witnesses of the text", grounds)
 
 
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
@@ -201,8 +202,10 @@ def _app(parent: xml.Element, ours: str, scans: str, entry: str) -> xml.Element:
 def _apparatus(div: xml.Element) -> None:
     _said(div, "head", "The apparatus")
     for entry in facts("apparatus")["entry"]:
-        classes = f"#{_class('kind', entry['kind'])} #{_class('certainty', entry['certainty'])}"
-        note = _named(div, "note", entry["id"], type="entry", ana=classes)
+        classes = [_class("kind", entry["kind"]), _class("certainty", entry["certainty"])]
+        classes += [_class("ground", siglum) for siglum in entry["grounds"]]
+        ana = " ".join(f"#{each}" for each in classes)
+        note = _named(div, "note", entry["id"], type="entry", ana=ana)
         if entry["programs"]:
             note.set("target", " ".join(f"#{each}" for each in _targets(entry)))
         for name in _TOLD:
@@ -274,8 +277,3 @@ def _class(taxonomy: str, name: str) -> str:
 def _cert(entry: str) -> str:
     found = next(each for each in facts("apparatus")["entry"] if each["id"] == entry)
     return _CERTAINTY[found["certainty"]]
-
-
-def _is_read(witness: dict[str, str]) -> bool:
-    """Whether it is a text that was read: it has a digest."""
-    return "sha256" in witness

@@ -6,6 +6,7 @@ import numpy as np
 
 from pyharness.model.facts import facts
 from pyharness.model.functions import is_finite
+from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Stop, Trajectory
 
@@ -27,9 +28,10 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
     ]
 
 
-def accelerations(scene: Scene) -> list[float]:
-    """Return force over mass along each axis (m/s2)."""
-    return [force / mass for force, mass in zip(scene.forces, scene.masses, strict=True)]
+def accelerations(scene: Scene, listing: Listing) -> list[float]:
+    """Return force over mass along each axis (m/s2); corrected, a body has one mass, the first."""
+    masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
+    return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 
 
 def initial_torque(scene: Scene) -> Vector | None:

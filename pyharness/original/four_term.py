@@ -17,7 +17,7 @@ def run(
 ) -> Trajectory:
     """Run the program; it has no stop test, so `lipschitz` and `may_stop` do nothing."""
     coefficients = scene.euler_coefficients
-    acceleration = accelerations(scene)
+    acceleration = accelerations(scene, listing)
 
     def rates(torques: Sequence[Vector], k: int, x: Vector) -> list[float]:
         u, v = x[:3], x[3:]

@@ -26,7 +26,7 @@ def run(
 ) -> Trajectory:
     """Run the program; `lipschitz` in 1/s, without `may_stop` the test is passed over."""
     a, b, c = scene.euler_coefficients
-    acceleration = accelerations(scene)
+    acceleration = accelerations(scene, listing)
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]

@@ -18,7 +18,7 @@ def run(
     """Run the program; it has no stop test, so `lipschitz` and `may_stop` do nothing."""
     a, b, c = scene.euler_coefficients
     unset_c1 = 0.0
-    acceleration = accelerations(scene)
+    acceleration = accelerations(scene, listing)
 
     def rates(torques: Sequence[Vector], k: int, x: Vector) -> list[float]:
         coefficients = (a, b, c)

@@ -163,7 +163,7 @@ class _Equations:
         self._moments = [Decimal(x.numerator) / x.denominator for x in divisors(scene)]
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [
-            Decimal(f) / Decimal(m) for f, m in zip(scene.forces, scene.masses, strict=True)
+            Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces
         ]
 
     def expand(self, time: Decimal, state: Row, order: int) -> list[Row]:

@@ -33,7 +33,7 @@ class Reference:
 
     time: Array  # shape (n,), s; where the solution leaves every bound, the rows end before
     omega: Array  # shape (n, 3), rad/s
-    velocity: Array | None  # shape (n, 3), m/s; from the deck's masses and forces
+    velocity: Array | None  # shape (n, 3), m/s; from the deck's forces and its first mass
     source: str  # what it is
     estimate: float  # estimated error of any omega before rounding (rad/s)
     # shape (n, 3); what rounding took from omega (rad/s): `omega` and it together have twice the

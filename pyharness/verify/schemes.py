@@ -122,7 +122,7 @@ def _stage(scene: Scene, part: float, state: Array) -> Stage:
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)
     torque = np.array([scene.normalized_torque(time) for time in times.tolist()])
     products = scene.euler_coefficients * np.roll(omega, -1, axis=1) * np.roll(omega, -2, axis=1)
-    pull = np.divide(scene.forces, scene.masses)
+    pull = np.divide(scene.forces, scene.masses[0])  # corrected: one mass
     rate = np.hstack([torque + products, pull + np.cross(velocity, omega)])
     u, v = np.abs(omega), np.abs(velocity)
     crossed = np.roll(v, -1, axis=1) * np.roll(u, -2, axis=1)

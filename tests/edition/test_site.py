@@ -108,8 +108,8 @@ def test_marks_stand_where_the_scan_differs() -> None:
 
 
 def test_kinds_have_an_order() -> None:
-    found = decks._kinds(["misreading", "dead code", "missing text", "reading", "misreading"])
-    assert found == ["reading", "missing text", "dead code", "misreading"]
+    found = decks._kinds(["misreading", "unread", "missing text", "reading", "misreading"])
+    assert found == ["reading", "missing text", "unread", "misreading"]
 
 
 def test_every_claim_entry_and_sentence_is_there(built_site: dict[str, bytes]) -> None:

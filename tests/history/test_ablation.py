@@ -15,7 +15,10 @@ from pyharness.truth.reference import Reference
 from pyharness.views.render import render
 
 Capture = pytest.CaptureFixture[str]
-KINDS = {"defect", "reading", "conjecture", "misreading", "dialect", "dead code", "missing text"}
+KINDS = {
+    "defect", "reading", "conjecture", "misreading", "normalization", "dialect", "redundant", "unread",
+    "unreachable", "missing text",
+}  # fmt: skip
 CERTAINTIES = {"certain", "probable", "conjecture", "undecidable"}
 
 

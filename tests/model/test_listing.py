@@ -26,9 +26,9 @@ def test_every_entry_names_its_cards_in_every_program_that_has_it() -> None:
 
 
 def test_programs_have_the_defects_of_the_apparatus() -> None:
-    assert names_of("defect", "two-term") == ("dt-accumulates", "x3-reads-acl2")
-    assert names_of("defect", "four-term") == ("dt-accumulates",)
-    assert len(names_of("defect", "runge-kutta")) == 5
+    assert names_of("defect", "two-term") == ("dt-accumulates", "x3-reads-acl2", "three-masses")
+    assert names_of("defect", "four-term") == ("dt-accumulates", "three-masses")
+    assert len(names_of("defect", "runge-kutta")) == 6
     for program in PROGRAMS:
         assert names_of("conjecture", program) == ("torque-held", "initial-torque")
         assert set(switches(program)) == {*names_of("defect", program), "torque-held"}
@@ -51,17 +51,18 @@ def test_conjectures_are_known_among_defects() -> None:
     assert found.conjectures == {"torque-held"}
     assert found.has("torque-held")
     assert Listing("two-term", ["c1-for-c"]).readings == {"c1-for-c"}
-    assert found.flags == original("two-term").flags - Listing("two-term", ["x3-reads-acl2"]).flags
+    others = Listing("two-term", ["x3-reads-acl2", "three-masses"])
+    assert found.flags == original("two-term").flags - others.flags
 
 
 def test_options_of_the_command_line() -> None:
     assert subset("two-term").label == "original"
-    assert subset("two-term", fix=["dt-accumulates"]).defects == {"x3-reads-acl2"}
+    assert subset("two-term", fix=["dt-accumulates"]).defects == {"x3-reads-acl2", "three-masses"}
     assert subset("two-term", keep=["dt-accumulates"]).defects == {"dt-accumulates"}
     assert subset("two-term", "original", keep=["dt-accumulates"]).label == "original"
     assert subset("two-term", "corrected", fix=["dt-accumulates"]).label == "corrected"
     both = subset("two-term", fix=["dt-accumulates"], keep=["x3-reads-acl2"])
-    assert both.defects == {"x3-reads-acl2"}
+    assert both.defects == {"x3-reads-acl2", "three-masses"}
     assert both.conjectures == {"torque-held"}
 
 

@@ -22,9 +22,10 @@ export function velocityRate(acceleration, u, v) {
   ];
 }
 
-// Force over mass along each axis (m/s2).
-export function accelerations(scene) {
-  return scene.forces.map((force, axis) => force / scene.masses[axis]);
+// Force over mass along each axis (m/s2); corrected, a body has one mass, the first.
+export function accelerations(scene, listing) {
+  const massAlong = (axis) => scene.masses[listing.has("three-masses") ? axis : 0];
+  return scene.forces.map((force, axis) => force / massAlong(axis));
 }
 
 // The torque over moment that Table 1 gives initially (1/s2), which acts over the first step by

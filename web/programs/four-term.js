@@ -6,7 +6,7 @@ import { accelerations, eulerCoefficients, omegaRate, velocityRate } from "./equ
 
 export function run(scene, listing) {
   const coefficients = eulerCoefficients(scene);
-  const acceleration = accelerations(scene);
+  const acceleration = accelerations(scene, listing);
 
   const rates = (torques, k, x) => {
     const u = x.slice(0, 3);

@@ -17,7 +17,7 @@ const STOP_VARIABLES = ["U1", "U2", "U3", "V1", "V2", "V3"];
 // `lipschitz` in 1/s; without `mayStop` the test is passed over.
 export function run(scene, listing, lipschitz = 500, mayStop = true) {
   const [a, b, c] = eulerCoefficients(scene);
-  const acceleration = accelerations(scene);
+  const acceleration = accelerations(scene, listing);
   const { step_size: dt, steps } = scene.run;
   let time = 0;
   let base = [...scene.initial.omega, 0, 0, 0];

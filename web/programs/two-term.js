@@ -7,7 +7,7 @@ import { accelerations, eulerCoefficients, omegaRate, velocityRate } from "./equ
 export function run(scene, listing) {
   const [a, b, c] = eulerCoefficients(scene);
   const unsetC1 = 0;
-  const acceleration = accelerations(scene);
+  const acceleration = accelerations(scene, listing);
 
   const rates = (torques, k, x) => {
     let coefficients = [a, b, c];

@@ -1,0 +1,149 @@
+"""The decks compared with each other, and with sections II to V: every step of every program.
+
+The table is `data/cards/collation.toml`; whether decks agree is found from their statements.
+"""
+
+import re
+from typing import Any, NamedTuple
+
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.original.cards import deck, numbers, tight
+
+
+class Row(NamedTuple):
+    """A step of the programs.
+
+    Attributes
+    ----------
+    what : str
+        What its cards do.
+    cards : dict of str to str
+        The cards of each deck that has the step, as in ``750-770, 800``.
+    decks : str
+        ``agree`` where all that have the step have the same statements, ``names`` or ``order``
+        where they differ in that alone, else ``differ``; ``-`` where none has it.
+    thesis : str
+        ``agrees`` or ``differs``; ``silent`` where the thesis does not speak of the step.
+    text, says : str
+        The place in the thesis, and what it says; empty where it is silent.
+    entries : tuple of str
+        The entries of the apparatus that explain a disagreement.
+    reason : str
+        What else does.
+    """
+
+    what: str
+    cards: dict[str, str]
+    decks: str
+    thesis: str
+    text: str
+    says: str
+    entries: tuple[str, ...]
+    reason: str
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether nothing disagrees, or an entry or a reason says why."""
+        agrees = self.decks == "agree" and len(self.cards) == len(PROGRAMS)
+        return (agrees and self.thesis == "agrees") or bool(self.entries or self.reason)
+
+
+def rows() -> list[Row]:
+    """Return the steps in the order of the decks."""
+    return [_row(each) for each in facts("cards/collation")["row"]]
+
+
+def faults(found: list[Row]) -> list[str]:
+    """Return what the table leaves unexplained or has wrong, a sentence each."""
+    told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
+    known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
+    for row in found:
+        told += [f"{row.what}: no entry {name!r}" for name in row.entries if name not in known]
+        told += [
+            f"{row.what}: {name} names none of its cards"
+            for name in row.entries
+            if name in known and not _names_a_card(known[name], row)
+        ]
+    for program in PROGRAMS:
+        named = [n for row in found for n in numbers(row.cards.get(program, ""))]
+        wanted = [n for n, card in deck(program).cards.items() if not card.is_comment]
+        told += [f"{program}:{n} is in no row" for n in wanted if n not in named]
+        told += [f"{program}:{n} is in two rows" for n in wanted if named.count(n) > 1]
+        comments = sorted(set(named) - set(wanted) - _comments(program))
+        told += [f"{program}:{n} is no card" for n in comments]
+    for name, entry in known.items():
+        if entry["kind"] not in ("misreading", "missing text", "normalization") and entry["cards"]:
+            if not any(name in row.entries for row in found):
+                told.append(f"{name}: in no row")
+    return told
+
+
+def statements(program: str, cards: str) -> list[str]:
+    """Return the statements of cards without blanks and labels; comments are none."""
+    found: list[str] = []
+    for number in numbers(cards):
+        card = deck(program).cards[number]
+        if card.is_comment:
+            continue
+        if card.continues:
+            found[-1] += tight(card.text[6:])
+        else:
+            found.append(tight(card.text[6:]))
+    return found
+
+
+def _row(given: dict[str, Any]) -> Row:
+    cards = given["cards"]
+    thesis = "silent"
+    if "text" in given:
+        thesis = "agrees" if given["agrees"] else "differs"
+    return Row(
+        given["what"], cards, _decks(given), thesis, given.get("text", ""), given.get("says", ""),
+        tuple(given.get("entries", ())), given.get("reason", ""),
+    )  # fmt: skip
+
+
+def _decks(given: dict[str, Any]) -> str:
+    """Say how the statements of the decks that have a step differ."""
+    found = {program: statements(program, cards) for program, cards in given["cards"].items()}
+    if not found:
+        return "-"
+    if _same(found):
+        return "agree"
+    renamed = {
+        program: [_renamed(each, given.get("names", {}).get(program, "")) for each in texts]
+        for program, texts in found.items()
+    }
+    if _same(renamed):
+        return "names"
+    if given.get("any_order"):
+        ordered = {
+            program: sorted(name for each in texts for name in re.split(r"[ ,]|REAL", each))
+            for program, texts in renamed.items()
+        }
+        return "order" if _same(ordered) else "differ"
+    return "differ"
+
+
+def _same(found: dict[str, list[str]]) -> bool:
+    first, *others = found.values()
+    return all(each == first for each in others)
+
+
+def _renamed(statement: str, names: str) -> str:
+    """Return a statement with names replaced, as in ``A=A1 B=B1``."""
+    changes = dict(each.split("=") for each in names.split())
+    return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
+
+
+def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
+    """Whether an entry names a card of the row; one of no card at all may stand in any."""
+    return not entry["cards"] or any(
+        set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))
+        for program, cards in row.cards.items()
+    )
+
+
+def _comments(program: str) -> set[int]:
+    return {n for n, card in deck(program).cards.items() if card.is_comment}

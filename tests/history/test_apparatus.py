@@ -1,0 +1,115 @@
+"""What the apparatus says of the programs is so, entry by entry."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pyharness.history.ablation import entries, entry
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS, original, subset
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.original.cards import chosen, deck, numbers
+from pyharness.original.programs import PROGRAM_REGISTRY, run_program
+from pyharness.truth.reference import reference
+
+
+def test_entries_rest_on_grounds_that_are_no_witnesses() -> None:
+    sigla = {each["siglum"] for each in facts("cards/scan")["ground"]}
+    assert {each["siglum"] for each in facts("cards/scan")["witness"]} == {"S"}
+    for each in entries():
+        assert each["grounds"], each["id"]
+        assert set(each["grounds"]) <= sigla, each["id"]
+    assert {siglum for each in entries() for siglum in each["grounds"]} == sigla
+
+
+@pytest.mark.parametrize("mass", [100.0, 110.0, 120.0])
+def test_with_one_mass_whichever_case_2_stops_at_step_26(mass: float) -> None:
+    scene = replace(case_scene(2), masses=(mass,) * 3)
+    stops = [
+        run_program(given, listing).stop
+        for given in (case_scene(2), scene)
+        for listing in (original("runge-kutta"), subset("runge-kutta", fix=["three-masses"]))
+    ]
+    assert [each and each.step for each in stops] == [25, 26, 26, 26]
+    assert "step 26" in entry("three-masses")["why"]
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("case", [3, 5])
+def test_corrected_velocity_is_that_of_one_mass(program: str, case: int) -> None:
+    scene = case_scene(case)
+    assert len(set(scene.masses)) == 3
+    errors = []
+    for listing in (subset(program, "corrected"), subset(program, keep=["three-masses"])):
+        finer = replace(scene, step_size=1e-3, steps=1000)
+        truth = reference(finer, finer.times(), velocity=True).velocity
+        run = run_program(finer, listing, may_stop=False)
+        assert truth is not None
+        assert run.velocity is not None
+        errors.append(float(np.abs(run.velocity - truth).max()))
+    assert errors[0] < 1e-4 < 1e-2 < errors[1]
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_omega_does_not_change_by_a_bit_without_the_translational_block(program: str) -> None:
+    for case in case_numbers():
+        with_it, without = (
+            PROGRAM_REGISTRY[program].run(
+                case_scene(case), original(program), may_stop=False, velocity=velocity
+            ).omega
+            for velocity in (True, False)
+        )
+        assert with_it.tobytes() == without.tobytes()
+    of_velocity = re.compile(r"V[123]|ACL|FRC|MS|[XYZ]\(|[XYZ]\d|B\(\d,[456]\)|VV|[XYZ]L")
+    for number in numbers(entry("translational-block")["cards"][program]):
+        card = deck(program).cards[number]
+        assert card.continues or of_velocity.search(card.text), card.name
+
+
+def test_torque_of_case_7_falls_and_is_sampled_once_a_radian() -> None:
+    scene = case_scene(7)
+    given = next(each for each in facts("printer")["initial_torque"] if each["case"] == 7)
+    assert list(given["torque"]) == [100.0, 200.0, 150.0]
+    moments = np.array(scene.moments)
+    law = np.array([scene.normalized_torque(t) for t in scene.times()]) * moments
+    assert np.abs(law).max() <= 1.0 + 1e-12
+    assert max(f for _, f in scene.torque.sines + scene.torque.cosines) * scene.step_size == 1.0
+    gained = np.abs(np.cumsum(law / moments * scene.step_size, axis=0)).max()
+    assert gained < 0.05
+
+
+def _texts(program: str, *numbers_: int) -> str:
+    return "\n".join(deck(program).cards[n].text for n in numbers_)
+
+
+def test_what_is_redundant_or_unread_is_so_on_the_cards() -> None:
+    four, kutta = (
+        {n: card.text for n, card in deck(name).cards.items() if not card.is_comment}
+        for name in ("four-term", "runge-kutta")
+    )
+    body = "\n".join(text for n, text in four.items() if n > 120)
+    for name in "TFGHXYZ":
+        assert set(re.findall(rf"\b{name}\((\w+)\)", body)) <= {"2", "3", "4", "5", "L"}, name
+    assert "DO 400 L=2,5,1" in body
+    assert "WKA(24)" in four[110]
+    assert "WKA(12)" in deck("two-term").cards[110].text
+    assert not any(re.search(r"\bM[123]\b", text) for n, text in kutta.items() if n != 110)
+    assert not any("WRITE" in text for n, text in kutta.items() if n > 1250)
+    assert [kutta[n].strip() for n in (770, 780, 790)] == [
+        "DO 100 I=1,2,1", "J=I-1", "IF(I.EQ.1)J=1",
+    ]  # fmt: skip
+    for program, aim in (("two-term", "30"), ("four-term", "30")):
+        jumps = [card.text for card in deck(program).cards.values() if "GO TO" in card.text]
+        assert not any(text.rstrip().endswith(aim) for text in jumps)
+
+
+def test_a_normalization_needs_no_emendation() -> None:
+    """As the scan has them both decks set, divide and print one name: nothing is unset."""
+    named = [c for c in chosen(()) if any(d.entry == "torque-names" for d in c.differences)]
+    assert len(named) == 14
+    for card in named:
+        scan = (card.scan or "").partition("-")[2]
+        assert not re.search(r"\bN[123]\b", scan)
+        assert re.search(r"M[123]", scan)

@@ -80,7 +80,8 @@ def interrupted(
             )
         time.sleep(moment)
         was_running = process.poll() is None
-        (os.killpg if to_group else os.kill)(process.pid, sent)
+        if was_running:
+            (os.killpg if to_group else os.kill)(process.pid, sent)
         begin = time.monotonic()
         try:
             _, errors = process.communicate(timeout=_PATIENCE)
@@ -97,7 +98,7 @@ def interrupted(
 
 def _judged(code: int, errors: str, was_running: bool, sent: signal.Signals) -> str:
     if not was_running:
-        return "had ended"
+        return "had ended" if code == 0 else f"CODE {code} by itself"
     if sent == signal.SIGKILL:
         return "killed" if code == -signal.SIGKILL else f"CODE {code}"
     # Until the interpreter has read this project's first file, it is not ours to answer: it dies

@@ -178,7 +178,7 @@ contains
       end do
       if (.not. change > 0.0_dp) status = COMPLETE
       if (change >= change_before .and. change <= ROUNDING*scale) status = COMPLETE
-      ! A torque that gives far more than there is, and is taken back by itself, leaves its rounding.
+      ! A torque that gives far more than is there, and takes it back, leaves its rounding.
       if (iteration > PATIENT .and. change >= change_before &
           .and. change <= ROUNDING*(scale + abs(h)*push)) status = COMPLETE
       if (status == COMPLETE) exit

@@ -55,8 +55,8 @@ def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
 def test_the_tolerance_holds_where_the_motion_magnifies_errors(tolerance: float) -> None:
     """Bodies that leave their middle axis under a faint torque: what a step errs grows e2 to e16.
 
-    Of thousands the error is below half of the tolerance; guards a thousand times looser, or a
-    trust in estimates fifty times larger, let some exceed it.
+    Of thousands the error is below half of the tolerance. If estimates were trusted fifty times
+    further, some would exceed it.
     """
     n = 8000
     rng = np.random.default_rng(1)

@@ -385,14 +385,13 @@ def test_full_inertia_takes_the_torque_as_it_is() -> None:
     assert found.omega[0] == pytest.approx(axes @ wanted.omega[0], abs=1e-12)
 
 
-def test_the_scale_is_the_largest_omega_on_the_way() -> None:
-    """Of a body that hardly turns at first the tolerance is relative to what the torque makes."""
+@pytest.mark.parametrize("time", [40.0, 120.0])
+def test_the_scale_is_the_largest_omega_on_the_way(time: float) -> None:
+    """A torque makes omega from almost nothing: a coarse tolerance takes no more steps than a fine.
+
+    It would, were the tolerance relative to the omega of the start.
+    """
     law = TorqueLaw((0.3, -0.2, 0.1), frame="space")
-    slow, fast = (
-        Scene("", omega, moments=(3.0, 2.0, 4.0), torque=law)
-        for omega in ((1e-9, 0.0, 0.0), (0.5, 0.3, 0.2))
-    )
-    of_slow, of_fast = (solve(each, [8.0], attitude=True, tolerance=1e-10) for each in (slow, fast))
-    assert of_slow.error is not None
-    assert of_slow.error <= 1e-10
-    assert of_slow.evaluations <= 2 * of_fast.evaluations
+    scene = Scene("", (1e-9, 0.0, 0.0), moments=(3.0, 2.0, 4.0), torque=law)
+    coarse, fine = (solve(scene, [time], attitude=True, tolerance=e) for e in (1e-3, 1e-9))
+    assert coarse.steps <= fine.steps

@@ -206,3 +206,24 @@ def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number
     generator = np.random.default_rng([11, list(NASTY).index(kind)])
     scene, time = [NASTY[kind](generator) for _ in range(number + 1)][-1]
     _held_to_fine_rows(scene, time, [1e-3], 0.4)
+
+
+def test_the_error_is_the_largest_of_all_rows() -> None:
+    """Rows within the steps have errors of their own, which the last row's do not show."""
+    generator = np.random.default_rng(3)
+    ratios = []
+    for _ in range(8):
+        least, middle, largest = np.sort(generator.uniform(1.0, 3.0, 3))
+        moments = (least, middle, min(largest, 0.95 * (least + middle)))
+        scene = Scene("", tuple(generator.standard_normal(3)), moments=moments)
+        times = np.linspace(0.0, generator.uniform(3.0, 12.0), 81)[1:]
+        for tolerance in (1e-3, 1e-5):
+            rows, end = (solve(scene, each, "taylor", tolerance) for each in (times, times[-1:]))
+            assert rows.steps == end.steps
+            assert rows.error is not None
+            assert end.error is not None
+            assert rows.error >= end.error
+            ratios.append(rows.error / end.error)
+            truth = solve(scene, times, "taylor", 1e-14).omega
+            assert np.abs(rows.omega - truth).max() / np.abs(truth).max() <= rows.error
+    assert max(ratios) > 2.0

@@ -10,7 +10,7 @@ import numpy as np
 
 import tests.conftest  # noqa: F401  (guards the kernels where traps are asked for)
 from pyharness import _build, _kernels
-from pyharness.model.listing import PROGRAMS
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled_in_word, in_word
@@ -39,6 +39,14 @@ def digest(run: Trajectory) -> str:
     return summed.hexdigest()[:16]
 
 
+def count_of_runs() -> int:
+    """Return how many digests there are, where the compiler has every word."""
+    cells = list(all_cells())
+    nasty = sum(2 * len(list(all_listings(program))) for program in PROGRAMS) * len(NASTY)
+    words = sum(_has_other_words(listing) for listing, _ in cells) * (len(COMPILED_WORDS) - 1)
+    return len(cells) + nasty + words
+
+
 def all_digests(language: str) -> Iterator[tuple[str, str]]:
     """Yield name and digest of every cell, of every listing on the nasty scenes, and in words."""
     for listing, case in all_cells():
@@ -61,9 +69,13 @@ def _in_words(language: str) -> Iterator[tuple[str, str]]:
     run = compiled_in_word.run if compiled else in_word.run
     for word in compiled_words() if compiled else COMPILED_WORDS:
         for listing, case in all_cells():
-            if word != BINARY64 and listing.label != "custom" and not listing.readings:
+            if word != BINARY64 and _has_other_words(listing):
                 found = run(case_scene(case), listing, WORDS[word])
                 yield f"words/{word}/{cell_name(listing, case)}", digest(found)
+
+
+def _has_other_words(listing: Listing) -> bool:
+    return listing.label != "custom" and not listing.readings
 
 
 def replay(cell: str) -> str:

@@ -19,8 +19,13 @@ from pyharness.original import compiled
 from tests import traps
 from tests.cross.builds import ROOT, Build, false_claims
 from tests.cross.comparison import compared
-from tests.cross.digests import digest, replay
+from tests.cross.digests import count_of_runs, digest, replay
 from tests.traps import DIVIDE, INVALID, TOO_LARGE, UntoldException, guarded
+
+
+def test_readme_has_the_number_of_runs_that_are_compared() -> None:
+    told = f"compares every bit of {count_of_runs()} runs"
+    assert told in " ".join((ROOT / "README.md").read_text().split())
 
 
 def test_digest_sees_every_bit_and_every_counter() -> None:

@@ -9,6 +9,7 @@ one answer of a thousand.
 
 import argparse
 import csv
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -77,18 +78,24 @@ class Answer:
 
     @property
     def is_silent(self) -> bool:
-        """Whether a result without digits is said to be complete."""
-        return self.lost > _SURELY and self.ended == "complete"
+        """Whether a result without digits is said to be complete.
+
+        A closed form loses no digit to rounding, and a torque in space tells no amplification: of
+        both the error decides.
+        """
+        known = self.growth is not None or self.error > self.draw.tolerance
+        return self.lost > _SURELY and self.ended == "complete" and known
 
     @property
     def is_false_alarm(self) -> bool:
         """Whether a scene is said to be sensitive that is not.
 
-        Torques that cancel are sensitive by themselves: no K says how much.
+        Torques that cancel are sensitive by themselves: no K says how much. With the attitude the
+        amplification is known up to the angle by which an error of omega may rotate the body.
         """
-        return (
-            self.lost < _HARDLY and self.ended == SENSITIVE and "cancelling" not in self.draw.kinds
-        )
+        angle = 1.0 + math.pi * self.draw.truth.turns * self.draw.attitude
+        calm = self.lost * angle < _HARDLY and "cancelling" not in self.draw.kinds
+        return calm and self.ended == SENSITIVE
 
     @property
     def seen(self) -> float | None:

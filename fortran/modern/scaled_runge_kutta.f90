@@ -6,8 +6,8 @@ module scaled_runge_kutta
   use kinds, only: dp
   use problem, only: problem_t
   use scaled_march, only: GAIN, march_constant, march_varying
-  use scaled_motion, only: amplification, average, integral, MOST_WAVES, motion_t, reach_of, scaled, &
-                           steps_for_waves
+  use scaled_motion, only: amplification, average, integral, MOST_WAVES, motion_t, reach_of, &
+                           scaled, steps_for_waves
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
   use torque_noise, only: torque_noise_of
   implicit none(type, external)

@@ -126,15 +126,16 @@ contains
     real(dp), intent(in) :: part !! of the step
     real(dp), intent(in) :: q(4)
     real(dp) :: error(3)
-    real(dp) :: square, cube ! of the part
+    real(dp) :: square, cube, fourth ! powers of the part
 
     square = part*part
     cube = square*part
+    fourth = part*cube
     error = now%before &
-            + in_space(now%ends(:, 1), (part - cube + 0.5_dp*part*cube)*now%rates(:, 1) &
-                       + (0.5_dp*square - 2.0_dp/3.0_dp*cube + 0.25_dp*part*cube)*now%slopes(:, 1)) &
-            + in_space(now%ends(:, 2), (cube - 0.5_dp*part*cube)*now%rates(:, 2) &
-                       + (0.25_dp*part*cube - cube/3.0_dp)*now%slopes(:, 2)) &
+            + in_space(now%ends(:, 1), (part - cube + 0.5_dp*fourth)*now%rates(:, 1) &
+                       + (0.5_dp*square - 2.0_dp/3.0_dp*cube + 0.25_dp*fourth)*now%slopes(:, 1)) &
+            + in_space(now%ends(:, 2), (cube - 0.5_dp*fourth)*now%rates(:, 2) &
+                       + (0.25_dp*fourth - cube/3.0_dp)*now%slopes(:, 2)) &
             - part**(order + 1)*left_turn(now%left, q)
   end function error_within
 

@@ -88,8 +88,8 @@ contains
     integer(int64) :: half_way   ! of the steps allowed
     real(dp) :: t_half           ! the time then, s
 
-    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true., &
-                      1.0_dp)
+    found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, &
+                      .true., 1.0_dp)
     with_attitude = n_attitudes > 0
     rest = times(n_times)
     if (rest == 0.0_dp) then

@@ -17,7 +17,7 @@ module taylor_series
     real(c_double) :: factors(4)             !! step times A, B, C, s
     real(c_double) :: change(4)              !! sum of the terms from 1, rad/s
     real(c_double) :: lanes(4, 3)            !! small differences, a vector in each lane, rad/s
-    !! The same of an attitude, and the two beyond the order but for what omega's next makes of them.
+    !! The same of an attitude, and two terms beyond the order without the next term of omega.
     real(c_double) :: turns(4, 0:MOST_ORDER + MORE_TURNS)
     real(c_double) :: half(4)                !! of the step, s
     real(c_double) :: turn(4)                !! sum of its terms from 1

@@ -18,7 +18,7 @@ VERBS = {
     "defects": "the apparatus: every defect and reading, the evidence, and its effect",
     "limits": "what the original programs tend to as the step goes to zero",
     "figures": "Figures 6 to 12 of the thesis, original and corrected: SVG, PNG, CSV",
-    "claims": "every statement of the thesis about results, judged",
+    "claims": "statements of the thesis by kind, judged for the programs as printed and corrected",
     "family": "the weighted residual methods: orders derived, and orders measured",
     "plan": "what a scene needs, what is therefore not computed, and why",
     "rotations": "the steady rotations of a scene, their stability, and the time between flips",

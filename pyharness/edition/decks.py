@@ -8,8 +8,8 @@ from pyharness.original.cards import Card, Place, deck, parallels, tight
 
 # Whose colour a card takes where it has entries of several kinds.
 _ORDER = (
-    "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant", "dialect",
-    "normalization", "misreading",
+    "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
+    "dialect", "normalization", "misreading",
 )  # fmt: skip
 
 

@@ -113,7 +113,10 @@ def classes_report() -> Report:
     told = ", ".join(f"{number} {certainty}" for certainty, number in sure)
     return Report(
         "cards",
-        [["witness:", *head], ["grounds of the entries:", *grounds], principles, [table], [f"{len(entries)} entries: {told}; text {text_digest()}"]],
+        [
+            ["witness:", *head], ["grounds of the entries:", *grounds], principles, [table],
+            [f"{len(entries)} entries: {told}; text {text_digest()}"],
+        ],
         record=lambda: {
             "classes": [dict(zip(_CLASSES_NAMES, row, strict=True)) for row in rows],
             "certainty": dict(sure), "witnesses": edition["witness"],

@@ -65,7 +65,9 @@ class Listing:
         """`original`, `corrected` or `custom`."""
         if not self.active:
             return "corrected"
-        return "original" if self.active - self.readings == set(switches(self.program)) else "custom"
+        return (
+            "original" if self.active - self.readings == set(switches(self.program)) else "custom"
+        )
 
     @property
     def active(self) -> frozenset[str]:

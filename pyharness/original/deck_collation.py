@@ -10,6 +10,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.original.cards import deck, numbers, tight
 
+_OF_THE_SCAN = ("misreading", "missing text", "normalization")
+
 
 class Row(NamedTuple):
     """A step of the programs.
@@ -72,10 +74,12 @@ def faults(found: list[Row]) -> list[str]:
         told += [f"{program}:{n} is in two rows" for n in wanted if named.count(n) > 1]
         comments = sorted(set(named) - set(wanted) - _comments(program))
         told += [f"{program}:{n} is no card" for n in comments]
-    for name, entry in known.items():
-        if entry["kind"] not in ("misreading", "missing text", "normalization") and entry["cards"]:
-            if not any(name in row.entries for row in found):
-                told.append(f"{name}: in no row")
+    explaining = {name for row in found for name in row.entries}
+    told += [
+        f"{name}: in no row"
+        for name, entry in known.items()
+        if entry["cards"] and entry["kind"] not in _OF_THE_SCAN and name not in explaining
+    ]
     return told
 
 

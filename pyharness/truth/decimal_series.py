@@ -162,9 +162,7 @@ class _Equations:
         self._torque = scene.body_torque
         self._moments = [Decimal(x.numerator) / x.denominator for x in divisors(scene)]
         self._velocity, self._attitude = velocity, scene.attitude is not None
-        self._acceleration = [
-            Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces
-        ]
+        self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 
     def expand(self, time: Decimal, state: Row, order: int) -> list[Row]:
         """Return the Taylor coefficients 0 ... order of every unknown around `time`."""

@@ -16,8 +16,8 @@ from pyharness.views.render import render
 
 Capture = pytest.CaptureFixture[str]
 KINDS = {
-    "defect", "reading", "conjecture", "misreading", "normalization", "dialect", "redundant", "unread",
-    "unreachable", "missing text",
+    "defect", "reading", "conjecture", "misreading", "normalization", "dialect",
+    "redundant", "unread", "unreachable", "missing text",
 }  # fmt: skip
 CERTAINTIES = {"certain", "probable", "conjecture", "undecidable"}
 

@@ -56,9 +56,9 @@ def test_corrected_velocity_is_that_of_one_mass(program: str, case: int) -> None
 def test_omega_does_not_change_by_a_bit_without_the_translational_block(program: str) -> None:
     for case in case_numbers():
         with_it, without = (
-            PROGRAM_REGISTRY[program].run(
-                case_scene(case), original(program), may_stop=False, velocity=velocity
-            ).omega
+            PROGRAM_REGISTRY[program]
+            .run(case_scene(case), original(program), may_stop=False, velocity=velocity)
+            .omega
             for velocity in (True, False)
         )
         assert with_it.tobytes() == without.tobytes()

@@ -1,4 +1,4 @@
-"""`claims`: every statement of the thesis about results, judged."""
+"""`claims`: statements of the thesis by kind, each judged."""
 
 import argparse
 

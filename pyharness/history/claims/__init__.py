@@ -1,1 +1,1 @@
-"""The statements of the thesis about results, judged."""
+"""The statements of the thesis, judged."""

@@ -82,10 +82,11 @@ def explanation(judgement: Judgement) -> Report:
     text: list[Section] = [
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
         [
-            Field("kind  ", entry["kind"]), Field("says  ", entry["statement"]),
+            Field("kind  ", entry["kind"]),
+            Field("says  ", entry["statement"]),
             Field("rule  ", entry["rule"]),
             *([Field("by    ", entry["source"])] if "source" in entry else []),
-        ],  # fmt: skip
+        ],
     ]
     for title, outcome in (("original", judgement.original), ("corrected", judgement.corrected)):
         width = max(map(len, outcome.numbers), default=0)

@@ -156,7 +156,7 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Measure what there was to find: what correcting everything gains at the steps that were run."""
+    """Measure what there was to find: what correcting everything gains at the steps that ran."""
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
     truth = lab.truth(case).omega[: run.steps]

@@ -30,7 +30,7 @@ def changes(text: str) -> Iterator[Change]:
     lines = wrapper.resolve(PositionProvider)
 
     def replaced(old: cst.CSTNode, new: cst.CSTNode) -> Callable[[], str]:
-        return lambda: str(wrapper.module.deep_replace(old, new).code)
+        return lambda: cst.ensure_type(wrapper.module.deep_replace(old, new), cst.Module).code
 
     def visit(node: cst.CSTNode) -> Iterator[Change]:
         for operator, new in _of_node(node):

@@ -27,7 +27,7 @@ class Recorder:
     def __init__(self) -> None:
         self._folder = f"{Path.cwd()}{os.sep}"
         self._code: dict[int, CodeType] = {}
-        self._names: dict[int, str] | None = None
+        self._names: dict[int, str] = {}
         hooks = ctypes.CDLL(os.environ["LD_PRELOAD"])
         self._entered = (ctypes.c_void_p * PLACES).in_dll(hooks, "entered")
 
@@ -41,7 +41,7 @@ class Recorder:
     def end(self) -> list[str]:
         """Return the names."""
         sys.settrace(None)
-        threading.settrace(None)  # type: ignore[arg-type]
+        threading.settrace(None)
         found = set()
         for code in self._code.values():
             if code.co_filename.startswith(self._folder):
@@ -49,9 +49,9 @@ class Recorder:
                 if path.startswith("pyharness/"):
                     found.add(f"{path}:{code.co_qualname.partition('.<locals>')[0]}")
         entered = {address for address in self._entered if address}
-        if entered and self._names is None:
+        if entered and not self._names:
             self._names = _compiled_names()
-        return sorted(found.union(self._names[x] for x in entered if x in (self._names or {})))
+        return sorted(found.union(self._names[x] for x in entered if x in self._names))
 
     def _look(self, frame: FrameType, event: str, argument: Any) -> None:
         self._code[id(frame.f_code)] = frame.f_code

@@ -14,12 +14,11 @@ from tests.mutations.sample import (
     draw,
     equivalent,
     files,
-    language_of,
     lines_of_code,
     mutations,
     stale,
 )
-from tests.mutations.text_source import FORTRAN, JAVASCRIPT, C
+from tests.mutations.text_source import C, FORTRAN, JAVASCRIPT, language_of
 from tests.mutations.tree import ROOT
 from tests.mutations.trial import Verdict
 

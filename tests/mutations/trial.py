@@ -146,7 +146,9 @@ def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
     by_name = {each.name: each for each in checks}
     failed = re.findall(r"^(?:FAILED|ERROR) (tests/\S.*?)(?: - .*)?$", said, re.M)
     for name in failed[:1]:
-        if found := by_name.get(name) or by_name.get(name.partition("::")[0]):
+        # The check may be a file, or a test with all its parameters.
+        wider = (name, name.partition("[")[0], name.partition("::")[0])
+        if found := next((by_name[each] for each in wider if each in by_name), None):
             return Check(name, found.seconds, found.functions)
     if failed or code in (2, 3, 4):
         raise NotCollected

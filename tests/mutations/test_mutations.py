@@ -18,7 +18,7 @@ from tests.mutations.sample import (
     mutations,
     stale,
 )
-from tests.mutations.text_source import C, FORTRAN, JAVASCRIPT, language_of
+from tests.mutations.text_source import FORTRAN, JAVASCRIPT, C, language_of
 from tests.mutations.tree import ROOT
 from tests.mutations.trial import Verdict
 

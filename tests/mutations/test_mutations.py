@@ -142,7 +142,7 @@ def test_names_are_unique_and_the_change_is_one() -> None:
 
 def test_the_function_around_a_mutation_is_known() -> None:
     for (file, id, _), wanted in zip(
-        PLANTED, ("factor", "omega_at", "_ordered", "factor"), strict=True
+        PLANTED, ("factor", "evaluate", "_ordinal", "factor"), strict=True
     ):
         assert find(file, id).function() == wanted
 

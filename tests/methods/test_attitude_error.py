@@ -123,7 +123,7 @@ def test_prepared_solver_reports_it_too() -> None:
     assert judged > 10
 
 
-def test_steady_spin_of_a_brick() -> None:
+def test_steady_spin_of_a_brick(level: int) -> None:
     """Twenty thousand times the reported error, once."""
     scene = Scene("", (0.0, 0.0, 1.0), moments=(4.0, 3.0, 2.0), attitude=(1.0, 0.0, 0.0, 0.0))
     found = solve(scene, [40.0], "taylor", 1e-3, attitude=True)

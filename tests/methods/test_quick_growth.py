@@ -109,7 +109,7 @@ def test_scene_of_the_first_report() -> None:
 
 
 def test_bound_of_the_amplification_is_one() -> None:
-    """Of calm and rough motions: rounding times the growth that the series finds is in the error."""
+    """In calm and rough motions the error has rounding times the growth that the series finds."""
     generator = np.random.default_rng(253)
     seen = 0
     for make in (plain, *NASTY.values()):

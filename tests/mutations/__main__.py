@@ -37,10 +37,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         return 2
     begin = time.perf_counter()
+    verdicts: list[Verdict] = []
     try:
-        verdicts = _all(options, processes)
+        _all(options, processes, verdicts)
     except (KeyboardInterrupt, Stopped):
-        print("interrupted: the checkout is as it was", file=sys.stderr)
+        print(table(verdicts))
+        print("interrupted: the same command continues from here", file=sys.stderr)
         return 130
     print(table(verdicts))
     score = caught_share(verdicts)
@@ -54,12 +56,12 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", default="1", help="of the draw (default: 1)")
     parser.add_argument("--jobs", type=int, default=2, help="how many at a time (default: 2)")
     parser.add_argument("--only", default="", help="files with this in their names alone")
-    parser.add_argument("--again", action="store_true", help="try those that lived, or all anew")
+    parser.add_argument("--again", action="store_true", help="try once more those that lived")
     parser.add_argument("--ci", action="store_true", help="four planted faults alone, for the gate")
     return parser.parse_args(arguments)
 
 
-def _all(options: argparse.Namespace, processes: Processes) -> list[Verdict]:
+def _all(options: argparse.Namespace, processes: Processes, verdicts: list[Verdict]) -> None:
     """Try the sample; verdicts of the same draw that are on record are taken from there."""
     checks = reach(processes, options.jobs)
     known = equivalent()
@@ -67,7 +69,6 @@ def _all(options: argparse.Namespace, processes: Processes) -> list[Verdict]:
     unchanged = Tree("unchanged", processes)
     drawn = (each for each in draw(options.seed) if options.only in each.file)
     lock = Lock()
-    verdicts: list[Verdict] = []
 
     def next_one() -> Mutation | None:
         # A draw that does not count is replaced: so many begin as are still missing.
@@ -106,7 +107,6 @@ def _all(options: argparse.Namespace, processes: Processes) -> list[Verdict]:
         except BaseException:
             processes.end()
             raise
-    return verdicts
 
 
 class Record:
@@ -115,7 +115,7 @@ class Record:
     def __init__(self, path: Path, again: bool) -> None:
         self._path = path
         rows = json.loads(path.read_text())["mutations"] if path.exists() else []
-        kept = [row for row in rows if not again or row["outcome"] not in ("lives", "equivalent")]
+        kept = [row for row in rows if not again or row["outcome"] != "lives"]
         self._rows = {(row["file"], row["id"]): row for row in kept}
 
     def of(self, mutation: Mutation) -> Verdict | None:

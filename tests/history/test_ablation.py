@@ -58,9 +58,9 @@ def test_effects_show_what_each_entry_says() -> None:
 def test_lattice_is_whole_and_sorted() -> None:
     scene = case_scene(2)
     found = lattice(scene, "runge-kutta")
-    assert len({each.listing.defects for each in found}) == 32
+    assert len({each.listing.defects for each in found}) == 64
     # Of a torque that varies the conjecture counts too.
-    assert len(lattice(case_scene(7), "four-term")) == 4
+    assert len(lattice(case_scene(7), "four-term")) == 8
     sizes = [float(f"{each.omega:.2e}") for each in found]
     assert sizes == sorted(sizes, reverse=True)
     # Without the stop test's defects the run goes on and shows its whole error.
@@ -121,10 +121,10 @@ def test_ablate_in_every_form(capsys: Capture) -> None:
     assert "every subset" in capsys.readouterr().out
     assert main([*arguments, "--format", "csv"]) == 0
     rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
-    assert len(rows) == 4 + 2 + 32
+    assert len(rows) == 8 + 4 + 64
     assert main([*arguments, "--format", "json", "--program", "two-term"]) == 0
     record = json.loads(capsys.readouterr().out)
-    assert [len(each) for each in record["lattice"].values()] == [4]
+    assert [len(each) for each in record["lattice"].values()] == [8]
     assert main([*arguments, "--program", "runge-kutta", "--reading", "do-variable"]) == 0
 
 
@@ -136,5 +136,5 @@ def test_overflow_near_the_truth_is_worse_too(monkeypatch: pytest.MonkeyPatch) -
         return Effect(listing, size, 0.0, 2, ended, None)
 
     monkeypatch.setattr("pyharness.history.ablation.effect", effect)
-    found = lattice(replace(case_scene(3), steps=2), "two-term")
+    found = lattice(replace(case_scene(3), steps=2), "four-term")
     assert [each.omega for each in found] == [0.1, 0.7, 0.6, 0.5]

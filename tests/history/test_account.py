@@ -150,11 +150,12 @@ def test_only_growing_beyond_the_sine_tells_that_u_is_not_set_back(
 
 
 def test_the_conclusion_rests_on_the_faults_under_every_reading_and_conjecture() -> None:
-    entry_ = {**claim("vi-superior"), "parameters": {"cases": [2, 3, 4, 5, 6]}}
+    superior = claim("vi-superior")
+    assert superior["parameters"]["cases"] == [2, 3, 4, 5, 6]
     for readings in subsets((*names_of("reading"),)):
         for conjectures in subsets(names_of("conjecture")):
             chosen = Assumptions(readings=readings, conjectures=conjectures)
-            found = [outcome(entry_, Laboratory(each, chosen)) for each in (True, False)]
+            found = [outcome(superior, Laboratory(each, chosen)) for each in (True, False)]
             assert [each.verdict for each in found] == [REPRODUCED, FALSE]
     assert "in each of Cases 2 to 6" in STATEMENTS["conclusion"]["text"]
 
@@ -164,6 +165,20 @@ def test_findings_have_the_numbers_of_the_claims() -> None:
     shares = [x for name, x in ratios.items() if name.startswith("case ")]
     told = f"Runge-Kutta is {min(shares):.0f} to {max(shares):,.0f} times more accurate"
     assert told in _document("docs/findings.md")
+
+
+def test_reconstruction_names_the_entries_of_each_certainty() -> None:
+    text = (ROOT / "docs/reconstruction.md").read_text()
+    listed = text.partition("## What is certain")[2].partition("## Known issues")[0]
+    known = {each["id"]: each["certainty"] for each in entries()}
+    for certainty in ("probable", "conjecture", "undecidable"):
+        (bullet,) = re.findall(rf"^- \*{certainty}\*(.*?)(?=^- |\Z)", listed, re.M | re.S)
+        named = {name for name in re.findall(r"`([a-z0-9-]+)`", bullet) if name in known}
+        assert named == {name for name, sure in known.items() if sure == certainty}
+    (bullet,) = re.findall(r"^- \*certain\*(.*?)(?=^- |\Z)", listed, re.M | re.S)
+    assert not set(re.findall(r"`([a-z0-9-]+)`", bullet)) & set(known)
+    flagged_ = [each for each in entries() if each["kind"] == "defect" and "flag" in each]
+    assert [each["id"] for each in flagged_ if each["certainty"] != "certain"] == ["x3-reads-acl2"]
 
 
 def test_of_the_lost_programs_nothing_is_said_to_be_known() -> None:

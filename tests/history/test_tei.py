@@ -211,8 +211,9 @@ def test_every_entry_stands_there_once_as_in_the_table(root: xml.Element) -> Non
         told = {part.get("type"): part.text for part in note.iter(TEI + "seg")}
         names = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
         assert told == {name: entry[name] for name in names if name in entry}
-        kind, certainty = (classes[each] for each in note.attrib["ana"].split())
+        kind, certainty, *grounds = (classes[each] for each in note.attrib["ana"].split())
         assert (kind[0], certainty[0]) == (entry["kind"], entry["certainty"])
+        assert [each[0] for each in grounds] == entry["grounds"]
         (sure,) = note.iter(TEI + "certainty")
         assert sure.get("cert") == certainty[1]
         programs = {each[1:].split(".")[0] for each in note.get("target", "").split()}
@@ -227,11 +228,11 @@ def test_every_pointer_leads_somewhere(root: xml.Element) -> None:
 
 
 def test_the_scan_alone_is_a_witness(root: xml.Element) -> None:
-    sigla = [each["siglum"] for each in facts("cards/scan")["witness"]]
+    sigla = [each["siglum"] for each in facts("cards/scan")["ground"]]
     assert [each.get(ID) for each in root.iter(TEI + "witness")] == ["S"]
     grounds = next(e for e in root.iter(TEI + "taxonomy") if e.get(ID) == "ground")
     assert [each.get(ID) for each in grounds.iter(TEI + "category")] == [
-        f"ground.{each}" for each in sigla if each != "S"
+        f"ground.{each}" for each in sigla
     ]
     for text in facts("cards/scan")["principles"].values():
         assert text in TEXT

@@ -42,7 +42,7 @@ def test_every_cell_agrees_to_the_last_bit_or_is_in_the_table() -> None:
         if differences(compiled, twin) or distance(compiled, twin):
             found.add(cell_name(listing, case))
     assert found == listed
-    assert count == (8 * 2 + 4 + 64 * 2) * 8  # seven cases, and Case 7 with its first torque
+    assert count == (16 * 2 + 8 + 128 * 2) * 8  # seven cases, and Case 7 with its first torque
 
 
 BODY = (3.0, 2.0, 1.0)

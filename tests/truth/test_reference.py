@@ -175,7 +175,9 @@ def test_sine_and_cosine_have_all_their_digits() -> None:
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_series_for_the_velocity_is_estimated_where_omega_is_known(number: int) -> None:
-    found = reference(case_scene(number), [1.0], velocity=True)
+    # A mass with which no acceleration is a short decimal: in Case 1 nothing would be rounded.
+    scene = replace(case_scene(number), masses=(110.0,) * 3)
+    found = reference(scene, [1.0], velocity=True)
     assert found.source == "known solution"
     assert 0.0 < found.estimate < 1e-18
 

@@ -10,7 +10,6 @@ class ManyStarts:
     def __new__(
         cls,
         kernel: Callable[..., int],
-        single: Callable[..., tuple[Array, int, int, Array]],
         packed: Array,
         brief: Array | None,
         slowly: Callable[..., tuple[Array, NDArray[np.int8]]],

@@ -23,7 +23,7 @@ _TAYLOR = (
     "two_words", "problem", "torque_noise", "torque_terms", "taylor_plan", "taylor_series",
     "taylor_error", "taylor_attitude", "taylor_rows", "taylor_march", "taylor",
 )  # fmt: skip
-_MANY = ("two_words", "problem", "torque_terms", "taylor_plan")
+_MANY = ("two_words", "problem", "torque_noise", "torque_terms", "taylor_plan")
 _BODIES = (
     "bodies", "many_circular", "many_columns", "many_free", "many_fixed", "many_slots",
     "many_taylor",

@@ -2,7 +2,7 @@
 subroutine many_as_written(method, n, n_waves, tolerance, step, body, constant, rate, sines, omega0, &
                            times, n_times, omega, status) bind(c)
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int8_t, c_loc
-  use bodies, only: bodies_t
+  use bodies, only: bodies_t, RAMPED
   use many_fixed, only: many_fixed_solve
   use many_taylor, only: many_taylor_solve
   implicit none(type, external)
@@ -27,6 +27,9 @@ subroutine many_as_written(method, n, n_waves, tolerance, step, body, constant, 
   given%cosines => none
   given%omega0 => omega0
   given%times => times
+  given%mark = RAMPED
+  given%n_waves = n_waves
+  status = RAMPED
   if (method == 0) then
     call many_taylor_solve(c_loc(given), n, omega, status, interrupted)
   else

@@ -10,6 +10,13 @@ module bodies
   integer, parameter, public :: LANES = 64   !! bodies side by side
   integer, parameter, public :: A_GROUP = 8  !! in the widest register: blocks are filled up to it
   integer(i1), parameter, public :: LEFT = -1_i1 !! status: left to the single kernel
+  ! Status before the kernels of lanes: which of them solves the body. A body's own numbers alone
+  ! decide it, so that no result depends on the other bodies of a call.
+  integer(i1), parameter, public :: FREE = -2_i1    !! without torque: the closed form
+  integer(i1), parameter, public :: STEPPED = -3_i1 !! a constant torque: steps of one size
+  integer(i1), parameter, public :: RAMPED = -4_i1  !! a torque without waves: the series
+  integer(i1), parameter, public :: WAVED = -5_i1   !! a torque with waves: the series
+  integer, parameter, public :: MOST_WAVES = 16 !! in lanes; the single kernel takes any number
 
   type, public :: bodies_t
     logical :: by_moments       !! I1, I2, I3 and N m; else A, B, C and 1/s2
@@ -23,9 +30,11 @@ module bodies
     real(dp), pointer, contiguous :: cosines(:, :, :)   !! (4, waves, 1 or n)
     real(dp), pointer, contiguous :: omega0(:, :)       !! (3, n), rad/s
     real(dp), pointer, contiguous :: times(:)           !! (1 or n), s
+    integer(i1) :: mark         !! status of the bodies that a kernel of lanes is called for
+    integer :: n_waves          !! the most waves that act on one of them
   end type bodies_t
 
-  public :: coefficients_of, has_torque, of_body
+  public :: acts, coefficients_of, has_torque, of_body
 
 contains
 
@@ -46,13 +55,20 @@ contains
     if (bodies%by_moments) a = [(a(2) - a(3))/a(1), (a(3) - a(1))/a(2), (a(1) - a(2))/a(3)]
   end function coefficients_of
 
-  pure logical function has_torque(bodies)
-    !! Whether any body has any.
-    type(bodies_t), intent(in) :: bodies
+  pure logical function acts(wave)
+    !! Whether a wave has an amplitude. One that is not finite acts: its body has no result.
+    real(dp), intent(in) :: wave(4)  !! as in problem_t
 
-    has_torque = size(bodies%sines, 2) + size(bodies%cosines, 2) > 0
-    if (.not. has_torque) has_torque = any(abs(bodies%constant) > 0.0_dp)
-    if (.not. has_torque) has_torque = any(abs(bodies%rate) > 0.0_dp)
+    acts = .not. (abs(wave(1)) <= 0.0_dp .and. abs(wave(2)) <= 0.0_dp .and. abs(wave(3)) <= 0.0_dp &
+                  .and. abs(wave(4)) <= huge(wave))
+  end function acts
+
+  pure logical function has_torque(vector)
+    !! Whether a constant torque or its rate is anything but zero; NaN is.
+    real(dp), intent(in) :: vector(3)
+
+    has_torque = .not. (abs(vector(1)) <= 0.0_dp .and. abs(vector(2)) <= 0.0_dp &
+                        .and. abs(vector(3)) <= 0.0_dp)
   end function has_torque
 
 end module bodies

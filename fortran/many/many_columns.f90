@@ -1,38 +1,87 @@
 module many_columns
   !! Bodies as the kernels of ensembles read them: a number of each in a lane, three in columns.
-  use bodies, only: bodies_t, LANES
+  use bodies, only: bodies_t, i1, LANES
   use kinds, only: dp
   implicit none(type, external)
   private
 
-  public :: columns_of, equations_of, odd_axes, turn_axes, turn_back
+  type, public :: block_t
+    !! The bodies in the lanes.
+    integer :: there            !! how many
+    integer :: last             !! all bodies up to this one have been in a block, or were passed
+    integer :: at(LANES)        !! the bodies, ascending; the last again where there are no more
+    logical :: in_row           !! at(i) is at(1) + i - 1
+  end type block_t
+
+  public :: columns_of, equations_of, next_block, odd_axes, put_back, times_of, turn_axes, turn_back
 
 contains
 
-  pure subroutine columns_of(source, first, m, columns)
-    !! Three numbers of bodies first + 1 ..., each in a row of lanes; the last body again where
+  pure subroutine next_block(n, status, mark, block)
+    !! The next bodies of that status, as many as there are lanes.
+    integer, intent(in) :: n
+    integer(i1), intent(in) :: status(n), mark
+    type(block_t), intent(inout) :: block  !! last is where to go on from
+    integer(i1) :: others
+    integer :: first, i, there
+
+    first = block%last
+    there = min(LANES, n - first)
+    others = 0_i1
+    do i = 1, there
+      others = ior(others, ieor(status(first + i), mark))
+    end do
+    block%in_row = others == 0_i1
+    if (block%in_row) then
+      do i = 1, LANES
+        block%at(i) = first + min(i, there)
+      end do
+      block%last = first + there
+    else
+      there = 0
+      do i = first + 1, n
+        block%last = i
+        if (status(i) /= mark) cycle
+        there = there + 1
+        block%at(there) = i
+        if (there == LANES) exit
+      end do
+      if (there > 0) block%at(there + 1:) = block%at(there)
+    end if
+    block%there = there
+  end subroutine next_block
+
+  pure subroutine columns_of(source, block, m, columns)
+    !! Three numbers of each body of a block, each in a row of lanes; the last body again where
     !! there are no more.
     real(dp), intent(in), contiguous :: source(:, :)
-    integer, intent(in) :: first
+    type(block_t), intent(in) :: block
     integer, intent(in) :: m         !! lanes to fill
     real(dp), intent(inout) :: columns(LANES, 3)
-    integer :: i, j, there
+    integer :: first, i, j, there
 
-    there = size(source, 2)
-    if (there == 1) then
+    there = min(m, block%there)
+    if (size(source, 2) == 1) then
       do j = 1, 3
         do i = 1, m
           columns(i, j) = source(j, 1)
         end do
       end do
       return
+    else if (block%in_row) then
+      first = block%at(1) - 1
+      do i = 1, there
+        columns(i, 1) = source(1, first + i)
+        columns(i, 2) = source(2, first + i)
+        columns(i, 3) = source(3, first + i)
+      end do
+    else
+      do i = 1, there
+        columns(i, 1) = source(1, block%at(i))
+        columns(i, 2) = source(2, block%at(i))
+        columns(i, 3) = source(3, block%at(i))
+      end do
     end if
-    there = min(m, there - first)
-    do i = 1, there
-      columns(i, 1) = source(1, first + i)
-      columns(i, 2) = source(2, first + i)
-      columns(i, 3) = source(3, first + i)
-    end do
     do j = 1, 3
       do i = there + 1, m
         columns(i, j) = columns(there, j)
@@ -40,20 +89,61 @@ contains
     end do
   end subroutine columns_of
 
-  pure subroutine equations_of(bodies, first, m, a, moments)
+  pure subroutine times_of(times, block, m, t)
+    !! The time of each body of a block, in a row of lanes.
+    real(dp), intent(in), contiguous :: times(:) !! s
+    type(block_t), intent(in) :: block
+    integer, intent(in) :: m                     !! lanes to fill
+    real(dp), intent(inout) :: t(LANES)
+
+    if (size(times) == 1) then
+      t(:m) = times(1)
+    else if (block%in_row) then
+      t(:block%there) = times(block%at(1):block%at(block%there))
+      t(block%there + 1:m) = t(block%there)
+    else
+      t(:m) = times(block%at(:m))
+    end if
+  end subroutine times_of
+
+  pure subroutine put_back(block, columns, results)
+    !! Three numbers of each body from its lane to its column.
+    type(block_t), intent(in) :: block
+    real(dp), intent(in) :: columns(LANES, 3)
+    real(dp), intent(inout), contiguous :: results(:, :)
+    integer :: first, i
+
+    if (block%in_row) then
+      first = block%at(1) - 1
+      do i = 1, block%there
+        results(1, first + i) = columns(i, 1)
+        results(2, first + i) = columns(i, 2)
+        results(3, first + i) = columns(i, 3)
+      end do
+    else
+      do i = 1, block%there
+        results(1, block%at(i)) = columns(i, 1)
+        results(2, block%at(i)) = columns(i, 2)
+        results(3, block%at(i)) = columns(i, 3)
+      end do
+    end if
+  end subroutine put_back
+
+  pure subroutine equations_of(bodies, block, m, a, moments)
     !! A, B, C of equations 13-15, and by what a torque is divided.
     type(bodies_t), intent(in) :: bodies
-    integer, intent(in) :: first, m
+    type(block_t), intent(in) :: block
+    integer, intent(in) :: m
     real(dp), intent(inout) :: a(LANES, 3), moments(LANES, 3)
     real(dp) :: least
     integer :: i
 
     if (.not. bodies%by_moments) then
-      call columns_of(bodies%body, first, m, a)
+      call columns_of(bodies%body, block, m, a)
       moments(:m, :) = 1.0_dp
       return
     end if
-    call columns_of(bodies%body, first, m, moments)
+    call columns_of(bodies%body, block, m, moments)
     do i = 1, m
       ! No body: NaN, which every look at a body finds.
       least = min(moments(i, 1), moments(i, 2), moments(i, 3))

@@ -1,13 +1,15 @@
 module many_fixed
   !! Many bodies under constant torque in steps of one size, side by side: the methods of III.2 in
-  !! unknowns so scaled that a right-hand side is one product and one sum. Bodies with a coefficient
-  !! of 0, or with three of one sign, are left to the single kernel.
+  !! unknowns so scaled that a right-hand side is one product and one sum. Each body takes as many
+  !! steps as its own time asks for. Bodies with a coefficient of 0, or with three of one sign, are
+  !! left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT
   use interruption, only: interrupt_raised
   use kinds, only: dp
-  use many_columns, only: columns_of, equations_of, odd_axes, turn_axes, turn_back
+  use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
+                          times_of, turn_axes, turn_back
   use methods, only: IMPROVED_EULER, TAYLOR_3
   use statuses, only: COMPLETE
   implicit none(type, external)
@@ -33,7 +35,7 @@ contains
 
   subroutine many_fixed_solve(bodies_at, method, n, omega, status, interrupted) &
     bind(c, name="solve_many_fixed_level")
-    !! Angular velocity of each body at the one time of all; status is COMPLETE or LEFT.
+    !! Angular velocity at its time of each body that is marked; status is then COMPLETE or LEFT.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     integer(c_int), intent(in), value :: method           !! IMPROVED_EULER, TAYLOR_3 or RK4
     integer(c_int), intent(in), value :: n                !! bodies
@@ -42,69 +44,123 @@ contains
     integer(c_int), intent(out) :: interrupted            !! 1: by the user
     type(bodies_t), pointer :: bodies
     type(scaled_t) :: s
+    type(block_t) :: block
     real(dp), dimension(LANES, 3) :: a, w, constant, moments
-    real(dp) :: h, n_steps, last
-    integer(int64) :: left_over, piece
-    integer :: first, i, m, there
+    real(dp), dimension(LANES) :: t, h, last
+    integer(int64) :: n_steps(LANES)
+    integer :: i, m
 
     call c_f_pointer(bodies_at, bodies)
     interrupted = 0
-    n_steps = 0.0_dp
-    if (size(bodies%times) == 1) then
-      n_steps = max(1.0_dp, aint(abs(bodies%times(1))/bodies%step + (1.0_dp - EXCESS)))
-    end if
-    if (.not. (n_steps >= 1.0_dp .and. n_steps <= MOST_STEPS) .or. size(bodies%sines, 2) > 0 &
-        .or. size(bodies%cosines, 2) > 0 .or. any(abs(bodies%rate) > 0.0_dp)) then
-      status(:n) = LEFT
-      return
-    end if
-    h = sign(bodies%step, bodies%times(1))
-    last = bodies%times(1) - h*(n_steps - 1.0_dp)
-    do first = 0, n - 1, LANES
-      there = min(LANES, n - first)
-      m = PAIR*((there + PAIR - 1)/PAIR)
-      call equations_of(bodies, first, m, a, moments)
-      call columns_of(bodies%constant, first, m, constant)
+    block%last = 0
+    do
+      call next_block(n, status, bodies%mark, block)
+      if (block%there == 0) exit
+      m = PAIR*((block%there + PAIR - 1)/PAIR)
+      call equations_of(bodies, block, m, a, moments)
+      call columns_of(bodies%constant, block, m, constant)
       constant(:m, :) = constant(:m, :)/moments(:m, :)
-      call columns_of(bodies%omega0, first, m, w)
+      call columns_of(bodies%omega0, block, m, w)
+      call times_of(bodies%times, block, m, t)
       call odd_axes(m, a, s%odd)
       call turn_axes(m, s%odd, a)
       call turn_axes(m, s%odd, constant)
       call turn_axes(m, s%odd, w)
+      call count_steps(m, bodies%step, t, n_steps, h, last, s%odd)
       call scale_to(m, h, a, constant, w, s)
-      left_over = int(n_steps, int64) - 1
-      do while (left_over > 0)
-        piece = min(left_over, BETWEEN_LOOKS)
-        call advance(method, m, piece, s)
-        left_over = left_over - piece
-        if (piece == BETWEEN_LOOKS) then
-          interrupted = merge(1, 0, interrupt_raised() /= 0)
-        end if
-        if (interrupted /= 0) return
-      end do
-      call lengthen(m, last/h, s)
+      call advance_each(method, m, n_steps, s, interrupted)
+      if (interrupted /= 0) return
+      call lengthen(m, last, s)
       call advance(method, m, 1_int64, s)
-      call scale_back(m, last/h, s, w)
-      do i = 1, there
-        omega(:, first + i) = w(i, :)
-        status(first + i) = merge(int(COMPLETE, i1), LEFT, &
-                                  abs(w(i, 1)) + abs(w(i, 2)) + abs(w(i, 3)) <= huge(h))
+      call scale_back(m, last, s, w)
+      call put_back(block, w, omega)
+      do i = 1, block%there
+        status(block%at(i)) = merge(int(COMPLETE, i1), LEFT, &
+                                    abs(w(i, 1)) + abs(w(i, 2)) + abs(w(i, 3)) <= huge(h))
       end do
     end do
   end subroutine many_fixed_solve
 
+  pure subroutine count_steps(m, step, t, n_steps, h, last, odd)
+    !! The steps of each body, all but the last of one size.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: step                  !! s
+    real(dp), intent(in) :: t(LANES)              !! s
+    integer(int64), intent(inout) :: n_steps(LANES)
+    real(dp), intent(inout) :: h(LANES)           !! s
+    real(dp), intent(inout) :: last(LANES)        !! step over the others
+    real(dp), intent(inout) :: odd(LANES)         !! 0 where the single kernel counts
+    real(dp) :: count
+    integer :: i
+
+    do i = 1, m
+      count = max(1.0_dp, aint(abs(t(i))/step + (1.0_dp - EXCESS)))
+      if (.not. count <= MOST_STEPS) then
+        count = 1.0_dp
+        odd(i) = 0.0_dp
+      end if
+      if (.not. abs(t(i)) <= huge(step)) odd(i) = 0.0_dp
+      n_steps(i) = int(count, int64)
+      h(i) = sign(step, t(i))
+      last(i) = (t(i) - h(i)*(count - 1.0_dp))/h(i)
+    end do
+  end subroutine count_steps
+
+  subroutine advance_each(method, m, n_steps, s, interrupted)
+    !! All steps of each body but the last one. A lane that has arrived goes on, as the others need
+    !! it, and is put back to where it arrived.
+    integer, intent(in) :: method, m
+    integer(int64), intent(in) :: n_steps(LANES)
+    type(scaled_t), intent(inout) :: s
+    integer(c_int), intent(out) :: interrupted
+    real(dp), dimension(LANES) :: x, y, z
+    integer(int64) :: done, next, piece, unseen
+    integer :: i
+
+    interrupted = 0
+    done = 0
+    unseen = 0
+    do
+      next = huge(done)
+      do i = 1, m
+        if (n_steps(i) - 1 == done) then
+          x(i) = s%x(i)
+          y(i) = s%y(i)
+          z(i) = s%z(i)
+        else if (n_steps(i) - 1 > done) then
+          next = min(next, n_steps(i) - 1)
+        end if
+      end do
+      if (next == huge(done)) exit
+      do while (done < next)
+        piece = min(next - done, BETWEEN_LOOKS - unseen)
+        call advance(method, m, piece, s)
+        done = done + piece
+        unseen = unseen + piece
+        if (unseen == BETWEEN_LOOKS) then
+          unseen = 0
+          interrupted = merge(1, 0, interrupt_raised() /= 0)
+          if (interrupted /= 0) return
+        end if
+      end do
+    end do
+    s%x(:m) = x(:m)
+    s%y(:m) = y(:m)
+    s%z(:m) = z(:m)
+  end subroutine advance_each
+
   pure subroutine scale_to(m, h, a, constant, w, s)
     !! Half a step is the unit of time.
     integer, intent(in) :: m
-    real(dp), intent(in) :: h                  !! s
+    real(dp), intent(in) :: h(LANES)           !! s
     real(dp), intent(in) :: a(LANES, 3), constant(LANES, 3), w(LANES, 3)
     type(scaled_t), intent(inout) :: s
     real(dp) :: direction, half, odd
     real(dp) :: a1, a2, a3, w1, w2, w3, scale1, scale2, scale3
     integer :: i
 
-    half = 0.5_dp*h
     do i = 1, m
+      half = 0.5_dp*h(i)
       a1 = a(i, 1)
       a2 = a(i, 2)
       a3 = a(i, 3)
@@ -138,33 +194,33 @@ contains
   pure subroutine lengthen(m, factor, s)
     !! Another step, `factor` times as long.
     integer, intent(in) :: m
-    real(dp), intent(in) :: factor
+    real(dp), intent(in) :: factor(LANES)
     type(scaled_t), intent(inout) :: s
     integer :: i
 
     do i = 1, m
-      s%x(i) = factor*s%x(i)
-      s%y(i) = factor*s%y(i)
-      s%z(i) = factor*s%z(i)
-      s%mx(i) = (factor*factor)*s%mx(i)
-      s%my(i) = (factor*factor)*s%my(i)
-      s%mz(i) = (factor*factor)*s%mz(i)
+      s%x(i) = factor(i)*s%x(i)
+      s%y(i) = factor(i)*s%y(i)
+      s%z(i) = factor(i)*s%z(i)
+      s%mx(i) = (factor(i)*factor(i))*s%mx(i)
+      s%my(i) = (factor(i)*factor(i))*s%my(i)
+      s%mz(i) = (factor(i)*factor(i))*s%mz(i)
     end do
   end subroutine lengthen
 
   pure subroutine scale_back(m, factor, s, w)
     !! Omega about the body's axes; NaN of a body that is none for here.
     integer, intent(in) :: m
-    real(dp), intent(in) :: factor  !! of the step
+    real(dp), intent(in) :: factor(LANES) !! of the step
     type(scaled_t), intent(in) :: s
     real(dp), intent(inout) :: w(LANES, 3)
     integer :: i
 
     do i = 1, m
-      w(i, 1) = s%x(i)/(factor*s%scale1(i))
-      w(i, 2) = s%y(i)/(factor*s%scale2(i))
-      w(i, 3) = s%z(i)/(factor*s%scale3(i))
-      if (.not. s%odd(i) > 0.0_dp) w(i, 2) = transfer(huge(0_int64), factor)
+      w(i, 1) = s%x(i)/(factor(i)*s%scale1(i))
+      w(i, 2) = s%y(i)/(factor(i)*s%scale2(i))
+      w(i, 3) = s%z(i)/(factor(i)*s%scale3(i))
+      if (.not. s%odd(i) > 0.0_dp) w(i, 2) = transfer(huge(0_int64), w(i, 2))
     end do
     call turn_back(m, s%odd, w)
   end subroutine scale_back

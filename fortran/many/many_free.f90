@@ -7,7 +7,8 @@ module many_free
   use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
-  use many_columns, only: columns_of, equations_of, odd_axes, turn_axes, turn_back
+  use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
+                          times_of, turn_axes, turn_back
   use statuses, only: COMPLETE
   implicit none(type, external)
   private
@@ -17,6 +18,14 @@ module many_free
   ! Rounding of the frequency, of each radian, in tolerances of 1; measured: at most a quarter.
   real(dp), parameter :: ERROR = 8.0_dp*2.0_dp**(-53)
   real(dp), parameter :: FAR = 1e100_dp ! from 1: products of such moduli are numbers
+  ! A result whose rounding may be amplified beyond UNSURE tolerances is left to the single kernel,
+  ! which measures that. Parts of the largest growth for the amplitudes and for the phase.
+  real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  real(dp), parameter :: UNSURE = 0.3_dp
+  real(dp), parameter :: ABOVE_ESTIMATE = 1.5_dp ! as in torque_free_differences.f90
+  real(dp), parameter :: OF_AMPLITUDES = 0.2_dp
+  real(dp), parameter :: UNLIKE = 100.0_dp ! coefficients for which the exponential is a bound
+  real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: NEVER = huge(1.0_dp) ! an error with which no body is finished here
 
   type :: orbits_t
@@ -27,6 +36,9 @@ module many_free
     real(dp), dimension(LANES) :: odd       !! the body's axis that is axis 2 here; 0: none
     real(dp), dimension(LANES) :: gap       !! below 0: axes 1 and 3 are swapped
     real(dp), dimension(LANES) :: error     !! estimate, in radians and tolerances of 1
+    real(dp), dimension(LANES) :: turning   !! square of the growth of phase in 1 s, times `most`
+    real(dp), dimension(LANES) :: most      !! square of the largest one, times what both divide by
+    real(dp), dimension(LANES) :: rate      !! square of the exponential rate of growth, 1/s2
     real(dp), dimension(LANES) :: a, b      !! of the mean
     real(dp), dimension(LANES) :: half      !! of their difference
     real(dp), dimension(LANES) :: frequency
@@ -39,7 +51,7 @@ module many_free
 contains
 
   subroutine many_free_solve(bodies_at, n, omega, status) bind(c, name="solve_many_free_level")
-    !! Angular velocity of each body at its time; status is COMPLETE or LEFT.
+    !! Angular velocity at its time of each body that is marked; status is then COMPLETE or LEFT.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     integer(c_int), intent(in), value :: n                !! bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
@@ -48,50 +60,52 @@ contains
     type(orbits_t) :: o
     real(dp), dimension(LANES, 3) :: a, w, moments
     real(dp) :: t(LANES)
-    integer :: first, i, m, there
+    type(block_t) :: block
+    logical :: is_first
+    integer :: i, m
 
     call c_f_pointer(bodies_at, bodies)
-    if (size(bodies%times) == 1) t = bodies%times(1)
-    do first = 0, n - 1, LANES
-      there = min(LANES, n - first)
-      m = A_GROUP*((there + A_GROUP - 1)/A_GROUP)
-      if (first == 0 .or. size(bodies%body, 2) > 1) then
-        call equations_of(bodies, first, m, a, moments)
+    block%last = 0
+    is_first = .true.
+    do
+      call next_block(n, status, bodies%mark, block)
+      if (block%there == 0) exit
+      m = A_GROUP*((block%there + A_GROUP - 1)/A_GROUP)
+      if (is_first .or. size(bodies%body, 2) > 1) then
+        call equations_of(bodies, block, m, a, moments)
         call odd_axes(m, a, o%odd)
         call turn_axes(m, o%odd, a)
       end if
-      call columns_of(bodies%omega0, first, m, w)
+      call columns_of(bodies%omega0, block, m, w)
       call turn_axes(m, o%odd, w)
-      if (size(bodies%times) > 1) then
-        t(:there) = bodies%times(first + 1:first + there)
-        t(there + 1:m) = t(there)
-      end if
-      call begin(m, a, w, o)
+      if (is_first .or. size(bodies%times) > 1) call times_of(bodies%times, block, m, t)
+      is_first = .false.
+      call begin(m, bodies%tolerance, a, w, o)
       call climb(m, o)
       call turn(m, t, o)
       call descend(m, o)
       call finish(m, o, w)
       call turn_back(m, o%odd, w)
-      do i = 1, there
-        omega(1, first + i) = w(i, 1)
-        omega(2, first + i) = w(i, 2)
-        omega(3, first + i) = w(i, 3)
-      end do
-      do i = 1, there
-        status(first + i) = merge(int(COMPLETE, i1), LEFT, o%error(i) <= bodies%tolerance)
+      call put_back(block, w, omega)
+      do i = 1, block%there
+        status(block%at(i)) = merge(int(COMPLETE, i1), LEFT, o%error(i) <= bodies%tolerance)
       end do
     end do
   end subroutine many_free_solve
 
-  pure subroutine begin(m, a, w, o)
+  pure subroutine begin(m, tolerance, a, w, o)
     !! All that does not depend on the time. Axis 2 of an orbit has the coefficient of the odd sign,
     !! axis 3 keeps its direction.
     integer, intent(in) :: m
+    real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: a(LANES, 3), w(LANES, 3)
     type(orbits_t), intent(inout) :: o
+    real(dp) :: most, early, c1, c3, s12
     real(dp) :: a1, a2, a3, w1, w2, w3, s1, s2, s3, first, third, y1, y2, y3, left, right, gap
     integer :: i
 
+    most = UNSURE*tolerance/(ABOVE_ESTIMATE*ROUNDING)
+    early = log(max(1.0_dp, UNSURE*tolerance/(ROUNDING*sqrt(3.0_dp*UNLIKE))))**2
     do i = 1, m
       a1 = a(i, 1)
       a2 = a(i, 2)
@@ -135,6 +149,21 @@ contains
       ! What rounding makes of a small gap, it makes of the frequency.
       o%error(i) = ERROR*(left + right)/gap
       if (.not. o%odd(i) > 0.0_dp) o%error(i) = NEVER
+      ! torque_free_growth_bound, squared and without a division.
+      c1 = s2*y1 + s1*y2
+      c3 = s3*y2 + s2*y3
+      s12 = s1*s2
+      o%turning(i) = 4.0_dp*c1*max(s1*s1*c3, s12*c3, s3*s3*c1) &
+                     *((s3*s3*c1 + s12*c3)*(s2*(gap*gap)) + (s1*s1*c3 + s3*s3*c1)*(s1*(c3*c3)))
+      o%most(i) = (((1.0_dp - OF_AMPLITUDES)*most)*(s12*(c3*gap)))**2
+      y1 = max(s12, s1*s1, s2*s2, s1*s3)*(s1*c3)**2
+      y2 = (OF_AMPLITUDES*most)**2*s12*(s2*gap)**2
+      if (.not. (y1 <= y2 .and. y2 <= NEVER .and. y2 >= LEAST)) o%most(i) = -1.0_dp
+      if (.not. (o%most(i) <= NEVER .and. o%most(i) >= LEAST)) o%most(i) = -1.0_dp
+      ! In units of the roots of the coefficients the symmetric part of the Jacobian matrix has the
+      ! norm (s1 s3)**(1/2) omega2: growth is at most its exponential, of short times less.
+      o%rate(i) = NEVER
+      if (max(s1, s2, s3) <= UNLIKE*min(s1, s2, s3) .and. early > 0.0_dp) o%rate(i) = s3*c1/early
       if (.not. s2 > 0.0_dp) o%error(i) = NEVER
       if (.not. (o%modulus(i) <= FAR .and. o%modulus(i) >= 1.0_dp/FAR)) o%error(i) = NEVER
     end do
@@ -177,6 +206,8 @@ contains
       o%denominator(i) = inverse*(1.0_dp + 0.25_dp*square)
       ! One more level would take that off.
       o%frequency(i) = (o%a(i) - 0.25_dp*square*o%a(i))*t(i)
+      if (.not. (o%turning(i)*(t(i)*t(i)) <= o%most(i) &
+                 .or. o%rate(i)*(t(i)*t(i)) <= 1.0_dp)) error = NEVER
       if (.not. abs(t(i)) > 0.0_dp) error = NEVER ! omega as it is
       o%error(i) = error + error*abs(o%frequency(i))
     end do

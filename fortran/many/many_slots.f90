@@ -1,8 +1,8 @@
 module many_slots
   !! Bodies under torque on their way, side by side, and those that are next.
-  use bodies, only: bodies_t, LANES, of_body
+  use bodies, only: acts, bodies_t, i1, LANES, MOST_WAVES, of_body
   use kinds, only: dp
-  use many_columns, only: columns_of, equations_of
+  use many_columns, only: block_t, columns_of, equations_of, next_block, times_of
   use problem, only: problem_t
   use taylor_plan, only: add_wave_rates, share_and_step, steady_rates
   use torque_noise, only: torque_noise_of
@@ -11,8 +11,8 @@ module many_slots
 
   integer, parameter, public :: SLOTS = 16      !! bodies on their way
   integer, parameter, public :: MOST_ORDER = 24
-  integer, parameter, public :: MOST_WAVES = 16 !! else the single kernel, for which none is many
-  real(dp), parameter, public :: SURE = 0.03_dp !! rounding times growth, in tolerances
+  integer, parameter, public :: KIND_OF = 5     !! of a wave: 1 of a cosine; the rest as in problem_t
+  real(dp), parameter :: SURE = 0.03_dp !! error of the waves' angles, in tolerances
   real(dp), parameter, public :: SHORTEST = 1e-7_dp !! step over the time
   real(dp), parameter, public :: FAR = 1e60_dp  !! from 1: products of such rates are numbers
   ! A step may leave out so much more than that of a single march, whose order it does not choose:
@@ -21,8 +21,6 @@ module many_slots
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
   real(dp), parameter :: CANCELLED = 10.0_dp !! torque of terms that leave so little of each
   real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! of each radian of a wave
-  ! None that a symmetry keeps from growing; of length 1 as growth takes it.
-  real(dp), parameter :: DIFFERENCE(3) = [0.48_dp, -0.31_dp, 0.21_dp]
 
   type, public :: slots_t
     real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding, rad/s
@@ -30,8 +28,8 @@ module many_slots
     real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment
     real(dp), dimension(SLOTS, 3) :: error    !! left out and carried so far, rad/s
     real(dp), dimension(SLOTS) :: worst       !! its largest size so far: it may shrink again
-    real(dp), dimension(SLOTS, 3) :: small    !! a difference
-    real(dp), dimension(SLOTS) :: growth      !! its largest size
+    real(dp) :: small(SLOTS, 3, 3)            !! state-transition matrix from time 0: row, column
+    real(dp), dimension(SLOTS) :: growth      !! its largest norm, that of the largest component
     real(dp), dimension(SLOTS) :: t, rest     !! s
     real(dp), dimension(SLOTS) :: h           !! the step before, s
     real(dp), dimension(SLOTS) :: scale       !! largest omega so far, rad/s
@@ -46,7 +44,8 @@ module many_slots
     real(dp), dimension(LANES, 3) :: w, a, constant, rate
     real(dp), dimension(LANES) :: rest, h, scale, share, spin
     real(dp), dimension(LANES) :: fits
-    integer :: there, taken
+    integer :: taken
+    type(block_t) :: block
   end type ready_t
 
   public :: fill, make_ready, put_in
@@ -75,33 +74,31 @@ contains
     s%going = 0.0_dp
   end subroutine fill
 
-  subroutine make_ready(bodies, first, waves, r)
-    !! The next bodies, as many as there are lanes; r%fits is below 0 of one that is none for here.
+  subroutine make_ready(bodies, status, waves, r)
+    !! The next bodies that are marked, as many as there are lanes; r%fits is below 0 of one that is
+    !! none for here.
     type(bodies_t), intent(in) :: bodies
-    integer, intent(in) :: first
-    real(dp), intent(inout), target :: waves(4, MOST_WAVES, LANES)
+    integer(i1), intent(in) :: status(bodies%n)
+    real(dp), intent(inout) :: waves(KIND_OF, MOST_WAVES, LANES)
     type(ready_t), intent(inout) :: r
     real(dp), dimension(LANES, 3) :: moments
     real(dp), dimension(LANES) :: coupling, gain, rate, turned, fastest
     type(problem_t) :: torque
+    real(dp), target :: own(4, MOST_WAVES)
     real(dp) :: push, ramp, tolerance
-    integer :: i, n, n_sines, n_waves
+    integer :: i, n
 
-    r%there = min(LANES, bodies%n - first)
+    call next_block(bodies%n, status, bodies%mark, r%block)
     r%taken = 0
+    if (r%block%there == 0) return
     tolerance = bodies%tolerance
-    call columns_of(bodies%omega0, first, LANES, r%w)
-    call columns_of(bodies%constant, first, LANES, r%constant)
-    call columns_of(bodies%rate, first, LANES, r%rate)
-    call equations_of(bodies, first, LANES, r%a, moments)
+    call columns_of(bodies%omega0, r%block, LANES, r%w)
+    call columns_of(bodies%constant, r%block, LANES, r%constant)
+    call columns_of(bodies%rate, r%block, LANES, r%rate)
+    call equations_of(bodies, r%block, LANES, r%a, moments)
     r%constant = r%constant/moments
     r%rate = r%rate/moments
-    if (size(bodies%times) == 1) then
-      r%rest = bodies%times(1)
-    else
-      r%rest(:r%there) = bodies%times(first + 1:first + r%there)
-      r%rest(r%there + 1:) = r%rest(r%there)
-    end if
+    call times_of(bodies%times, r%block, LANES, r%rest)
     do i = 1, LANES
       coupling(i) = max(abs(r%a(i, 1)), abs(r%a(i, 2)), abs(r%a(i, 3)))
       push = max(abs(r%constant(i, 1)), abs(r%constant(i, 2)), abs(r%constant(i, 3)))
@@ -118,34 +115,35 @@ contains
       if (.not. abs(r%a(i, 1)) <= FAR) r%fits(i) = -1.0_dp
     end do
     turned = 0.0_dp
-    n_sines = size(bodies%sines, 2)
-    n_waves = n_sines + size(bodies%cosines, 2)
-    if (n_waves > 0) then
-      torque%n_sines = n_sines
-      torque%n_cosines = n_waves - n_sines
+    if (bodies%n_waves > 0) then
+      do i = 1, LANES
+        call waves_of_body(bodies, r%block%at(i), waves(:, :bodies%n_waves, i))
+      end do
       fastest = 0.0_dp
-      do n = 1, n_waves
-        do i = 1, r%there
-          if (n <= n_sines) then
-            waves(:, n, i) = bodies%sines(:, n, of_body(size(bodies%sines, 3), first + i))
-          else
-            waves(:, n, i) = bodies%cosines(:, n - n_sines, &
-                                            of_body(size(bodies%cosines, 3), first + i))
-          end if
+      do n = 1, bodies%n_waves
+        do i = 1, LANES
           waves(:3, n, i) = waves(:3, n, i)/moments(i, :)
-          call add_wave_rates(waves(:, n, i), n <= n_sines, coupling(i), r%rest(i), gain(i), &
-                              rate(i), turned(i))
+          call add_wave_rates(waves(:4, n, i), .not. waves(KIND_OF, n, i) > 0.0_dp, coupling(i), &
+                              r%rest(i), gain(i), rate(i), turned(i))
           fastest(i) = max(fastest(i), abs(waves(4, n, i)))
           if (.not. all(abs(waves(:, n, i)) <= FAR)) r%fits(i) = -1.0_dp
         end do
       end do
-      do i = 1, r%there
+      do i = 1, LANES
         if (.not. fastest(i)*abs(r%rest(i))*WAVES_ERR <= SURE*tolerance) r%fits(i) = -1.0_dp
         if (r%fits(i) < 0.0_dp) cycle
         torque%constant = r%constant(i, :)
         torque%rate = r%rate(i, :)
-        torque%sines => waves(:, :n_sines, i)
-        torque%cosines => waves(:, n_sines + 1:n_waves, i)
+        own = waves(:4, :, i)
+        torque%n_sines = 0
+        do n = 1, bodies%n_waves
+          ! Sines are before cosines; what fills up the array counts as either.
+          if (waves(KIND_OF, n, i) > 0.0_dp) exit
+          torque%n_sines = n
+        end do
+        torque%n_cosines = bodies%n_waves - torque%n_sines
+        torque%sines => own(:, :torque%n_sines)
+        torque%cosines => own(:, torque%n_sines + 1:bodies%n_waves)
         if (torque_noise_of(torque, r%rest(i), 1.0_dp, -r%scale(i)) > CANCELLED) then
           r%fits(i) = -1.0_dp
         end if
@@ -154,7 +152,7 @@ contains
     do i = 1, LANES
       call share_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
                           r%rest(i), r%share(i), r%h(i))
-      r%share(i) = merge(MORE_WITH_WAVES, MORE, n_waves > 0)*r%share(i)
+      r%share(i) = merge(MORE_WITH_WAVES, MORE, bodies%n_waves > 0)*r%share(i)
       push = sqrt(abs(r%a(i, 1)))
       ramp = sqrt(abs(r%a(i, 2)))
       rate(i) = sqrt(abs(r%a(i, 3)))
@@ -162,6 +160,30 @@ contains
       if (.not. abs(r%h(i)) > SHORTEST*abs(r%rest(i))) r%fits(i) = -1.0_dp
     end do
   end subroutine make_ready
+
+  pure subroutine waves_of_body(bodies, body, waves)
+    !! The waves that act on a body, sines before cosines; after them zeros, which change no bit.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: body
+    real(dp), intent(inout) :: waves(:, :)  !! (KIND_OF, the most that act on a body)
+    integer :: column, n, there
+
+    there = 0
+    waves = 0.0_dp
+    column = of_body(size(bodies%sines, 3), body)
+    do n = 1, size(bodies%sines, 2)
+      if (.not. acts(bodies%sines(:, n, column))) cycle
+      there = there + 1
+      waves(:4, there) = bodies%sines(:, n, column)
+    end do
+    column = of_body(size(bodies%cosines, 3), body)
+    do n = 1, size(bodies%cosines, 2)
+      if (.not. acts(bodies%cosines(:, n, column))) cycle
+      there = there + 1
+      waves(:4, there) = bodies%cosines(:, n, column)
+      waves(KIND_OF, there) = 1.0_dp
+    end do
+  end subroutine waves_of_body
 
   pure subroutine put_in(r, j, s, i)
     !! Body j of those that are ready into slot i.
@@ -177,7 +199,8 @@ contains
       s%constant(i, axis) = r%constant(j, axis)
       s%rate(i, axis) = r%rate(j, axis)
       s%error(i, axis) = 0.0_dp
-      s%small(i, axis) = DIFFERENCE(axis)
+      s%small(i, axis, :) = 0.0_dp
+      s%small(i, axis, axis) = 1.0_dp
     end do
     s%growth(i) = 1.0_dp
     s%worst(i) = 0.0_dp

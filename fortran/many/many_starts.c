@@ -13,18 +13,11 @@ typedef void kernel(const double *packed, const int *n_packed, const int *n, con
                     const int *n_times, const double *times, int *given_up, double *omega,
                     int8_t *status, int *raised);
 
-/* solve_packed, for a start alone. */
-typedef void single_kernel(const double *packed, const int *n_packed, const double *start,
-                           const double *t_end, double *state, int *status, int64_t *steps,
-                           double *found);
-
 typedef struct {
   PyObject_HEAD
   vectorcallfunc vectorcall;
   PyObject *callable;    /* the kernel as Python has it: keeps its address */
-  PyObject *single;
   kernel *address;
-  single_kernel *single_address;
   PyArrayObject *packed; /* read-only */
   PyArrayObject *brief;  /* the same, or NULL: for what takes less time than others' getting a turn */
   PyObject *slowly;      /* what takes any arguments */
@@ -46,14 +39,6 @@ static int enter(const many_starts *self, PyArrayObject *packed, int n, const do
   const int n_packed = (int)PyArray_DIM(packed, 0);
   const double *numbers = PyArray_DATA(packed);
   int given_up = 0, raised = 0, is_complete = 1;
-  if (n == 1) {
-    int ended;
-    int64_t steps;
-    double found[2];
-    self->single_address(numbers, &n_packed, start, times, omega, &ended, &steps, found);
-    *status = (int8_t)ended;
-    return ended == 0;
-  }
   self->address(numbers, &n_packed, &n, start, &n_times, times, &given_up, omega, status, &raised);
   for (int i = 0; i < n && is_complete; i++) is_complete = status[i] == 0;
   return is_complete;
@@ -66,7 +51,7 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   const double *times = &time;
   int n_times = 1;
 
-  if (self->address == NULL || self->single_address == NULL) goto slowly;
+  if (self->address == NULL) goto slowly;
   if (PyVectorcall_NARGS(n_given) != 2 || names != NULL || !is_plain(given[0], 2)) goto slowly;
   PyArrayObject *start = (PyArrayObject *)given[0];
   npy_intp shape[2] = {PyArray_DIM(start, 0), 3};
@@ -124,20 +109,18 @@ static PyArrayObject *own_packed(PyObject *packed)
 
 static PyObject *new_many(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-  static char *known[] = {"kernel", "single", "packed", "brief", "slowly", NULL};
-  PyObject *callable, *single, *packed, *brief, *slowly;
-  if (!PyArg_ParseTupleAndKeywords(args, names, "OOOOO", known, &callable, &single, &packed,
-                                   &brief, &slowly)) {
+  static char *known[] = {"kernel", "packed", "brief", "slowly", NULL};
+  PyObject *callable, *packed, *brief, *slowly;
+  if (!PyArg_ParseTupleAndKeywords(args, names, "OOOO", known, &callable, &packed, &brief,
+                                   &slowly)) {
     return NULL;
   }
   many_starts *self = (many_starts *)type->tp_alloc(type, 0);
   if (self == NULL) return NULL;
   self->vectorcall = call;
   self->callable = Py_NewRef(callable);
-  self->single = Py_NewRef(single);
   self->slowly = Py_NewRef(slowly);
   self->address = (kernel *)address_of(callable);
-  if (!PyErr_Occurred()) self->single_address = (single_kernel *)address_of(single);
   if (!PyErr_Occurred()) self->packed = own_packed(packed);
   if (!PyErr_Occurred() && brief != Py_None) self->brief = own_packed(brief);
   if (PyErr_Occurred()) Py_CLEAR(self);
@@ -148,7 +131,6 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
 {
   many_starts *self = (many_starts *)object;
   Py_VISIT(self->callable);
-  Py_VISIT(self->single);
   Py_VISIT(self->slowly);
   return 0;
 }
@@ -164,7 +146,6 @@ static void dealloc(PyObject *object)
   many_starts *self = (many_starts *)object;
   PyObject_GC_UnTrack(object);
   Py_XDECREF(self->callable);
-  Py_XDECREF(self->single);
   Py_XDECREF(self->packed);
   Py_XDECREF(self->brief);
   Py_XDECREF(self->slowly);

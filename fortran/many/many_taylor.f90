@@ -5,12 +5,12 @@ module many_taylor
   !! to be sure of, the body is left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: bodies_t, i1, LANES, LEFT
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT, MOST_WAVES
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
-  use many_slots, only: FAR, fill, make_ready, MOST_ORDER, MOST_WAVES, put_in, ready_t, SHORTEST, &
-                        SLOTS, slots_t, SURE
+  use many_slots, only: FAR, fill, KIND_OF, make_ready, MOST_ORDER, put_in, ready_t, SHORTEST, &
+                        SLOTS, slots_t
   use statuses, only: COMPLETE
   implicit none(type, external)
   private
@@ -18,9 +18,12 @@ module many_taylor
   integer, parameter :: BETWEEN_LOOKS = 100000 ! at the user, steps of all slots
   ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
   real(dp), parameter :: TRUSTED = 0.4_dp
-  real(dp), parameter :: DOUBTED = 16.0_dp   ! growth at which it is half of that
-  real(dp), parameter :: MOST_GROWTH = 100.0_dp
+  real(dp), parameter :: DOUBTED = 64.0_dp   ! growth at which it is half of that
+  real(dp), parameter :: MOST_GROWTH = 1000.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  ! Rounding times growth, in tolerances: a third of what the single kernel reports as sensitive, as
+  ! it measures the growth from later instants too.
+  real(dp), parameter :: SURE = 0.1_dp
   real(dp), parameter :: A_STEP = 3.0_dp     ! norm up to which an exponential is taken at once
   real(dp), parameter :: RIDGE = 1.001_dp
   real(dp), parameter :: LEAST = 1e-290_dp
@@ -35,7 +38,7 @@ contains
 
   subroutine many_taylor_solve(bodies_at, n, omega, status, interrupted) &
     bind(c, name="solve_many_taylor_level")
-    !! Angular velocity of each body at its time; status is COMPLETE or LEFT.
+    !! Angular velocity at its time of each body that is marked; status is then COMPLETE or LEFT.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     integer(c_int), intent(in), value :: n                !! bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
@@ -43,30 +46,28 @@ contains
     integer(c_int), intent(out) :: interrupted            !! 1: by the user
     type(bodies_t), pointer :: bodies
     type(slots_t) :: s
-    real(dp) :: waves(4, MOST_WAVES, SLOTS)
+    real(dp) :: waves(KIND_OF, MOST_WAVES, SLOTS)
     integer :: body(SLOTS)   ! in each slot; 0: none
     type(ready_t) :: ready
-    real(dp), target :: ready_waves(4, MOST_WAVES, LANES)
-    integer :: n_sines, n_waves, order, first, active, i, j, unseen
+    real(dp) :: ready_waves(KIND_OF, MOST_WAVES, LANES)
+    integer :: n_waves, order, active, n_slots, i, j, unseen
 
     call c_f_pointer(bodies_at, bodies)
     interrupted = 0
-    n_sines = size(bodies%sines, 2)
-    n_waves = n_sines + size(bodies%cosines, 2)
-    if (n_waves > MOST_WAVES) then
-      status(:n) = LEFT
-      return
-    end if
+    n_waves = bodies%n_waves
     order = order_for(bodies%tolerance)
     call fill(s)
     body = 0
-    first = 0
-    call make_ready(bodies, first, ready_waves, ready)
+    waves = 0.0_dp
+    ready%block%last = 0
+    call make_ready(bodies, status, ready_waves, ready)
+    n_slots = SLOTS
+    if (ready%block%there <= A_GROUP) n_slots = A_GROUP ! a register: the others would stay empty
     active = 0
     unseen = 0
     do
-      if (.not. minval(s%going) > 0.0_dp) then
-        do i = 1, SLOTS
+      if (.not. minval(s%going(:n_slots)) > 0.0_dp) then
+        do i = 1, n_slots
           if (s%going(i) > 0.0_dp) cycle
           if (body(i) > 0) then
             call take_out(bodies%tolerance, s, i, omega(:, body(i)), status(body(i)))
@@ -74,26 +75,25 @@ contains
           end if
           body(i) = 0
           do
-            if (ready%taken == ready%there) then
-              if (first + ready%there >= n) exit
-              first = first + LANES
-              call make_ready(bodies, first, ready_waves, ready)
+            if (ready%taken == ready%block%there) then
+              call make_ready(bodies, status, ready_waves, ready)
+              if (ready%block%there == 0) exit
             end if
             j = ready%taken + 1
             ready%taken = j
-            status(first + j) = LEFT
+            status(ready%block%at(j)) = LEFT
             if (ready%fits(j) < 0.0_dp) cycle
             call put_in(ready, j, s, i)
             if (n_waves > 0) waves(:, :n_waves, i) = ready_waves(:, :n_waves, j)
-            body(i) = first + j
+            body(i) = ready%block%at(j)
             active = active + 1
             exit
           end do
         end do
       end if
       if (active == 0) exit
-      if (n_waves > 0) call wave_terms(order, n_sines, n_waves, waves, s)
-      call step(order, n_waves > 0, SLOTS, s)
+      if (n_waves > 0) call wave_terms(order, n_waves, waves, s)
+      call step(order, n_waves > 0, n_slots, s)
       unseen = unseen + 1
       if (unseen >= BETWEEN_LOOKS) then
         unseen = 0
@@ -148,10 +148,10 @@ contains
     end if
   end subroutine take_out
 
-  subroutine wave_terms(order, n_sines, n_waves, waves, s)
+  subroutine wave_terms(order, n_waves, waves, s)
     !! What waves of torque add to the terms of a step as long as the one before.
-    integer, intent(in) :: order, n_sines, n_waves
-    real(dp), intent(in) :: waves(4, MOST_WAVES, SLOTS)
+    integer, intent(in) :: order, n_waves
+    real(dp), intent(in) :: waves(KIND_OF, MOST_WAVES, SLOTS)
     type(slots_t), intent(inout) :: s
     real(dp), dimension(LANES) :: angle, sine, cosine
     real(dp), dimension(SLOTS) :: turn, power, even, odd
@@ -166,13 +166,10 @@ contains
       end do
       call sine_cosine_lanes(SLOTS, angle, sine, cosine)
       ! The derivatives of a wave run value, slope, -value, -slope.
-      if (n <= n_sines) then
-        even = sine(:SLOTS)
-        odd = cosine(:SLOTS)
-      else
-        even = cosine(:SLOTS)
-        odd = -sine(:SLOTS)
-      end if
+      do i = 1, SLOTS
+        even(i) = merge(cosine(i), sine(i), waves(KIND_OF, n, i) > 0.0_dp)
+        odd(i) = merge(-sine(i), cosine(i), waves(KIND_OF, n, i) > 0.0_dp)
+      end do
       do k = 1, order
         do axis = 1, 3
           do i = 1, SLOTS
@@ -225,6 +222,7 @@ contains
     integer, parameter :: CARRIED = 7, MOMENTS = 8
     real(dp) :: terms(3, 0:MOST_ORDER), f(3), products(3), change(3), total(3), part(3)
     real(dp) :: mean(3), moment(3), c(3), o(3, 3), d(3), e(3), left(3), last4(3, 4)
+    real(dp) :: rows(3)
     real(dp) :: h, r, next, scale, allowed, uu, vv, uv, p, q, determinant
     integer :: j, k
 
@@ -293,20 +291,25 @@ contains
     ! In units in which the matrix of a body is symmetric but for signs.
     s%spin(i) = sqrt(abs(o(1, 2)*o(2, 1)) + abs(o(1, 3)*o(3, 1)) + abs(o(2, 3)*o(3, 2))) &
                 /max(abs(next), LEAST)
-    do j = 1, 2
-      d = merge(s%error(i, :), s%small(i, :), j == 1)
+    rows = 0.0_dp
+    do j = 0, 3
+      if (j == 0) d = s%error(i, :)
+      if (j > 0) d = s%small(i, :, j)
       e = d
       do k = CARRIED, 1, -1
         e = [o(1, 2)*e(2) + o(1, 3)*e(3), o(2, 1)*e(1) + o(2, 3)*e(3), &
              o(3, 1)*e(1) + o(3, 2)*e(2)]/real(k, dp) + d
       end do
-      if (j == 1) then
+      if (j == 0) then
         s%error(i, :) = e - left
         s%worst(i) = max(s%worst(i), sum(abs(s%error(i, :))))
+      else
+        s%small(i, :, j) = e
+        rows = rows + abs(e)
       end if
-      if (j == 2) s%small(i, :) = e
     end do
-    s%growth(i) = max(s%growth(i), sum(abs(s%small(i, :))))
+    ! Sums, as a NaN may be lost in a maximum.
+    s%growth(i) = max(s%growth(i), rows(1), rows(2), rows(3)) + 0.0_dp*sum(rows)
     s%t(i) = s%t(i) + next
     s%rest(i) = s%rest(i) - next
     s%h(i) = next

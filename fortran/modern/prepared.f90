@@ -24,7 +24,7 @@ module prepared
   real(dp), parameter :: LARGE = 2.0_dp**300
   integer, parameter :: MOST_POWER = 1000
 
-  public :: solve_prepared, solve_prepared_attitude
+  public :: solve_prepared, solve_prepared_attitude, unpack
 
 contains
 

@@ -151,23 +151,31 @@ def one_step(order: int, waves: bool) -> Iterator[str]:
     yield from (f"{factor} = {factor}*r" for factor in ("fa", "fb", "fc"))
     yield from POLES.splitlines()
     yield from MATRIX.splitlines()
-    for name in ("error", "small"):
-        for axis, x in enumerate("xyz", 1):
-            yield f"d{x} = s%{name}(i, {axis})"
+    yield from ("sx = 0.0_dp", "sy = 0.0_dp", "sz = 0.0_dp")
+    for column in range(4):  # the error, and the columns of the state-transition matrix
+        places = [
+            f"error(i, {axis})" if column == 0 else f"small(i, {axis}, {column})"
+            for axis in (1, 2, 3)
+        ]
+        for place, x in zip(places, "xyz", strict=True):
+            yield f"d{x} = s%{place}"
             yield f"e{x} = d{x}"
         for k in range(CARRIED, 0, -1):
             yield f"gx = (oxy*ey + oxz*ez)*(1.0_dp/{k}.0_dp) + dx"
             yield f"gy = (oyx*ex + oyz*ez)*(1.0_dp/{k}.0_dp) + dy"
             yield f"ez = (ozx*ex + ozy*ey)*(1.0_dp/{k}.0_dp) + dz"
             yield from ("ex = gx", "ey = gy")
-        for axis, x in enumerate("xyz", 1):
+        for place, x in zip(places, "xyz", strict=True):
             # What it leaves out, the step takes away.
-            if name == "error":
+            if column == 0:
                 yield f"e{x} = e{x} - (p*l{x} - q*u{x})"
-            yield f"s%{name}(i, {axis}) = e{x}"
-        if name == "error":
+            else:
+                yield f"s{x} = s{x} + abs(e{x})"
+            yield f"s%{place} = e{x}"
+        if column == 0:
             yield "s%worst(i) = max(s%worst(i), abs(ex) + abs(ey) + abs(ez))"
-    yield "s%growth(i) = max(s%growth(i), abs(ex) + abs(ey) + abs(ez))"
+    # A sum, as a NaN may be lost in a maximum.
+    yield "s%growth(i) = max(s%growth(i), sx, sy, sz) + 0.0_dp*((sx + sy) + sz)"
     yield from END.splitlines()
 
 

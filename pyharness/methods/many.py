@@ -1,20 +1,36 @@
 """Many bodies in one call: side by side in the kernel, and on several cores where asked.
 
-The blocks and the threads change no bit of a result: each body is solved by itself, as if alone.
+The result of a body depends on that body alone: no other body, no order and no number of threads
+changes a bit of it.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.methods.ensemble import Ensemble as Ensemble
+from pyharness.methods.ensemble import place_for
+from pyharness.methods.many_scenes import (
+    Axes,
+    check_alike,
+    from_rows,
+    from_scene,
+    from_scenes,
+    units_of,
+    waves_of,
+)
+from pyharness.methods.many_space import (
+    NO_ATTITUDE,
+    acts_in_space,
+    inertia_scenes,
+    space_bodies,
+)
 from pyharness.methods.many_starts import (
-    buffer_of,
     for_each_piece,
-    numbers_of,
     rows_of,
     threads_of,
     times_of,
@@ -25,46 +41,11 @@ from pyharness.methods.registry import REGISTRY, check_attitude, requested_toler
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.extension import ENDS, extension
-from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene
-from pyharness.model.shown import short_repr
-from pyharness.model.trajectory import WITH_ALL_ROWS, Array
+from pyharness.model.extension import extension
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, finite
 from pyharness.model.waves import with_merged_rows
-
-_RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
-
-
-@dataclass(frozen=True, eq=False)
-class Ensemble:
-    """The ends of many scenes.
-
-    Attributes
-    ----------
-    omega : ndarray, shape (n, 3)
-        Angular velocity about the body axes, rad/s; NaN where there is no result.
-    status : ndarray of int8, shape (n,)
-        How each ended: 0 complete, 2 overflow, 3 refused, 4 gave up, 6 sensitive, which is a result
-        too. A closed form does not look whether a motion is sensitive.
-    attitude : ndarray, shape (n, 4), or None
-        Quaternions from body to space, scalar first; None where they were not asked for.
-    """
-
-    omega: Array
-    status: NDArray[np.int8]
-    attitude: Array | None = None
-
-    @property
-    def ended(self) -> NDArray[np.str_]:
-        """How each ended, in words: complete, sensitive, overflow, refused, gave up."""
-        return np.array(ENDS)[self.status]
-
-    __repr__ = short_repr
-
-    @property
-    def has_result(self) -> NDArray[np.bool_]:
-        """Where there is one."""
-        return np.isin(self.status, _RESULTS)
 
 
 def solve_many(
@@ -74,6 +55,7 @@ def solve_many(
     omega0: Any = None,
     moments: Any = None,
     coefficients: Any = None,
+    inertia: Any = None,
     torque_constant: Any = None,
     torque_rate: Any = None,
     sines: Any = None,
@@ -97,12 +79,16 @@ def solve_many(
     omega0, moments, coefficients, torque_constant, torque_rate : array, shape (n, 3) or (3,)
         Starts (rad/s), moments (kg m2) or A, B, C, torque (N m; 1/s2 for bodies of coefficients)
         and its rate, of each body or of all.
+    inertia : array, shape (n, 3, 3) or (3, 3)
+        Full inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the
+        axes of the matrix. Finding the principal axes takes some tenths of a millisecond a body.
     sines, cosines : array, shape (n, k, 4) or (k, 4)
         Waves of torque: an amplitude of three, and the frequency (rad/s).
     attitude0 : array, shape (n, 4) or (4,)
         Quaternions at time 0, body to space, scalar first; with them the attitudes are found.
     method : str
-        A name in `PREPARED`; `auto` is the closed form where no body has torque, else the series.
+        A name in `PREPARED`; `auto` is the closed form for each body without torque and for each
+        sphere, and the series for any other.
     tolerance : float
         As in `prepare`: largest error at the end, relative to the largest omega on the way; by
         default the method's own.
@@ -135,31 +121,126 @@ def solve_many(
     >>> starts = np.array([[0.0, 1.0, 10.0], [0.0, 2.0, 5.0]])
     >>> np.round(solve_many(case_scene(2), 1.0, omega0=starts).omega, 6) + 0.0
     array([[-0.958924,  0.283662, 10.      ],
-           [-1.979985,  0.282253,  5.      ]])
+           [ 1.196944, -1.602287,  5.      ]])
     """
-    if isinstance(scene, Scene):
-        given = _from_scene(scene)
-    else:
-        given = _from_scenes(scene)
-        for name, value in (("omega0", omega0), ("moments", moments), ("attitude0", attitude0)):
-            if value is not None:
-                raise InputError(f"{name} is given beside many scenes; allowed: one scene, or none")
-    if moments is not None and coefficients is not None:
-        raise InputError("moments and coefficients are both given; allowed: one of them")
-    if moments is not None or coefficients is not None:
-        given["by_moments"] = moments is not None
-        given["body"] = moments if coefficients is None else coefficients
     arrays = {
         "omega0": omega0, "constant": torque_constant, "rate": torque_rate,
         "sines": sines, "cosines": cosines, "attitude": attitude0,
     }  # fmt: skip
-    given.update({name: value for name, value in arrays.items() if value is not None})
+    own = {name: value for name, value in arrays.items() if value is not None}
+    kinds = {"moments": moments, "coefficients": coefficients, "inertia": inertia}
+    kinds_given = [name for name, value in kinds.items() if value is not None]
+    if len(kinds_given) > 1:
+        raise InputError(f"{' and '.join(kinds_given)} are both given; allowed: one of them")
+    torques = {
+        "torque_constant": torque_constant, "torque_rate": torque_rate, "sines": sines,
+        "cosines": cosines,
+    }  # fmt: skip
+    settings: dict[str, Any] = {
+        "method": method, "tolerance": tolerance, "effort": effort, "threads": threads,
+    }  # fmt: skip
+    if isinstance(scene, Scene):
+        if acts_in_space(scene, torques.values()):
+            every = {**torques, **kinds, "omega0": omega0, "attitude0": attitude0}
+            return _solve_in_space(scene, t_end, every, out, **settings)
+        if inertia is not None or (scene.inertia is not None and not kinds_given):
+            given = from_rows(inertia_scenes(scene, {**torques, **kinds}))
+            given["step"] = scene.step_size
+            turning = {name: value for name, value in own.items() if name in ("omega0", "attitude")}
+            given.update(turning)
+            given["axes"].about_principal(given, turning)
+            own = {}
+        else:
+            if scene.inertia is not None:  # other bodies are given
+                scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
+            given = from_scene(scene)
+    else:
+        scene = list(scene)
+        for name, value in {"omega0": omega0, **kinds, "attitude0": attitude0}.items():
+            if value is not None and name != "coefficients":
+                raise InputError(f"{name} is given beside many scenes; allowed: one scene, or none")
+        if any(_is_special(each) for each in scene):
+            if own or kinds_given:
+                raise InputError(
+                    "arrays are given beside scenes with a full inertia matrix, or a torque about "
+                    "the axes of space; allowed: one scene and arrays, or scenes alone"
+                )
+            if (len(scene) > 1 and not all(each.inertia is not None for each in scene)) or any(
+                each.torque.in_space for each in scene
+            ):
+                return _solve_groups(scene, t_end, step, out, **settings)
+            given = _from_full_scenes(scene)
+        else:
+            given = from_scenes(scene)
+    if kinds_given and inertia is None:
+        given["by_moments"] = moments is not None
+        given["body"] = kinds[kinds_given[0]]
+    given.update(own)
     given["step"] = finite("step", given["step"] if step is None else step)
-    code, tolerance = _chosen(method, tolerance)
-    bodies = _Bodies(given, t_end, code, tolerance, checked_effort(effort))
-    if bodies.attitude.size:
+    code, asked = _chosen(method, tolerance)
+    bodies = _Bodies(given, t_end, code, asked, checked_effort(effort))
+    if bodies.with_attitude:
         check_attitude(method)
-    return bodies.solve(threads_of(threads), out)
+    found = bodies.solve(threads_of(threads), out)
+    axes: Axes | None = given["axes"]
+    if axes is not None:
+        axes.give_back(found.omega, found.attitude)
+    return found
+
+
+def _is_special(scene: Scene) -> bool:
+    checked_scene(scene, any_axes=True, any_torque=True)
+    return scene.inertia is not None or scene.torque.in_space
+
+
+def _from_full_scenes(scenes: list[Scene]) -> dict[str, Any]:
+    check_alike(scenes)
+    return {**from_rows(scenes), "step": scenes[0].step_size}
+
+
+def _solve_in_space(
+    scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
+    method: str, tolerance: Number | None, effort: float, threads: int,
+) -> Ensemble:  # fmt: skip
+    """Solve bodies of a torque about the axes of space."""
+    _, asked = _chosen(method, tolerance)
+    bodies = space_bodies(
+        checked_scene(scene, any_axes=True, any_torque=True), t_end, method, arrays
+    )
+    found = place_for(out, bodies.n, with_attitude=True)
+    assert found.attitude is not None
+    ends = bodies.solve(method, asked, checked_effort(effort), threads_of(threads))
+    found.omega[:], found.status[:], found.attitude[:] = ends
+    return found
+
+
+def _solve_groups(
+    scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
+    **settings: Any,
+) -> Ensemble:  # fmt: skip
+    """Solve scenes of several kinds, each as if alone: about which axes the body and torque are."""
+    check_alike(scenes)
+    if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):
+        raise InputError(NO_ATTITUDE)
+    times, n = times_of(t_end), len(scenes)
+    if len(times) not in (1, n):
+        raise InputError(
+            f"t_end: {len(times)} rows; allowed: 1, or as many as there are bodies, {n}"
+        )
+    times = np.broadcast_to(times, n)
+    found = place_for(out, n, scenes[0].attitude is not None)
+    groups: dict[int, list[int]] = {}
+    for row, each in enumerate(scenes):
+        # A torque about the axes of space is solved alone, whatever the body is about.
+        kind = row if each.torque.in_space else -1 if each.inertia is not None else -2
+        groups.setdefault(kind, []).append(row)
+    for kind, rows in groups.items():
+        own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
+        part = solve_many(own, times[rows], step=step, **settings)
+        found.omega[rows], found.status[rows] = part.omega, part.status
+        if found.attitude is not None:
+            found.attitude[rows] = part.attitude
+    return found
 
 
 class _Bodies:
@@ -173,11 +254,12 @@ class _Bodies:
         self.body = rows_of(body, given["body"], 3)
         self.constant = rows_of("torque_constant", given["constant"], 3)
         self.rate = rows_of("torque_rate", given["rate"], 3)
-        self.sines = _waves("sines", given["sines"])
-        self.cosines = _waves("cosines", given["cosines"])
+        self.sines = waves_of("sines", given["sines"])
+        self.cosines = waves_of("cosines", given["cosines"])
         self.omega0 = rows_of("omega0", given["omega0"], 3)
         attitude = given["attitude"]
-        self.attitude = np.empty((0, 4)) if attitude is None else _units(attitude)
+        self.with_attitude = attitude is not None
+        self.attitude = np.empty((0, 4)) if attitude is None else units_of(attitude)
         self.times = times_of(t_end)
         named = {
             "omega0": self.omega0, body: self.body, "torque_constant": self.constant,
@@ -202,13 +284,18 @@ class _Bodies:
         if not self.step > 0.0:
             raise InputError(f"step is {self.step:g}; allowed: above 0")
         self.code, self.tolerance, self.effort = code, tolerance, effort
-        torque = self.constant.any() or self.rate.any() or self.sines.size or self.cosines.size
-        if code == Methods.CLOSED_FORM and torque:
+        torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
+        if code == Methods.CLOSED_FORM and any(each.any() for each in torques):
             raise InputError("closed-form can't take a torque here; allowed: auto, taylor")
+        if code == Methods.CLOSED_FORM and self.with_attitude and not self.by_moments:
+            raise InputError(
+                "closed-form can't take an attitude of bodies given by coefficients; allowed: "
+                "moments, or methods auto and taylor"
+            )
 
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
         """Return the ends."""
-        found = self._place(out)
+        found = place_for(out, self.n, self.with_attitude)
         for_each_piece(partial(self._enter, found), self.n, threads)
         return found
 
@@ -226,66 +313,6 @@ class _Bodies:
             nothing if found.attitude is None else found.attitude[piece].T, found.status[piece],
         )  # fmt: skip
 
-    def _place(self, out: "Ensemble | Array | None") -> Ensemble:
-        """Return arrays for the results."""
-        shape = (self.n, 3)
-        if out is None or isinstance(out, np.ndarray):
-            omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")
-            attitude = np.empty((self.n, 4)) if self.attitude.size else None
-            return Ensemble(omega, np.empty(self.n, np.int8), attitude)
-        if not isinstance(out, Ensemble):
-            raise InputError("out: allowed: an Ensemble, or an array of float64")
-        buffer_of("out.omega", out.omega, shape, "d")
-        buffer_of("out.status", out.status, (self.n,), "b")
-        if (out.attitude is None) != (not self.attitude.size):
-            raise InputError("out.attitude: allowed: an array where attitude0 is given, else None")
-        if out.attitude is not None:
-            buffer_of("out.attitude", out.attitude, (self.n, 4), "d")
-        return out
-
-
-def _from_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as arrays of one row."""
-    law = checked_scene(scene, any_torque=True).torque
-    if law.in_space:
-        raise InputError(
-            SPACE_TORQUE.replace("methods auto and taylor, with the attitude", "solve")
-        )
-    law = scene.body_torque
-    return {
-        "by_moments": scene.moments is not None,
-        "body": scene.moments or scene.coefficients,
-        "omega0": scene.omega,
-        "constant": law.constant,
-        "rate": law.rate,
-        "sines": [[*amplitude, frequency] for amplitude, frequency in law.sines],
-        "cosines": [[*amplitude, frequency] for amplitude, frequency in law.cosines],
-        "attitude": scene.attitude,
-        "step": scene.step_size,
-    }
-
-
-def _from_scenes(scenes: Iterable[Scene]) -> dict[str, Any]:
-    """Return scenes as arrays of a row each; InputError where they can't be side by side."""
-    rows = [_from_scene(checked_scene(each, any_torque=True)) for each in scenes]
-    if not rows:
-        raise InputError("there is no scene; allowed: a scene, or some")
-    for name, what in (("by_moments", "kind of body"), ("step", "step size")):
-        if len({row[name] for row in rows}) > 1:
-            raise InputError(f"the scenes have more than one {what}; allowed: one for all")
-    if len({row["attitude"] is None for row in rows}) > 1:
-        raise InputError("some scenes have an attitude and some have none; allowed: all or none")
-    found = {**rows[0]}
-    for name in ("body", "omega0", "constant", "rate"):
-        found[name] = np.array([row[name] for row in rows])
-    if found["attitude"] is not None:
-        found["attitude"] = np.array([row["attitude"] for row in rows])
-    for name in ("sines", "cosines"):
-        # Waves without amplitude fill up the shorter laws.
-        most = max(len(row[name]) for row in rows)
-        found[name] = [row[name] + [[0.0] * 4] * (most - len(row[name])) for row in rows]
-    return found
-
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
     """Return the number by which the kernel knows a method, and the tolerance."""
@@ -296,21 +323,3 @@ def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
     if not finest <= asked <= 1.0:
         raise InputError(f"tolerance is {asked:g}; allowed: {finest:g} to 1")
     return (Methods.CLOSED_FORM_OR_TAYLOR if method == "auto" else CODES[method]), asked
-
-
-def _units(values: Any) -> Array:
-    """Return quaternions of length 1; NaN, which has no attitude, where there is none."""
-    found = rows_of("attitude0", values, 4)
-    with np.errstate(all="ignore"):
-        found = found / np.abs(found).max(axis=1, keepdims=True)
-        units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))
-    return units
-
-
-def _waves(where: str, values: Any) -> Array:
-    found = numbers_of(where, values)
-    if not found.size:
-        return np.empty((1, 0, 4))
-    if found.ndim not in (2, 3) or found.shape[-1] != 4:
-        raise InputError(f"{where}: shape {found.shape}; allowed: (k, 4) or (n, k, 4)")
-    return np.ascontiguousarray(found.reshape(-1, *found.shape[-2:]))

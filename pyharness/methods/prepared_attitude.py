@@ -62,9 +62,13 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
     """Return a solver; InputError where the method carries no attitude."""
+    return AttitudeSolver(attitude_plan(scene, method, tolerance), tolerance, method, effort)
+
+
+def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
+    """Return the plan of a scene with attitude; InputError where the method carries none."""
     check_attitude(method)
-    chosen = plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
-    return AttitudeSolver(chosen, tolerance, method, effort)
+    return plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
 
 
 def _check(

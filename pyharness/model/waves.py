@@ -198,5 +198,9 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return an array of waves without the columns in which no law has one."""
-    return np.ascontiguousarray(waves[:, waves[..., :3].any(axis=(0, 2))])
+    """Return an array of waves without the columns in which no law has one.
+
+    A frequency that is no number keeps its column, so that its law alone is refused for it.
+    """
+    is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
+    return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -146,15 +146,18 @@ def test_what_has_no_lanes_is_solved_one_by_one() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_one_body_alone_is_a_single_solution(kind: str) -> None:
+def test_one_body_alone_keeps_the_tolerance_of_a_single_solution(kind: str) -> None:
     drawn = bodies(kind, 12, 23)
+    whole = solve_many(TOP, tolerance=1e-9, **drawn)
     for row in range(12):
         solver = prepare(scene_of(drawn, row), tolerance=1e-9)
         alone = solver(drawn["omega0"][row], drawn["t_end"][row])
         start, t_end = drawn["omega0"][row : row + 1], float(drawn["t_end"][row])
-        assert np.array_equal(solver.many(start, t_end)[0][0], alone)
+        allowed = 2e-9 * max(np.abs(alone).max(), np.abs(start).max())
+        assert np.abs(solver.many(start, t_end)[0][0] - alone).max() <= allowed
         found = solve_many(TOP, tolerance=1e-9, **only(drawn, slice(row, row + 1)))
-        assert np.array_equal(found.omega[0], alone)
+        assert np.abs(found.omega[0] - alone).max() <= allowed
+        assert np.array_equal(found.omega[0], whole.omega[row])
 
 
 def test_a_bad_body_spoils_no_other() -> None:
@@ -340,4 +343,4 @@ def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path, level: int
         assert np.count_nonzero(solved) > 20
         scale = np.abs(found.omega).max(axis=1, keepdims=True)
         off = np.abs(omega - found.omega) / scale
-        assert off[solved].max() <= (2e-12 if method == 0 else 1e-11)
+        assert off[solved].max() <= 1e-11

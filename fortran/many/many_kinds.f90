@@ -1,0 +1,125 @@
+module many_kinds
+  !! What solves each of many bodies: its own numbers alone decide, so that no result depends on the
+  !! other bodies of a call.
+  use bodies, only: acts, bodies_t, coefficients_of, FREE, has_torque, i1, LEFT, MOST_WAVES, &
+                    of_body, RAMPED, STEPPED, WAVED
+  use kinds, only: dp
+  use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, RK4, SPHERE, TAYLOR
+  implicit none(type, external)
+  private
+
+  public :: is_sphere, mark_bodies, single_code
+
+contains
+
+  subroutine mark_bodies(bodies, code, status, n_waves)
+    !! What solves each body, by its own numbers.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: code
+    integer(i1), intent(out) :: status(bodies%n)
+    integer, intent(out) :: n_waves    !! the most that act on a body that is marked WAVED
+    integer :: i
+
+    n_waves = 0
+    if (code == CLOSED_FORM) then
+      status = FREE
+    else if (.not. (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR &
+                    .or. (code >= IMPROVED_EULER .and. code <= RK4))) then
+      status = LEFT
+    else if (shares_torque(bodies) .and. code /= CLOSED_FORM_OR_TAYLOR) then
+      status = mark_of(bodies, 1, code, n_waves)
+    else if (shares_torque(bodies) .and. .not. feels_torque(bodies, 1)) then
+      status = FREE
+    else
+      do i = 1, bodies%n
+        status(i) = mark_of(bodies, i, code, n_waves)
+      end do
+    end if
+  end subroutine mark_bodies
+
+  pure logical function shares_torque(bodies)
+    !! Whether one torque is that of all bodies.
+    type(bodies_t), intent(in) :: bodies
+
+    shares_torque = max(size(bodies%constant, 2), size(bodies%rate, 2), size(bodies%sines, 3), &
+                        size(bodies%cosines, 3)) == 1
+  end function shares_torque
+
+  pure logical function feels_torque(bodies, i)
+    !! Whether a torque acts on body i.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i
+
+    feels_torque = has_torque(bodies%constant(:, of_body(size(bodies%constant, 2), i))) &
+                   .or. has_torque(bodies%rate(:, of_body(size(bodies%rate, 2), i)))
+    if (.not. feels_torque) feels_torque = waves_on(bodies, i) > 0
+  end function feels_torque
+
+  pure integer function waves_on(bodies, i)
+    !! The waves that act on body i.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i
+    integer :: k
+
+    waves_on = 0
+    do k = 1, size(bodies%sines, 2)
+      if (acts(bodies%sines(:, k, of_body(size(bodies%sines, 3), i)))) waves_on = waves_on + 1
+    end do
+    do k = 1, size(bodies%cosines, 2)
+      if (acts(bodies%cosines(:, k, of_body(size(bodies%cosines, 3), i)))) waves_on = waves_on + 1
+    end do
+  end function waves_on
+
+  integer(i1) function mark_of(bodies, i, code, n_waves)
+    !! What solves body i.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i, code
+    integer, intent(inout) :: n_waves  !! the most so far
+    integer :: own_waves
+
+    if (code == CLOSED_FORM_OR_TAYLOR) then
+      mark_of = FREE
+      if (.not. feels_torque(bodies, i)) return
+      mark_of = LEFT
+      if (is_sphere(coefficients_of(bodies, i))) return
+    end if
+    own_waves = waves_on(bodies, i)
+    if (code >= IMPROVED_EULER .and. code <= RK4) then
+      mark_of = STEPPED
+      if (has_torque(bodies%rate(:, of_body(size(bodies%rate, 2), i)))) mark_of = LEFT
+      if (own_waves > 0) mark_of = LEFT
+    else if (own_waves > MOST_WAVES) then
+      mark_of = LEFT
+    else if (own_waves > 0) then
+      mark_of = WAVED
+      n_waves = max(n_waves, own_waves)
+    else
+      mark_of = RAMPED
+    end if
+  end function mark_of
+
+  pure logical function is_sphere(coefficients)
+    real(dp), intent(in) :: coefficients(3) !! A, B, C
+
+    is_sphere = all(abs(coefficients) <= 0.0_dp)
+  end function is_sphere
+
+  integer function single_code(bodies, i, code, with_attitude)
+    !! What the single kernel solves body i by, where `code` was asked for.
+    type(bodies_t), intent(in) :: bodies
+    integer, intent(in) :: i, code
+    logical, intent(in) :: with_attitude
+
+    single_code = code
+    if (code /= CLOSED_FORM_OR_TAYLOR) return
+    if (feels_torque(bodies, i)) then
+      single_code = TAYLOR
+      ! With attitude a sphere has no closed form under torque.
+      if (is_sphere(coefficients_of(bodies, i)) .and. .not. with_attitude) single_code = SPHERE
+    else if (with_attitude .and. .not. bodies%by_moments) then
+      ! Coefficients alone do not say which angular momentum the body has.
+      single_code = TAYLOR
+    end if
+  end function single_code
+
+end module many_kinds

@@ -1,0 +1,164 @@
+"""Prepared solvers of scenes with a full inertia matrix: about principal axes, and back.
+
+A scene about principal axes has the solvers of `prepared`, which enter the kernel from C. The
+solvers of this module rotate arguments and results in Python.
+"""
+
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.methods.many_starts import buffer_of, many_starts, rows_of
+from pyharness.methods.plan import Plan
+from pyharness.methods.prepared import Solver, no_buffer
+from pyharness.methods.prepared_attitude import AttitudeSolver
+from pyharness.model.attitude import IDENTITY, Quaternion, product, unit_quaternion
+from pyharness.model.errors import InputError
+from pyharness.model.principal import principal
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.values import Number, Numbers, three, three_floats
+
+
+class InertiaSolver(Solver):
+    """A scene with a full inertia matrix, prepared: see `Solver`.
+
+    Angular velocities are about the axes of the matrix. `plan` is that of the scene about principal
+    axes, and `growth` is a norm about them.
+    """
+
+    def __new__(
+        cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
+        scene: Scene | None = None,
+    ) -> Self:  # fmt: skip
+        """Prepare the scene about principal axes; `scene` is the one with the matrix."""
+        solver = super().__new__(cls, chosen, tolerance, asked, effort)
+        assert scene is not None
+        solver._scene = scene
+        solver._axes = principal(scene)[1]
+        return solver
+
+    _scene: Scene
+    _axes: Array  # columns
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a copy, in this process or another, be prepared as this one was."""
+        return type(self), (self.plan, *self._given, self._scene)
+
+    def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
+        """Return the angular velocity at `t_end`, about the axes of the matrix."""
+        start = np.array(three_floats("omega0", omega0))
+        if out is not None and (found := no_buffer(out)):
+            raise InputError(
+                f"out: {found}; allowed: a writable array of three float64 side by side"
+            )
+        end = rotated(super().__call__(rotated(start, self._axes.T), t_end), self._axes)
+        if out is None:
+            return end
+        out[:] = end
+        return out
+
+    @property
+    def many(self) -> Any:
+        """Solve many starts in one call, as `Solver.many` does."""
+        return self._many
+
+    def _many(
+        self, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
+    ) -> tuple[Array, NDArray[np.int8]]:
+        starts = rotated(rows_of("omega0", omega0, 3), self._axes.T)
+        if out is not None:
+            buffer_of("out", out, starts.shape, "d")
+        ends, status = many_starts(self._packed, starts, t_end, threads=threads, out=out)
+        ends[:] = rotated(ends, self._axes)
+        return ends, status
+
+    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
+        """Return rows from another start (rad/s) at `times` (s), as `Solver.trajectory` does."""
+        return self._rows(replace(self._scene, omega=three("omega0", omega0)), times)
+
+
+class InertiaAttitudeSolver(AttitudeSolver):
+    """A scene with a full inertia matrix, prepared with attitude: see `AttitudeSolver`.
+
+    Angular velocities and attitudes are those of the axes of the matrix.
+    """
+
+    def __new__(
+        cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
+        scene: Scene | None = None,
+    ) -> Self:  # fmt: skip
+        """Prepare the scene about principal axes; `scene` is the one with the matrix."""
+        solver = super().__new__(cls, chosen, tolerance, asked, effort)
+        assert scene is not None
+        solver._scene = scene
+        solver._axes, solver._turn = axes_and_turn(scene)
+        return solver
+
+    _scene: Scene
+    _axes: Array  # columns
+    _turn: Quaternion  # from principal axes to those of the matrix
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a copy, in this process or another, be prepared as this one was."""
+        return type(self), (self.plan, *self._given, self._scene)
+
+    def __call__(
+        self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
+    ) -> tuple[Array, Array]:
+        """Return angular velocity and attitude at `t_end`, those of the axes of the matrix."""
+        start = np.array(three_floats("omega0", omega0))
+        attitude = self._scene.attitude or IDENTITY
+        if attitude0 is not None:
+            attitude = unit_quaternion("attitude0", attitude0)[0]
+        omega, found = super().__call__(
+            rotated(start, self._axes.T), t_end, product(attitude, self._turn)
+        )
+        return rotated(omega, self._axes), turned_back(found, self._turn)
+
+
+def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
+    """Return the principal axes of a scene as columns, and as a quaternion."""
+    about_principal, axes = principal(replace(scene, attitude=IDENTITY))
+    return axes, about_principal.attitude or IDENTITY
+
+
+def rotated(vectors: Array, matrix: Array) -> Array:
+    """Return the matrix times each vector, shape (3,) or (n, 3); (n, 3, 3) has one for each.
+
+    Sums in a fixed order: the bits of a row do not depend on how many rows there are.
+    """
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.stack(
+        [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],
+        axis=-1,
+    )
+
+
+def turned_back(attitudes: Array, turn: Any) -> Array:
+    """Return attitudes of principal axes, shape (4,) or (n, 4), as those of the matrix's axes."""
+    w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
+    first, *rest = np.moveaxis(attitudes, -1, 0)
+    parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))
+    return np.stack(parts, axis=-1)
+
+
+def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
+    """Return a solver of a scene with a full inertia matrix."""
+    from pyharness.methods.plan import plan
+
+    about_principal, _ = principal(replace(scene, attitude=None))
+    return InertiaSolver(plan(about_principal, method, tolerance), tolerance, method, effort, scene)
+
+
+def prepared_inertia_attitude(
+    scene: Scene, method: str, tolerance: float, effort: float
+) -> InertiaAttitudeSolver:
+    """Return a solver with attitude of a scene with a full inertia matrix."""
+    from pyharness.methods.prepared_attitude import attitude_plan
+
+    about_principal, _ = principal(replace(scene, attitude=scene.attitude or IDENTITY))
+    chosen = attitude_plan(about_principal, method, tolerance)
+    return InertiaAttitudeSolver(chosen, tolerance, method, effort, scene)

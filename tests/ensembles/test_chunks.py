@@ -1,0 +1,30 @@
+"""A scene of a sweep has the same bits whatever the chunk that it is in."""
+
+from pathlib import Path
+
+import pytest
+
+from pyharness.ensembles.sweep import points, solve_points
+from pyharness.ensembles.sweep_file import read_sweep
+from tests.ensembles.sweeps import TILT, text, written
+
+TORQUE = '[[axis]]\nfield = "torque.constant.1"\nvalues = [0.0, 0.3, 0.7]'
+RATE = '[[axis]]\nfield = "torque.rate.2"\nvalues = [0.0, 0.1]'
+TIME = '[[axis]]\nfield = "t_end"\nfrom = 0.5\nto = 40.0\ncount = 4'
+
+
+@pytest.mark.parametrize("method", ["auto", "rk4"])
+@pytest.mark.parametrize("axes", [(TORQUE, TILT), (TILT, TORQUE, RATE, TIME)], ids=["two", "four"])
+def test_chunks_change_no_bit(axes: tuple[str, ...], method: str, tmp_path: Path) -> None:
+    """Torques of zero among others: a chunk may have no other, or one of each."""
+    if method == "rk4":
+        axes = tuple(each for each in axes if each != TIME)
+    solve = f'[solve]\nmethod = "{method}"'
+    sweep = read_sweep(written(tmp_path, text(*axes, solve)))
+    every = points(sweep, tuple(slice(0, n) for n in sweep.shape))
+    whole = solve_points(sweep, every)
+    for size in (1, 2, 3, 7, 64):
+        for first in range(0, sweep.n_scenes, size):
+            part = solve_points(sweep, [each[first : first + size] for each in every])
+            for name, values in part.items():
+                assert values.tobytes() == whole[name][first : first + size].tobytes()

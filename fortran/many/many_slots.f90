@@ -19,7 +19,11 @@ module many_slots
   ! what it leaves out is known and taken off.
   real(dp), parameter :: MORE = 3.0_dp
   real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
-  real(dp), parameter :: CANCELLED = 10.0_dp !! torque of terms that leave so little of each
+  ! Rounding of torques that cancel, in roundings of omega: nothing beside what else there is. More
+  ! counts only where it is a part of the tolerance, whatever the growth that these bodies may have.
+  real(dp), parameter :: LITTLE = 10.0_dp
+  real(dp), parameter, public :: MOST_GROWTH = 1000.0_dp
+  real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! of each radian of a wave
 
   type, public :: slots_t
@@ -86,6 +90,7 @@ contains
     type(problem_t) :: torque
     real(dp), target :: own(4, MOST_WAVES)
     real(dp) :: push, ramp, tolerance
+    real(dp) :: cancelled ! noise of a torque that is too much for here
     integer :: i, n
 
     call next_block(bodies%n, status, bodies%mark, r%block)
@@ -116,6 +121,7 @@ contains
     end do
     turned = 0.0_dp
     if (bodies%n_waves > 0) then
+      cancelled = max(LITTLE, SURE*tolerance/(ROUNDING*MOST_GROWTH))
       do i = 1, LANES
         call waves_of_body(bodies, r%block%at(i), waves(:, :bodies%n_waves, i))
       end do
@@ -144,7 +150,7 @@ contains
         torque%n_cosines = bodies%n_waves - torque%n_sines
         torque%sines => own(:, :torque%n_sines)
         torque%cosines => own(:, torque%n_sines + 1:bodies%n_waves)
-        if (torque_noise_of(torque, r%rest(i), 1.0_dp, -r%scale(i)) > CANCELLED) then
+        if (torque_noise_of(torque, r%rest(i), 1.0_dp, -r%scale(i)) > cancelled) then
           r%fits(i) = -1.0_dp
         end if
       end do

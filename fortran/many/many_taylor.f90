@@ -9,8 +9,8 @@ module many_taylor
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
-  use many_slots, only: FAR, fill, KIND_OF, make_ready, MOST_ORDER, put_in, ready_t, SHORTEST, &
-                        SLOTS, slots_t
+  use many_slots, only: FAR, fill, KIND_OF, make_ready, MOST_GROWTH, MOST_ORDER, put_in, ready_t, &
+                        SHORTEST, SLOTS, slots_t
   use statuses, only: COMPLETE
   implicit none(type, external)
   private
@@ -19,7 +19,6 @@ module many_taylor
   ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
   real(dp), parameter :: TRUSTED = 0.4_dp
   real(dp), parameter :: DOUBTED = 64.0_dp   ! growth at which it is half of that
-  real(dp), parameter :: MOST_GROWTH = 1000.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   ! Rounding times growth, in tolerances: a third of what the single kernel reports as sensitive, as
   ! it measures the growth from later instants too.

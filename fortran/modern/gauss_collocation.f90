@@ -15,7 +15,7 @@ module gauss_collocation
   private
 
   integer, parameter :: MOST_ITERATIONS = 60
-  integer, parameter :: PATIENT = 20 ! iterations that converge, if they do
+  integer, parameter :: PATIENT = 50 ! iterations that converge, if they do
   real(dp), parameter :: MOST_EVALUATIONS = 4e8_dp ! some ten seconds
   real(dp), parameter :: COUNTABLE = 4e18_dp
   real(dp), parameter :: BETWEEN_LOOKS = 5e5_dp ! at the user; right-hand sides, some 8 a step

@@ -125,8 +125,9 @@ def _turned(axis: Exact) -> Exact:
     return -axis[0], -axis[1], -axis[2]
 
 
-def _determinant(axes: list[Exact]) -> Fraction:
-    (a, b, c), (d, e, f), (g, h, k) = axes
+def _determinant(axes: list[Exact]) -> float:
+    """Return the determinant of orthonormal axes, 1 or -1, for which few digits will do."""
+    (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 
 

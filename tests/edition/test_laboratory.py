@@ -209,7 +209,7 @@ def test_what_an_address_has_wrong_is_told_in_a_line_and_the_default_taken(
     assert len(problems) == 1
     assert problems[0].startswith(told)
     assert "\n" not in problems[0]
-    assert len(problems[0]) < 200
+    assert len(problems[0]) < 240
     program = "two-term" if "two-term" in words else "runge-kutta"
     kept = [word for word in ("no-stop", "fix=stage-base") if word in words.split("&")[:-1]]
     assert fragment == "&".join([f"case=2&program={program}&listing=original", *kept])

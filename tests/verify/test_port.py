@@ -205,7 +205,7 @@ def test_too_few_rows_and_a_crash_later_end_the_checks(tmp_path: Path, capsys: C
     assert captured.err == ""
     told = " ".join(captured.out.split())
     assert "50 rows of a run of 100 steps that ended 'complete'" in told
-    assert "ended at the first of 16 cells that it did not answer" in told
+    assert "ended at the first of 32 cells that it did not answer" in told
 
 
 @pytest.mark.parametrize("command", ["no-such-port-here", "/"])

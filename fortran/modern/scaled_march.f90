@@ -57,7 +57,7 @@ contains
     y(:, 1) = start
     y(:, 2) = start
     top = abs(start)
-    ! The trapezoidal rule, whose last node is taken as a half after the loop.
+    ! The trapezoidal rule on every second step, whose last node is taken as a half after the loop.
     spread = 0.5_dp*top(2)
     ended = .false.
     do i = 1, 2*fours
@@ -112,17 +112,17 @@ contains
         x1 = ((x1 + sixth*a1) + third*(b1 + c1)) + sixth*d1
         x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
         x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
-        spread = spread + abs(x2)
       end do
       top(1) = max(top(1), abs(x1))
       top(2) = max(top(2), abs(x2))
+      spread = spread + abs(x2)
       top(3) = max(top(3), abs(x3))
       if (iand(i, BETWEEN_LOOKS) == 0) then
         ended = interrupt_raised() /= 0
         if (ended) exit
       end if
     end do
-    spread = abs(h)*(spread - 0.5_dp*abs(x2))
+    spread = 2.0_dp*abs(h)*(spread - 0.5_dp*abs(x2))
     x = [x1, x2, x3]
     gaps(:, 1) = x - y(:, 1)
     gaps(:, 2) = y(:, 1) - y(:, 2)
@@ -185,7 +185,7 @@ contains
     y(:, 1) = x + aside
     y(:, 2) = x - GAIN*aside
     top = abs(start)
-    ! The trapezoidal rule, whose last node is taken as a half after the loop.
+    ! The trapezoidal rule on every second step, whose last node is taken as a half after the loop.
     spread = 0.5_dp*top(2)
     s(:, 8) = motion%mean
     ended = .false.
@@ -261,17 +261,17 @@ contains
         x1 = ((x1 + sixth*a1) + third*(b1 + c1)) + sixth*d1
         x2 = ((x2 + sixth_2*a2) + third_2*(b2 + c2)) + sixth_2*d2
         x3 = ((x3 + sixth*a3) + third*(b3 + c3)) + sixth*d3
-        spread = spread + abs(x2 + s(2, end_))
       end do
       top(1) = max(top(1), abs(x1 + s(1, end_)))
       top(2) = max(top(2), abs(x2 + s(2, end_)))
+      spread = spread + abs(x2 + s(2, end_))
       top(3) = max(top(3), abs(x3 + s(3, end_)))
       if (iand(i, BETWEEN_LOOKS) == 0) then
         ended = interrupt_raised() /= 0
         if (ended) exit
       end if
     end do
-    spread = abs(h)*(spread - 0.5_dp*abs(x2 + s(2, 8)))
+    spread = 2.0_dp*abs(h)*(spread - 0.5_dp*abs(x2 + s(2, 8)))
     x = [x1, x2, x3]
     gaps(:, 1) = x - y(:, 1)
     gaps(:, 2) = y(:, 1) - y(:, 2)

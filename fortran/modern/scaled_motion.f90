@@ -233,6 +233,7 @@ contains
     real(dp), intent(in) :: top(3)       !! largest size of the unknowns
     real(dp), intent(out) :: exponent    !! integral of the logarithmic norm over time
     real(dp), intent(out) :: bound       !! in rad/s for rad/s
+    real(dp) :: size(3)                  ! of the scales, rad/s
     integer :: n
 
     exponent = spread
@@ -242,9 +243,10 @@ contains
       exponent = exponent + 2.0_dp*abs(t_end)*size_of(motion, n)
     end do
     exponent = min(MOST_EXPONENT, exponent)
+    size = abs(motion%scale)
     ! A power of two no less than the exponential, from its bits, costs no call.
     bound = transfer(ishft(1024_int64 + int(LOG2_E*exponent, int64), 52), bound) &
-            *(maxval(abs(motion%scale))/minval(abs(motion%scale)))
+            *(max(size(1), size(2), size(3))/min(size(1), size(2), size(3)))
   end subroutine amplification
 
   pure elemental real(dp) function versine(angle)

@@ -3,7 +3,7 @@ module taylor_attitude
   !! recurrence like that of omega, its error as a small turn in space, taken off the rows.
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
-  use taylor_error, only: remainder_of, rise
+  use taylor_error, only: rise, take_thirds
   use taylor_series, only: expand, MORE_TURNS, series_t
   use torque_terms, only: MOST_ORDER
   use two_words, only: two_sum
@@ -77,12 +77,11 @@ contains
                      0.0_dp, 0.0_dp)
   end subroutine begin_attitude
 
-  pure subroutine turn_error(s, order, unit, from_rest, before, carried, now)
+  pure subroutine turn_error(s, order, from_rest, before, carried, now)
     !! The error at the end of the step: what that of omega turns, by Hermite's cubic, and what the
     !! step leaves out of the attitude itself: where omega is steady that is all there is.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
-    real(dp), intent(in) :: unit       !! over which terms are near 1
     logical, intent(in) :: from_rest   !! the first step of a body at rest
     real(dp), intent(in) :: before(3)  !! error of omega where the step begins, rad/s
     real(dp), intent(in) :: carried(3) !! and where it ends, but for what it leaves out, rad/s
@@ -91,16 +90,15 @@ contains
 
     now%before = now%error
     q = now%q + s%turn
-    ! No pair of poles tells those of a turn that begins at no speed: its every second term is at
-    ! right angles to the one before.
-    call remainder_of(order + MORE_TURNS, s%turns, unit, from_rest, now%left)
-    now%left = now%left + (s%turns(:, order + 1) + s%turns(:, order + 2))
+    ! The next two terms are most of what is left out. A pair of poles could not tell those of a turn
+    ! that begins at no speed: its every second term is at right angles to the one before.
+    now%left = s%turns(:, order + 1) + s%turns(:, order + 2)
+    if (from_rest) call take_thirds(order + MORE_TURNS, s%turns, 1.0_dp, now%left)
     now%ends(:, 1) = now%q
     now%ends(:, 2) = q
     call rate_of_turn(s, s%terms(:3, 0), before, now%rates(:, 1), now%slopes(:, 1))
     call rate_of_turn(s, s%terms(:3, 0) + s%change(:3), carried, now%rates(:, 2), now%slopes(:, 2))
     now%error = error_within(now, order, 1.0_dp, q)
-    now%peak = max(now%peak, sum(abs(now%error)))
   end subroutine turn_error
 
   pure subroutine rate_of_turn(s, w, error, rate, slope)

@@ -26,7 +26,8 @@ module taylor_error
     integer :: steps_a_block
   end type blocks_t
 
-  public :: begin, count_step, growths_of, leave_out, likely_remainder, remainder_of, rise
+  public :: begin, count_step, growths_of, leave_out, leave_out_from_rest, likely_remainder, &
+            rise, take_thirds
 
 contains
 
@@ -43,16 +44,34 @@ contains
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
-  pure subroutine leave_out(s, order, unit, from_rest, left)
-    !! Sum of the terms of omega that a step leaves out; the error has it from here on.
+  pure subroutine leave_out(s, order, unit, left)
+    !! Sum of the terms of omega that a step leaves out, as if one pair of poles made its last four:
+    !! v(k + 1) = a v(k) - b v(k - 1), by least squares; the error has it from here on.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! over which terms are near 1, s/rad
-    logical, intent(in) :: from_rest   !! the first step of a body at rest
     real(dp), intent(out) :: left(4)   !! rad/s
+    real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
+    real(dp) :: x, u, v, w
+    real(dp) :: a, b, determinant
     integer :: i
 
-    call remainder_of(order, s%terms, unit, from_rest, left)
+    do i = 1, 4
+      x = unit*s%terms(i, order)
+      u = unit*s%terms(i, order - 1)
+      v = unit*s%terms(i, order - 2)
+      w = unit*s%terms(i, order - 3)
+      uu(i) = u*u + v*v
+      vv(i) = v*v + w*w
+      uv(i) = u*v + v*w
+      ux(i) = u*x + v*u
+      vx(i) = v*x + w*u
+    end do
+    call fit_poles((uu(1) + uu(2)) + uu(3), (vv(1) + vv(2)) + vv(3), (uv(1) + uv(2)) + uv(3), &
+                   (ux(1) + ux(2)) + ux(3), (vx(1) + vx(2)) + vx(3), a, b)
+    do i = 1, 4
+      left(i) = a*s%terms(i, order) - b*s%terms(i, order - 1)
+    end do
     do i = 1, 4
       s%lanes(i, 1) = s%lanes(i, 1) - FIRST(i)*left(1)
       s%lanes(i, 2) = s%lanes(i, 2) - FIRST(i)*left(2)
@@ -60,38 +79,17 @@ contains
     end do
   end subroutine leave_out
 
-  pure subroutine remainder_of(order, terms, unit, from_rest, left)
-    !! Sum of the terms beyond the order, of omega or of an attitude, as if one pair of poles made
-    !! the last four: v(k + 1) = a v(k) - b v(k - 1), by least squares.
+  pure subroutine leave_out_from_rest(s, order, unit, left)
+    !! The same where a body begins at rest.
+    type(series_t), intent(inout) :: s
     integer, intent(in) :: order
-    real(dp), intent(in) :: terms(4, 0:order)
-    real(dp), intent(in) :: unit       !! times which the last terms are near 1
-    logical, intent(in) :: from_rest
-    real(dp), intent(out) :: left(4)
-    real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
-    real(dp) :: x, u, v, w
-    real(dp) :: a, b, determinant
-    integer :: i
+    real(dp), intent(in) :: unit       !! s/rad
+    real(dp), intent(inout) :: left(4) !! as found before, rad/s
 
-    do i = 1, 4
-      x = unit*terms(i, order)
-      u = unit*terms(i, order - 1)
-      v = unit*terms(i, order - 2)
-      w = unit*terms(i, order - 3)
-      uu(i) = u*u + v*v
-      vv(i) = v*v + w*w
-      uv(i) = u*v + v*w
-      ux(i) = u*x + v*u
-      vx(i) = v*x + w*u
-    end do
-    call fit_poles((uu(1) + uu(2)) + (uu(3) + uu(4)), (vv(1) + vv(2)) + (vv(3) + vv(4)), &
-                   (uv(1) + uv(2)) + (uv(3) + uv(4)), (ux(1) + ux(2)) + (ux(3) + ux(4)), &
-                   (vx(1) + vx(2)) + (vx(3) + vx(4)), a, b)
-    do i = 1, 4
-      left(i) = a*terms(i, order) - b*terms(i, order - 1)
-    end do
-    if (from_rest) call take_thirds(order, terms, unit, left)
-  end subroutine remainder_of
+    s%lanes(1, :) = s%lanes(1, :) + left(:3)
+    call take_thirds(order, s%terms, unit, left)
+    s%lanes(1, :) = s%lanes(1, :) - left(:3)
+  end subroutine leave_out_from_rest
 
   pure subroutine fit_poles(uu, vv, uv, ux, vx, a, b)
     !! The pair of poles of v(k + 1) = a v(k) - b v(k - 1), for the sum of all terms beyond x, the
@@ -111,10 +109,10 @@ contains
 
   pure subroutine take_thirds(order, terms, unit, left)
     !! From rest a torque that grows with time makes every third term only, of which four in a row
-    !! tell nothing: the same with three terms for each, where that leaves out more.
+    !! tell nothing: the sum of all further terms with three for each, where that is more.
     integer, intent(in) :: order
     real(dp), intent(in) :: terms(4, 0:order)
-    real(dp), intent(in) :: unit
+    real(dp), intent(in) :: unit       !! over which terms are near 1
     real(dp), intent(inout) :: left(4)
     real(dp), dimension(4, 3) :: x, u, v, w
     real(dp) :: thirds(4)

@@ -8,7 +8,7 @@ module taylor_march
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_attitude, only: attitude_t, begin_attitude, expand_both, turn_error, turn_on
   use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out, &
-                          likely_remainder
+                          leave_out_from_rest, likely_remainder
   use taylor_plan, only: LEAST_SHARE, plan
   use taylor_rows, only: add_last_row, add_rows, outcome_t, state_t
   use taylor_series, only: carry, carry_precisely, expand, fitting, following, rescale, series_t, &
@@ -78,7 +78,7 @@ contains
     real(dp) :: coupling
     real(dp) :: farthest      ! in a step, rad: a spin has no terms that would tell
     logical :: at_end, with_attitude
-    logical :: from_rest      ! in the first step
+    logical :: from_rest      ! the first step of a body at rest
     integer(int64) :: decay   ! logarithm, of the last terms over two orders
     integer(int64) :: part    ! 65536 over the order
     integer :: order
@@ -184,21 +184,26 @@ contains
       else
         call carry(s)
       end if
-      from_rest = found%steps == 0 .and. .not. maxval(abs(omega)) > 0.0_dp
-      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), from_rest, left)
-      if (with_attitude) then
-        call turn_error(s, order, 1.0_dp/share, from_rest, error, s%lanes(1, :) + left(:3), &
-                        attitude)
-      end if
-      now%peak = max(now%peak, maxval(abs(error)))
+      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left)
       if (found%steps < FEW_STEPS) then
+        from_rest = found%steps == 0 .and. .not. maxval(abs(omega)) > 0.0_dp
+        if (from_rest) call leave_out_from_rest(s, order, 1.0_dp/max(allowed, tiny(h)), left)
         found%least = max(found%least, likely_remainder(order, s%terms)/max(now%scale, tiny(h)))
         if (with_attitude) found%least = max(found%least, 2.0_dp*likely_remainder(order, s%turns))
+      end if
+      if (with_attitude) then
+        call turn_error(s, order, from_rest, error, s%lanes(1, :) + left(:3), &
+                        attitude)
       end if
       call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
                     n_attitudes, attitudes, found)
       if (found%status /= COMPLETE) exit
       call count_step(precise, s%lanes, blocks)
+      if (blocks%steps == 0) then
+        ! Not at every step, which would take time.
+        now%peak = max(now%peak, maxval(abs(error)))
+        if (with_attitude) attitude%peak = max(attitude%peak, sum(abs(attitude%error)))
+      end if
       call add_change(s%change, now)
       if (with_attitude) call turn_on(s, attitude)
       found%steps = found%steps + 1

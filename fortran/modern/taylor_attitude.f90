@@ -90,8 +90,8 @@ contains
 
     now%before = now%error
     q = now%q + s%turn
-    ! The next two terms are most of what is left out. A pair of poles could not tell those of a turn
-    ! that begins at no speed: its every second term is at right angles to the one before.
+    ! The next two terms are most of what is left out. A pair of poles could not tell those of a
+    ! turn that begins at no speed: its every second term is at right angles to the one before.
     now%left = s%turns(:, order + 1) + s%turns(:, order + 2)
     if (from_rest) call take_thirds(order + MORE_TURNS, s%turns, 1.0_dp, now%left)
     now%ends(:, 1) = now%q

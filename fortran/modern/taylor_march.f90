@@ -189,9 +189,9 @@ contains
         from_rest = found%steps == 0 .and. .not. maxval(abs(omega)) > 0.0_dp
         if (from_rest) call leave_out_from_rest(s, order, 1.0_dp/max(allowed, tiny(h)), left)
         found%least = max(found%least, likely_remainder(order, s%terms)/max(now%scale, tiny(h)))
-        if (with_attitude) found%least = max(found%least, 2.0_dp*likely_remainder(order, s%turns))
       end if
       if (with_attitude) then
+        found%least = max(found%least, 2.0_dp*likely_remainder(order, s%turns))
         call turn_error(s, order, from_rest, error, s%lanes(1, :) + left(:3), &
                         attitude)
       end if

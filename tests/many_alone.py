@@ -26,7 +26,7 @@ _WAVES = 3  # sines and as many cosines; one batch in eight has more than lanes 
 _LITTLE_WORK = 1e-4  # seconds are spent on many bodies, not on a few that give up
 
 
-def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> dict[str, Array]:
+def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> dict[str, Any]:
     """Draw bodies of every kind, in random order, as the arrays of `solve_many`."""
     rng = np.random.default_rng([seed, n])
     body = 10.0 ** rng.uniform(-1.0, 1.0, (n, 3)) if by_moments else rng.uniform(-1, 1, (n, 3))
@@ -108,13 +108,13 @@ def same_bits(one: Ensemble, other: Ensemble, rows: Any = slice(None)) -> NDArra
     return same
 
 
-def parts_of(drawn: dict[str, Array], rows: Any) -> dict[str, Array]:
+def parts_of(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
     """Return some of the bodies."""
     return {name: values[rows] for name, values in drawn.items()}
 
 
 def regroupings(
-    drawn: dict[str, Array], rng: np.random.Generator, alone: int
+    drawn: dict[str, Any], rng: np.random.Generator, alone: int
 ) -> Iterator[tuple[str, Any, int]]:
     """Yield ways to deal out bodies: a name, rows, threads."""
     n = len(drawn["omega0"])
@@ -144,7 +144,7 @@ def regroupings(
 
 
 def differing(
-    drawn: dict[str, Array], seed: int, alone: int = _ALONE, **settings: Any
+    drawn: dict[str, Any], seed: int, alone: int = _ALONE, **settings: Any
 ) -> dict[str, set[int]]:
     """Return by the way they were dealt out the bodies whose result changed."""
     rng = np.random.default_rng(seed)

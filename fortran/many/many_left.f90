@@ -160,8 +160,8 @@ contains
   end subroutine pack
 
   subroutine tell_sensitive(packed, n_packed, omega0, time, steps, status)
-    !! Report a result as sensitive where a prepared solver does: a closed form and Gauss collocation
-    !! measure no error amplification by themselves.
+    !! Report a result as sensitive where a prepared solver does: a closed form and Gauss
+    !! collocation measure no error amplification by themselves.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)   !! rad/s

@@ -11,7 +11,7 @@ module many_slots
 
   integer, parameter, public :: SLOTS = 16      !! bodies on their way
   integer, parameter, public :: MOST_ORDER = 24
-  integer, parameter, public :: KIND_OF = 5     !! of a wave: 1 of a cosine; the rest as in problem_t
+  integer, parameter, public :: KIND_OF = 5     !! place in a wave: 1 of a cosine, else 0
   real(dp), parameter :: SURE = 0.03_dp !! error of the waves' angles, in tolerances
   real(dp), parameter, public :: SHORTEST = 1e-7_dp !! step over the time
   real(dp), parameter, public :: FAR = 1e60_dp  !! from 1: products of such rates are numbers
@@ -129,7 +129,7 @@ contains
       do n = 1, bodies%n_waves
         do i = 1, LANES
           waves(:3, n, i) = waves(:3, n, i)/moments(i, :)
-          call add_wave_rates(waves(:4, n, i), .not. waves(KIND_OF, n, i) > 0.0_dp, coupling(i), &
+          call add_wave_rates(waves(:4, n, i), waves(KIND_OF, n, i) <= 0.0_dp, coupling(i), &
                               r%rest(i), gain(i), rate(i), turned(i))
           fastest(i) = max(fastest(i), abs(waves(4, n, i)))
           if (.not. all(abs(waves(:, n, i)) <= FAR)) r%fits(i) = -1.0_dp

@@ -1,6 +1,7 @@
 """A result in a batch: its bits depend on that body alone, its status is a single solver's."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,6 @@ import pytest
 from pyharness import Ensemble, Scene, TorqueLaw, prepare, solve, solve_many
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import extension
-from pyharness.model.trajectory import Array
 from tests.many_alone import BASE, METHODS, differing, differing_starts, mixed, same_bits
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(3.0, 2.0, 1.0))
@@ -82,7 +82,7 @@ def test_a_torque_that_is_no_number_refuses_its_body() -> None:
     assert np.isnan(found.omega[2]).all()
 
 
-def unstable(n: int, seed: int, with_torque: bool) -> dict[str, Array]:
+def unstable(n: int, seed: int, with_torque: bool) -> dict[str, Any]:
     """Draw bodies beside steady rotations: about the middle axis, or any that a torque holds."""
     rng = np.random.default_rng([seed, with_torque])
     moments = 10.0 ** rng.uniform(-0.5, 0.5, (n, 3))

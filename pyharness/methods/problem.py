@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 
@@ -73,6 +72,8 @@ def remainders(scene: Scene) -> Triple:
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
         return 0.0, 0.0, 0.0
     i1, i2, i3 = moments
+    from fractions import Fraction
+
     a, b, c = map(Fraction, found)
     return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 

@@ -10,9 +10,9 @@ import numpy as np
 from pyharness.model.diagonal import diagonalised
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
+from pyharness.model.values import Matrix as Matrix
 from pyharness.model.values import Triple, several, three
 
-Matrix = tuple[Triple, Triple, Triple]
 Exact = tuple[Fraction, Fraction, Fraction]
 
 _ALIKE = 1e-12  # of the largest entry: so much may two entries differ that ought to be the same

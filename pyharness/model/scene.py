@@ -5,7 +5,6 @@ import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import TYPE_CHECKING, SupportsIndex
 
 from pyharness.model.attitude import Quaternion, unit_quaternion
@@ -13,8 +12,8 @@ from pyharness.model.errors import InputError, kind_of, printable, unknown
 from pyharness.model.facts import facts
 from pyharness.model.functions import cosine, sine
 from pyharness.model.impossible import warn_of_impossible
-from pyharness.model.inertia import Exact, Matrix, breaks_triangle, checked_inertia
 from pyharness.model.values import (
+    Matrix,
     Number,
     Numbers,
     finite,
@@ -25,6 +24,9 @@ from pyharness.model.values import (
     whole,
 )
 from pyharness.model.values import Triple as Triple
+
+if TYPE_CHECKING:
+    from pyharness.model.inertia import Exact
 
 Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
 # What the waves of a law may be given as: pairs of three numbers and one.
@@ -179,6 +181,8 @@ class Scene:
         if self.coefficients is not None:
             self._set("coefficients", three("[body] coefficients", self.coefficients))
         if self.inertia is not None:
+            from pyharness.model.inertia import checked_inertia
+
             self._set("inertia", checked_inertia("[body] inertia", self.inertia))
         self._set("omega", three("[initial] omega", self.omega))
         if self.attitude is not None:
@@ -228,7 +232,7 @@ class Scene:
         return (second - third) / first, (third - first) / second, (first - second) / third
 
     @property
-    def exact_moments(self) -> Exact | None:
+    def exact_moments(self) -> "Exact | None":
         """The principal moments without rounding (kg m2); None where only coefficients are known.
 
         InputError for a full inertia matrix.
@@ -237,6 +241,9 @@ class Scene:
             return None
         if self.moments is None:
             raise InputError(FULL_INERTIA)
+        # Who runs a program needs no exact numbers.
+        from fractions import Fraction
+
         first, second, third = map(Fraction, self.moments)
         return first, second, third
 
@@ -249,6 +256,8 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether the moments break the triangle inequality, so that no body has them."""
         if self.inertia is not None:
+            from pyharness.model.inertia import breaks_triangle
+
             return breaks_triangle(self.inertia)
         if self.moments is None:
             return False

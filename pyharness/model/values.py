@@ -9,6 +9,7 @@ from typing import SupportsFloat, SupportsIndex
 from pyharness.model.errors import InputError, kind_of
 
 Triple = tuple[float, float, float]
+Matrix = tuple[Triple, Triple, Triple]
 # float() makes one of Python's of it, though not of text: int, Fraction, Decimal, NumPy's scalars.
 Number = SupportsFloat | SupportsIndex
 # A list, a tuple, an array, a generator.

@@ -1,5 +1,6 @@
 """Hostile input: devices, pipes, counts without end, letters that steer a terminal."""
 
+import importlib
 import os
 import re
 import time
@@ -178,7 +179,8 @@ def test_folder_that_can_not_be_made_is_refused_before_any_work(
     name: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Permissions let a superuser do all; making a folder tells."""
-    monkeypatch.setattr("pyharness.edition.site.build_site", lambda *_: pytest.fail("worked"))
+    site = importlib.import_module("pyharness.edition.site")
+    monkeypatch.setattr(site, "build_site", lambda *_: pytest.fail("worked"))
     assert "give a" in _refusal(f"edition --out {name}", capsys)
     assert list(Path().iterdir()) == []
 

@@ -216,7 +216,8 @@ def test_one_scene_alone(capsys: pytest.CaptureFixture[str]) -> None:
 
 def _answer(of: Draw, growth: float, ended: str, error: float) -> Answer:
     truth = replace(of.truth, growth=growth)
-    return Answer(replace(of, truth=truth, tolerance=1e-9), "solve taylor", "taylor", ended, error)
+    draw = replace(of, truth=truth, tolerance=1e-9, kinds=("all",))
+    return Answer(draw, "solve taylor", "taylor", ended, error, growth=growth)
 
 
 @pytest.mark.parametrize(

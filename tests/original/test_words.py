@@ -251,7 +251,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="vectors"):
             answers(path)
     vector = {"name": "", "op": "FX+", "x": "0" * 20, "y": "0" * 20, "result": "0" * 19}
-    path.write_text(json.dumps([vector]))
+    path.write_text(json.dumps({"schema": 1, "vectors": [vector]}))
     with pytest.raises(InputError, match="entry 1: result"):
         answers(path)
     path.write_text(json.dumps([{**vector, "result": "0" * 20, "op": "XX"}]))

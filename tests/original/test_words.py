@@ -254,7 +254,8 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     path.write_text(json.dumps({"schema": 1, "vectors": [vector]}))
     with pytest.raises(InputError, match="entry 1: result"):
         answers(path)
-    path.write_text(json.dumps([{**vector, "result": "0" * 20, "op": "XX"}]))
+    unknown = {**vector, "result": "0" * 20, "op": "XX"}
+    path.write_text(json.dumps({"schema": 1, "vectors": [unknown]}))
     with pytest.raises(InputError, match="entry 1: unknown instruction"):
         answers(path)
     with pytest.raises(InputError, match="No such file"):

@@ -189,7 +189,7 @@ contains
   end subroutine solve_as_given
 
   subroutine compare_with_series(problem, omega0, tolerance, effort, times, omega, ended, found)
-    !! Error and growth of a result whose method can't tell what the motion makes of rounding.
+    !! Error and growth of a result whose method does not measure the amplification of rounding.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: tolerance, effort

@@ -141,7 +141,7 @@ contains
   end function likely_remainder
 
   pure function rise(factors, w, error)
-    !! Of a small difference, times the step, rad/s.
+    !! Rate of change of a perturbation, times the step, rad/s.
     real(dp), intent(in) :: factors(3), w(3), error(3)
     real(dp) :: rise(3)
 

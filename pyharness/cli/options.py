@@ -106,7 +106,7 @@ def chosen_effort(options: argparse.Namespace) -> float:
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
-    """Return the requested tolerance; None where none is given, which is the method's default."""
+    """Return the requested tolerance, or None for the default of the method."""
     if options.tolerance is None:
         return None
     return positive(options.tolerance, "--tolerance", 1.0)

@@ -177,9 +177,9 @@ def prepare(
     method : str
         A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
     tolerance : float
-        Largest error of any component at the end, relative to the largest on the way; by default
-        the method's own, as in `solve`. Methods with a fixed step do not look at it. Where small
-        differences grow by a factor K on the way, no method keeps less than some 1e-15 K.
+        Largest error of any component at the end, relative to the largest |omega| until then; by
+        default the method's own, as in `solve`. Methods with a fixed step ignore it. Where the
+        motion amplifies perturbations K times, no method has an error below some 1e-15 K.
     effort : float
         Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
     attitude : bool

@@ -1,6 +1,6 @@
 module many_bodies
-  !! Many bodies in one call: side by side where those kernels are accurate enough, the others one by
-  !! one. Which kernel solves a body depends on that body alone.
+  !! Many bodies in one call: side by side where those kernels are accurate enough, the others one
+  !! by one. Which kernel solves a body depends on that body alone.
   use, intrinsic :: iso_c_binding, only: c_loc
   use bodies, only: bodies_t, FREE, i1, LEFT, RAMPED, STEPPED, WAVED
   use kinds, only: dp

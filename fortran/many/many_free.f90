@@ -19,7 +19,8 @@ module many_free
   real(dp), parameter :: ERROR = 8.0_dp*2.0_dp**(-53)
   real(dp), parameter :: FAR = 1e100_dp ! from 1: products of such moduli are numbers
   ! A result whose rounding may be amplified beyond UNSURE tolerances is left to the single kernel,
-  ! which measures that. Parts of the largest growth for the amplitudes and for the phase.
+  ! which measures that. A first bound takes no division and no root; its parts of the largest
+  ! growth for the amplitudes and for the phase.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: UNSURE = 0.3_dp
   real(dp), parameter :: ABOVE_ESTIMATE = 1.5_dp ! as in torque_free_differences.f90
@@ -39,6 +40,7 @@ module many_free
     real(dp), dimension(LANES) :: turning   !! square of the growth of phase in 1 s, times `most`
     real(dp), dimension(LANES) :: most      !! square of the largest one, times what both divide by
     real(dp), dimension(LANES) :: rate      !! square of the exponential rate of growth, 1/s2
+    real(dp), dimension(LANES) :: unsure    !! 1 where the first bound of the growth is not enough
     real(dp), dimension(LANES) :: a, b      !! of the mean
     real(dp), dimension(LANES) :: half      !! of their difference
     real(dp), dimension(LANES) :: frequency
@@ -85,10 +87,12 @@ contains
       call turn(m, t, o)
       call descend(m, o)
       call finish(m, o, w)
+      if (maxval(o%unsure(1:m)) > 0.0_dp) call ask_again(m, bodies%tolerance, a, w, t, o)
       call turn_back(m, o%odd, w)
       call put_back(block, w, omega)
       do i = 1, block%there
-        status(block%at(i)) = merge(int(COMPLETE, i1), LEFT, o%error(i) <= bodies%tolerance)
+        status(block%at(i)) = merge(int(COMPLETE, i1), LEFT, o%error(i) <= bodies%tolerance &
+                                    .and. .not. o%unsure(i) > 0.0_dp)
       end do
     end do
   end subroutine many_free_solve
@@ -149,7 +153,7 @@ contains
       ! What rounding makes of a small gap, it makes of the frequency.
       o%error(i) = ERROR*(left + right)/gap
       if (.not. o%odd(i) > 0.0_dp) o%error(i) = NEVER
-      ! torque_free_growth_bound, squared and without a division.
+      ! A number above torque_free_growth_bound, squared and without a division.
       c1 = s2*y1 + s1*y2
       c3 = s3*y2 + s2*y3
       s12 = s1*s2
@@ -206,8 +210,9 @@ contains
       o%denominator(i) = inverse*(1.0_dp + 0.25_dp*square)
       ! One more level would take that off.
       o%frequency(i) = (o%a(i) - 0.25_dp*square*o%a(i))*t(i)
-      if (.not. (o%turning(i)*(t(i)*t(i)) <= o%most(i) &
-                 .or. o%rate(i)*(t(i)*t(i)) <= 1.0_dp)) error = NEVER
+      o%unsure(i) = 1.0_dp
+      if (o%turning(i)*(t(i)*t(i)) <= o%most(i) &
+          .or. o%rate(i)*(t(i)*t(i)) <= 1.0_dp) o%unsure(i) = 0.0_dp
       if (.not. abs(t(i)) > 0.0_dp) error = NEVER ! omega as it is
       o%error(i) = error + error*abs(o%frequency(i))
     end do
@@ -275,5 +280,50 @@ contains
       w(i, 3) = third
     end do
   end subroutine finish
+
+  pure subroutine ask_again(m, tolerance, a, w, t, o)
+    !! torque_free_growth_bound of the bodies whose first bound of the growth is not enough.
+    integer, intent(in) :: m
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(in) :: a(LANES, 3), w(LANES, 3) !! rad/s, at the end
+    real(dp), intent(in) :: t(LANES) !! s
+    type(orbits_t), intent(inout) :: o
+    real(dp) :: enough, s1, s2, s3, y1, y2, y3, gap, c1, c3, speed, relative, amplified
+    real(dp) :: larger, smaller, mean, share, total
+    integer :: i, level
+
+    enough = UNSURE*tolerance/(ABOVE_ESTIMATE*ROUNDING)
+    do i = 1, m
+      s1 = abs(a(i, 1))
+      s2 = abs(a(i, 2))
+      s3 = abs(a(i, 3))
+      speed = max(s1*abs(w(i, 2)*w(i, 3)), s2*abs(w(i, 3)*w(i, 1)), s3*abs(w(i, 1)*w(i, 2)))
+      if (o%gap(i) < 0.0_dp) then
+        s1 = abs(a(i, 3))
+        s3 = abs(a(i, 1))
+      end if
+      y1 = o%omega1(i)*o%omega1(i)
+      y2 = o%omega2(i)*o%omega2(i)
+      y3 = o%omega3(i)*o%omega3(i)
+      gap = abs(o%gap(i))
+      c1 = s2*y1 + s1*y2
+      c3 = s3*y2 + s2*y3
+      larger = sqrt(s1*c3)
+      smaller = sqrt(s2*gap)
+      total = 0.0_dp
+      do level = 1, LEVELS
+        mean = 0.5_dp*(larger + smaller)
+        total = total + 2.0_dp**(level - 3)*(larger - smaller)**2
+        smaller = sqrt(larger*smaller)
+        larger = mean
+      end do
+      share = 0.5_dp
+      if (s1*c3 > s2*gap) share = max(0.0_dp, 0.5_dp - total/(s1*c3 - s2*gap))
+      relative = (1.0_dp - share)*sqrt((s2 + s3)/c3) &
+                 + share*(s1*sqrt(c3/s2) + s3*sqrt(c1/s2))/gap
+      amplified = sqrt(max(1.0_dp, s1/s2, s2/s1, s3/s2))*(s1/s2)*(c3/gap)
+      if (amplified + abs(t(i))*speed*relative <= enough) o%unsure(i) = 0.0_dp
+    end do
+  end subroutine ask_again
 
 end module many_free

@@ -21,14 +21,16 @@ module torque_free_differences
   ! Largest quotient of the growth and its estimate, of random bodies and times, with a margin.
   real(dp), parameter :: ABOVE_ESTIMATE = 1.5_dp
 
+  integer, parameter :: LEVELS = 8 ! of the arithmetic-geometric mean
+
   public :: torque_free_growth_of
 
 contains
 
-  pure subroutine torque_free_growth_bound(coefficients, omega0, t_end, bound, amplified)
+  subroutine torque_free_growth_bound(coefficients, omega0, t_end, bound, amplified)
     !! A number above the growth that costs a hundredth of it; huge where none is known.
     !! A perturbation changes the amplitudes and the frequency of a motion. The change of frequency
-    !! becomes a phase in proportion to the time.
+    !! becomes a shift of time, in proportion to the time.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C
     real(dp), intent(in) :: omega0(3)        !! rad/s
     real(dp), intent(in) :: t_end            !! s
@@ -37,9 +39,12 @@ contains
     real(dp) :: s(3), y(3)       ! |coefficients| and squares of omega0; 2 is the axis of odd sign
     real(dp) :: near, far        ! s(1) y(3) and s(3) y(1), the larger one first
     real(dp) :: gap, first, third ! integrals of the motion
-    real(dp) :: most(3)          ! largest |omega| along each axis
-    real(dp) :: speed, relative  ! largest rate of omega; derivative of the frequency, over itself
-    integer :: odd, axes(3)
+    real(dp) :: most(3)          ! largest |omega| along axes 1 and 3
+    real(dp) :: row(3, 1)        ! omega at t_end
+    real(dp) :: speed            ! largest component of the rate of omega, there
+    real(dp) :: relative         ! derivative of the frequency's logarithm
+    real(dp) :: share            ! of `gap` in the frequency
+    integer :: odd, axes(3), n, status
 
     bound = huge(bound)
     amplified = bound
@@ -49,6 +54,9 @@ contains
       if (s(1)*s(3) >= 0.0_dp .and. s(1)*s(2) <= 0.0_dp .and. s(2)*s(3) <= 0.0_dp) exit
     end do
     if (odd > 3) return
+    call torque_free_rows(coefficients, EXACTLY, omega0, 1, [t_end], row, n, status)
+    if (n < 1) return
+    speed = maxval(abs(coefficients*row([2, 3, 1], 1)*row([3, 1, 2], 1)))
     s = abs(s)
     y = omega0(axes)**2
     near = s(1)*y(3)
@@ -62,12 +70,37 @@ contains
     first = s(2)*y(1) + s(1)*y(2)
     third = s(3)*y(2) + s(2)*y(3)
     most = sqrt([first/s(2), first/s(1), third/s(2)])
-    speed = max(s(1)*most(2)*most(3), s(2)*most(1)*most(3), s(3)*most(1)*most(2))
-    relative = (s(3)*most(2) + s(2)*most(3))/third + (s(1)*most(3) + s(3)*most(1))/gap
+    share = share_of_smaller(s(1)*third, s(2)*gap)
+    relative = (1.0_dp - share)*sqrt((s(2) + s(3))/third) &
+               + share*(s(1)*most(3) + s(3)*most(1))/gap
     amplified = sqrt(max(1.0_dp, s(1)/s(2), s(2)/s(1), s(3)/s(2)))*(s(1)/s(2))*(third/gap)
     bound = ABOVE_ESTIMATE*(amplified + abs(t_end)*speed*relative)
     if (.not. bound <= huge(bound)) bound = huge(bound)
   end subroutine torque_free_growth_bound
+
+  pure function share_of_smaller(larger, smaller) result(share)
+    !! The derivative of the logarithm of the arithmetic-geometric mean of two roots, by that of the
+    !! smaller root; with that of the larger one it adds up to 1.
+    real(dp), intent(in) :: larger, smaller !! squares
+    real(dp) :: share
+    real(dp) :: a, b, mean, total, weight
+    integer :: level
+
+    share = 0.5_dp
+    if (.not. larger > smaller) return
+    a = sqrt(larger)
+    b = sqrt(smaller)
+    total = 0.0_dp
+    weight = 1.0_dp
+    do level = 1, LEVELS
+      mean = 0.5_dp*(a + b)
+      total = total + weight*(0.5_dp*(a - b))**2
+      weight = 2.0_dp*weight
+      b = sqrt(a*b)
+      a = mean
+    end do
+    share = max(0.0_dp, share - total/(larger - smaller))
+  end function share_of_smaller
 
   function torque_free_growth_of(coefficients, omega0, t_end, enough) result(growth)
     !! The largest derivative of omega at `t_end` by omega at any of 64 instants before, 0 among

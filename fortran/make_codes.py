@@ -16,10 +16,15 @@ def _module(codes: type) -> Iterator[str]:
     name = codes.__name__.lower()
     yield f"module {name}"
     yield "  !! Written by fortran/make_codes.py; pyharness/model/codes.py says what is what."
+    numbers = {each: value for each, value in vars(codes).items() if each.isupper()}
+    if any(isinstance(value, float) for value in numbers.values()):
+        yield "  use, intrinsic :: iso_fortran_env, only: real64"
     yield "  implicit none(type, external)"
     yield "  private"
-    for each, value in vars(codes).items():
-        if each.isupper():
+    for each, value in numbers.items():
+        if isinstance(value, float):
+            yield f"  real(real64), parameter, public :: {each} = {value!r}_real64"
+        else:
             yield f"  integer, parameter, public :: {each} = {value}"
     yield f"end module {name}"
 

@@ -4,13 +4,13 @@ module many_slots
   use kinds, only: dp
   use many_columns, only: block_t, columns_of, equations_of, next_block, times_of
   use problem, only: problem_t
+  use series, only: MOST_ORDER
   use taylor_plan, only: add_wave_rates, share_and_step, steady_rates
   use torque_noise, only: torque_noise_of
   implicit none(type, external)
   private
 
   integer, parameter, public :: SLOTS = 16      !! bodies on their way
-  integer, parameter, public :: MOST_ORDER = 24
   integer, parameter, public :: KIND_OF = 5     !! place in a wave: 1 of a cosine, else 0
   real(dp), parameter :: SURE = 0.03_dp !! error of the waves' angles, in tolerances
   real(dp), parameter, public :: SHORTEST = 1e-7_dp !! step over the time

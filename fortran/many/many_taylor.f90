@@ -9,8 +9,9 @@ module many_taylor
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
-  use many_slots, only: FAR, fill, KIND_OF, make_ready, MOST_GROWTH, MOST_ORDER, put_in, ready_t, &
+  use many_slots, only: FAR, fill, KIND_OF, make_ready, MOST_GROWTH, put_in, ready_t, &
                         SHORTEST, SLOTS, slots_t
+  use series, only: MOST_ORDER
   use statuses, only: COMPLETE
   implicit none(type, external)
   private

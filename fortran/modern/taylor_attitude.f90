@@ -3,9 +3,9 @@ module taylor_attitude
   !! recurrence like that of omega, its error as a small turn in space, taken off the rows.
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
+  use series, only: MOST_ORDER
   use taylor_error, only: rise, take_thirds
   use taylor_series, only: expand, MORE_TURNS, series_t
-  use torque_terms, only: MOST_ORDER
   use two_words, only: two_sum
   implicit none(type, external)
   private

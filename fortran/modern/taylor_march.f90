@@ -5,11 +5,12 @@ module taylor_march
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: problem_t
+  use series, only: LEAST_SHARE, SLACK
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_attitude, only: attitude_t, begin_attitude, expand_both, turn_error, turn_on
   use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out, &
                           leave_out_from_rest, likely_remainder
-  use taylor_plan, only: LEAST_SHARE, plan
+  use taylor_plan, only: plan
   use taylor_rows, only: add_last_row, add_rows, outcome_t, state_t
   use taylor_series, only: carry, carry_precisely, expand, fitting, following, rescale, series_t, &
                            size_of
@@ -22,7 +23,6 @@ module taylor_march
   integer, parameter :: MOST_TRIES = 60
   real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
   real(dp), parameter :: GROWING = 1.3_dp ! power of time with which steps do, not by chance
-  real(dp), parameter :: SLACK = 16.0_dp ! before a step does not pass
   ! Radians about the body in a step: differences turn where omega does not.
   real(dp), parameter :: A_STEP = 60.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp

@@ -4,11 +4,10 @@ module taylor_plan
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: problem_t
-  use torque_terms, only: LEAST_ORDER, MOST_ORDER
+  use series, only: LEAST_ORDER, LEAST_SHARE, MOST_ORDER
   implicit none(type, external)
   private
 
-  real(dp), parameter, public :: LEAST_SHARE = 1.0e-19_dp ! well below rounding
   real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
 
   public :: add_wave_rates, plan, share_and_step, steady_rates

@@ -4,7 +4,7 @@ module taylor_series
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use torque_terms, only: MOST_ORDER
+  use series, only: MOST_ORDER
   implicit none(type, external)
   private
 

@@ -2,11 +2,11 @@ module torque_terms
   !! Torque over moment, constant + rate t + sines + cosines, in the Taylor terms of omega.
   use kinds, only: dp
   use problem, only: problem_t
+  use series, only: MOST_ORDER
   use two_words, only: sine_cosine_of
   implicit none(type, external)
   private
 
-  integer, parameter, public :: LEAST_ORDER = 12, MOST_ORDER = 24 ! of the series
   ! Weights in fours: eight orders more than the series has, for sine and cosine of the turn.
   integer, parameter :: MOST_FOURS = MOST_ORDER/4 + 2
   integer :: order_

@@ -47,6 +47,15 @@ class Places:
     WAVES = 24  # four for each sine, then for each cosine
 
 
+class Series:
+    """Limits of the Taylor series."""
+
+    LEAST_ORDER = 12
+    MOST_ORDER = 24
+    LEAST_SHARE = 1e-19  # part of omega that a step may leave out, well below rounding
+    SLACK = 16.0  # times that part, before a step does not pass
+
+
 class Waves:
     """Of our own sine in binary128 (`wide_functions.f90`)."""
 

@@ -11,6 +11,7 @@ from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.compare.checks import Check
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
+from pyharness.model.codes import Series
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import Listing
@@ -38,10 +39,8 @@ _HALFWAY = 0.25
 # A phase error (rad) beyond which its linear measure says only that it is large.
 _LOST = 0.1
 
-# Of fortran/modern/taylor.f90: the part of omega that the last two terms may have, and how often
-# that before a step is taken again.
-_LEAST_SHARE, _SLACK = 1e-19, 16.0
-_ORDER = 28
+# At the finest tolerance the last two terms of the series have no larger part of omega.
+_LEFT_OUT = Series.SLACK * Series.LEAST_SHARE
 # Steps of Gauss collocation, in radians of the fastest rate: with 8 stages truncation is far below
 # rounding, with 4 it leads the phase and must leave energy alone.
 _PARTS = {8: 1.0, 4: 0.25}
@@ -102,7 +101,7 @@ MARCHERS = {
     # SLACK shares; what follows them falls at least by halves.
     "taylor": Marcher(
         _taylor,
-        partial(brouwer.taylor_noise, order=_ORDER, left_out=_SLACK * _LEAST_SHARE),
+        partial(brouwer.taylor_noise, order=Series.MOST_ORDER, left_out=_LEFT_OUT),
         1e6,
         10**5.5,
         preference=True,

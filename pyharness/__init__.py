@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pyharness.compare.comparison import Comparison, compare_programs
     from pyharness.methods.many import Ensemble, solve_many
-    from pyharness.methods.prepared import Solver, prepare
+    from pyharness.methods.prepared import prepare
     from pyharness.methods.solve import solve
+    from pyharness.methods.solver import Solver
     from pyharness.model.errors import InputError, NotBuiltError
     from pyharness.model.impossible import ImpossibleBodyWarning
     from pyharness.model.listing import Listing, subset
@@ -61,7 +62,8 @@ _ROOMS = {
     "original.many": ("ProgramEnsemble", "run_many"),
     "original.programs": ("run_program",),
     "methods.many": ("Ensemble", "solve_many"),
-    "methods.prepared": ("Solver", "prepare"),
+    "methods.prepared": ("prepare",),
+    "methods.solver": ("Solver",),
     "methods.solve": ("solve",),
 }
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.methods.plan import EITHER
-from pyharness.methods.prepared import CODES as _CODES
+from pyharness.methods.solver import CODES as _CODES
 from pyharness.model.codes import Places
 from pyharness.model.extension import GAVE_UP, OVERFLOW, SENSITIVE
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.bench.ensemble_contenders import HORIZON, EnsembleLoad
+from pyharness.bench.ensemble_contenders import HORIZON, EnsembleLoad, coefficients
 from pyharness.model.trajectory import Array
 
 LANES = 64  # of a block
@@ -47,8 +47,6 @@ def numba_rk4(
 
 @cache
 def _rates() -> Array:
-    from pyharness.bench.ensemble_peers import coefficients
-
     return np.array(coefficients())
 
 

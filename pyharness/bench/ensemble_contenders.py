@@ -9,12 +9,18 @@ from pyharness.methods.many import solve_many
 from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
+from pyharness.truth.reference import exact_coefficients
 
 MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2
 HORIZON = 3.0  # s
 SAMPLE = 200  # bodies whose error is found
 _FASTEST = 2.0  # rad/s, about each axis
 _HARDEST = 1.0  # rad/s2, about each axis
+
+
+def coefficients() -> list[float]:
+    """Return A, B, C of the body."""
+    return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
 @dataclass(frozen=True, eq=False)

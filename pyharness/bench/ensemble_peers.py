@@ -11,13 +11,11 @@ from pyharness.bench import ensemble_compiled as compiled
 from pyharness.bench.contenders import refuse_rounding
 from pyharness.bench.ensemble_contenders import (
     HORIZON,
-    MOMENTS,
     EnsembleContender,
     EnsembleLoad,
+    coefficients,
 )
-from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.truth.reference import exact_coefficients
 
 _BLOCK = 4096  # bodies whose arrays stay near the processor
 
@@ -40,11 +38,6 @@ def ensemble_peers() -> list[EnsembleContender]:
 def is_installed(contender: EnsembleContender) -> bool:
     """Whether the package of a contender is there."""
     return not contender.package or find_spec(contender.package) is not None
-
-
-def coefficients() -> list[float]:
-    """Return A, B, C of the body."""
-    return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
 def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:

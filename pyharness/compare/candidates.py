@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.methods.prepared import Solver, prepare
+from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import solve
+from pyharness.methods.solver import Solver
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, STOPPED, extension
 from pyharness.model.listing import Listing

@@ -16,7 +16,8 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from pyharness.ensembles.children import deaf_children, end_with_parent
-from pyharness.ensembles.sweep import Arrays, Sweep, solve_chunk
+from pyharness.ensembles.chunk import solve_chunk
+from pyharness.ensembles.sweep import Arrays, Sweep
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
 

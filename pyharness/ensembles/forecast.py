@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.ensembles.chunk import solve_chunk, solve_points
 from pyharness.ensembles.executors import Engine
 from pyharness.ensembles.loads import looped_fields
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import scratch
-from pyharness.ensembles.sweep import Arrays, Indices, Sweep, solve_chunk, solve_points, spread
+from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread
 
 # Of a sample: scenes from all over the grid, first a few.
 _SAMPLES = (8, 256, 2048, 8192)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pyharness.ensembles.loads import Load
 from pyharness.ensembles.one_by_one import Ends, ProgramRows, run_each, solve_each
 from pyharness.methods.many import Ensemble, solve_many
-from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import REGISTRY, requested_tolerance
+from pyharness.methods.solver import PREPARED
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array

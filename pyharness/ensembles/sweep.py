@@ -151,29 +151,6 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
     return [np.array(each, dtype=np.int64) for each in reversed(found)]
 
 
-def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Return the arrays of a chunk, by name: what a task of any executor is."""
-    box = sweep.box(chunk)
-    shape = tuple(part.stop - part.start for part in box)
-    found = solve_points(sweep, points(sweep, box))
-    return {name: each.reshape(*shape, *each.shape[1:]) for name, each in found.items()}
-
-
-def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Return the arrays of scenes, given by an array of indices for each dimension."""
-    from pyharness.ensembles.loads import loads
-    from pyharness.ensembles.reductions import empty, reduced
-    from pyharness.ensembles.solved import Solved
-
-    n = len(where[0])
-    found = {asked.name: empty(asked, n) for asked in sweep.reductions}
-    for members, load in loads(sweep, where):
-        solved = Solved(load)
-        for asked in sweep.reductions:
-            found[asked.name][members] = reduced(asked, solved)
-    return found
-
-
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
     """Return the values of every axis at scenes, by field."""
     at = dict(zip(sweep.dimensions, where, strict=True))

@@ -15,8 +15,8 @@ from pyharness.ensembles.fields import CHOICES, RIVALS
 from pyharness.ensembles.loads import listing_of
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import Solver, Sweep
-from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import REGISTRY, requested_tolerance
+from pyharness.methods.solver import PREPARED
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene

@@ -36,8 +36,8 @@ from pyharness.methods.many_starts import (
     times_of,
 )
 from pyharness.methods.plan import FINEST
-from pyharness.methods.prepared import CODES, PREPARED
 from pyharness.methods.registry import REGISTRY, check_attitude, requested_tolerance
+from pyharness.methods.solver import CODES, PREPARED
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
+from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import REGISTRY, check_torque, requested_tolerance
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
@@ -120,25 +121,6 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     # No solver that can be prepared needs either.
     yield Decision("reference", False, "not asked for")
     yield Decision("SciPy", False, "ours")
-
-
-def closed_form(scene: Scene) -> str | None:
-    """Name the closed form that solves a scene, None where there is none."""
-    if scene.torque.in_space:
-        return None
-    a, b, c = scene.euler_coefficients
-    # A body that is given by coefficients has no angular momentum to turn about.
-    if scene.attitude is not None and (not scene.torque.is_zero or scene.moments is None):
-        return None
-    if a == b == c == 0.0:
-        return "sphere"
-    if not scene.torque.is_zero:
-        return None
-    if 0.0 in (a, b, c):
-        # Two coefficients of opposite sign turn; of one sign, or one alone, they run away.
-        rest = [x for x in (a, b, c) if x != 0.0]
-        return "symmetric" if len(rest) == 2 and rest[0] * rest[1] < 0.0 else None
-    return None if min(a, b, c) > 0.0 or max(a, b, c) < 0.0 else "elliptic"
 
 
 def _why_no_form(scene: Scene) -> str:

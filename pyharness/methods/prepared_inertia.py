@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from pyharness.methods.many_starts import buffer_of, many_starts, rows_of
 from pyharness.methods.plan import Plan
-from pyharness.methods.prepared import Solver, no_buffer
 from pyharness.methods.prepared_attitude import AttitudeSolver
+from pyharness.methods.solver import Solver, no_buffer
 from pyharness.model.attitude import IDENTITY, Quaternion, product, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.principal import principal

@@ -111,3 +111,22 @@ def rows_trajectory(
     """Return a trajectory without velocity, recorded at its true times."""
     time = np.array(times, dtype=float)
     return Trajectory(time, time, omega, None, steps, evaluations, ended)
+
+
+def closed_form(scene: Scene) -> str | None:
+    """Name the closed form that solves a scene, None where there is none."""
+    if scene.torque.in_space:
+        return None
+    a, b, c = scene.euler_coefficients
+    # A body that is given by coefficients has no angular momentum to turn about.
+    if scene.attitude is not None and (not scene.torque.is_zero or scene.moments is None):
+        return None
+    if a == b == c == 0.0:
+        return "sphere"
+    if not scene.torque.is_zero:
+        return None
+    if 0.0 in (a, b, c):
+        # Two coefficients of opposite sign turn; of one sign, or one alone, they run away.
+        rest = [x for x in (a, b, c) if x != 0.0]
+        return "symmetric" if len(rest) == 2 and rest[0] * rest[1] < 0.0 else None
+    return None if min(a, b, c) > 0.0 or max(a, b, c) < 0.0 else "elliptic"

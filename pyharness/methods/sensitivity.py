@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pyharness.methods.problem import known, normalized
+from pyharness.methods.problem import closed_form, known, normalized
 from pyharness.model.extension import extension
 from pyharness.model.same_motion import factor_near_one, scaled
 from pyharness.model.scene import Scene, Triple
@@ -75,9 +75,6 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
     That is the largest norm of the derivative of omega at the end by omega at any time before:
     from a closed form where there is one, else from the Taylor series; None where neither tells.
     """
-    # Here, since the plan knows all methods, and those that call this are among them.
-    from pyharness.methods.plan import closed_form
-
     if closed_form(scene):
         _, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, t_end)
         if growth is not None:

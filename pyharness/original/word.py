@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 
 from pyharness.model.errors import InputError, unknown
 from pyharness.original.cdc import cdc
-from pyharness.original.programs import WORD_NAMES
 from pyharness.original.rounding import Pair, Rules, ieee
 
 RULES = ("nearest-even", "chop", "FX", "RX")
@@ -283,4 +282,3 @@ WORDS: dict[str, Word] = {
     "cdc48": Word(48, "FX"),
     "cdc48-rounded": Word(48, "RX"),
 }
-assert tuple(WORDS) == WORD_NAMES

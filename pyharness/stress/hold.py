@@ -10,7 +10,8 @@ import numpy as np
 
 from pyharness.compare.candidates import Candidate, End, called, solved, unstopped
 from pyharness.compare.checks import Check
-from pyharness.methods.plan import FEW_DIGITS, closed_form
+from pyharness.methods.plan import FEW_DIGITS
+from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene

@@ -89,7 +89,7 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
     """Return omega at each time, and whether it is there to the end."""
-    from pyharness.methods.plan import closed_form
+    from pyharness.methods.problem import closed_form
     from pyharness.methods.solve import solve
 
     # Beside the separatrix an integrated path would be another one after a few turns.

@@ -12,7 +12,7 @@ from functools import cache
 
 from numpy.polynomial import Polynomial
 
-from pyharness.methods.plan import closed_form
+from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.scipy_ivp import steps_sum
 from pyharness.methods.solve import finest as finest_of

@@ -8,8 +8,8 @@ import numpy as np
 
 from pyharness.compare.checks import REFUSED, Check, Sample, bounded
 from pyharness.compare.random_scenes import draw
-from pyharness.methods.plan import closed_form
 from pyharness.methods.prepared import prepare
+from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve
 from pyharness.model.attitude import Quaternion, angle_between

@@ -16,7 +16,7 @@ import numpy as np
 
 from pyharness.compare.candidates import called, listed, solved
 from pyharness.compare.checks import REFUSED, Check, bounded, may_hold, selected
-from pyharness.methods.plan import closed_form
+from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY
 from pyharness.methods.solve import finest
 from pyharness.model.attitude import angle_between

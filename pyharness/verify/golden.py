@@ -19,7 +19,7 @@ import numpy as np
 from pyharness.compare.agreement import ulps
 from pyharness.compare.candidates import listed, solved
 from pyharness.compare.checks import Check
-from pyharness.methods.plan import closed_form
+from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected, original

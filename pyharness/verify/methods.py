@@ -12,8 +12,8 @@ from pyharness.compare.agreement import ulps
 from pyharness.compare.candidates import called, listed, solved
 from pyharness.compare.checks import REFUSED, Check, bounded
 from pyharness.compare.orders import Order, measured_order, order_of
-from pyharness.methods.plan import FEW_DIGITS, closed_form
-from pyharness.methods.problem import normalized
+from pyharness.methods.plan import FEW_DIGITS
+from pyharness.methods.problem import closed_form, normalized
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest
 from pyharness.model.errors import InputError

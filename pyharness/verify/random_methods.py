@@ -14,7 +14,7 @@ import numpy as np
 from pyharness.compare.candidates import called, solved
 from pyharness.compare.checks import REFUSED, Check, Sample
 from pyharness.compare.random_scenes import Draw, draw
-from pyharness.methods.plan import closed_form
+from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import finest
 from pyharness.model.errors import InputError

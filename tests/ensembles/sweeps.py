@@ -3,7 +3,8 @@
 import time
 from pathlib import Path
 
-from pyharness.ensembles.sweep import Arrays, Sweep, solve_chunk
+from pyharness.ensembles.chunk import solve_chunk
+from pyharness.ensembles.sweep import Arrays, Sweep
 
 BASE = """
 [scene.body]

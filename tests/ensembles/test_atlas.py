@@ -12,10 +12,11 @@ from pyharness.ensembles.atlas import PAGES, atlas_picture
 from pyharness.ensembles.atlas_collocation import tenfold
 from pyharness.ensembles.atlas_maps import place_of
 from pyharness.ensembles.atlas_stops import case_scenes, foretold
+from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.forecast import _together
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.store import opened
-from pyharness.ensembles.sweep import Sweep, solve_chunk, spread
+from pyharness.ensembles.sweep import Sweep, spread
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError

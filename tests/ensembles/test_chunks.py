@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.ensembles.sweep import points, solve_points
+from pyharness.ensembles.chunk import solve_points
+from pyharness.ensembles.sweep import points
 from pyharness.ensembles.sweep_file import read_sweep
 from tests.ensembles.sweeps import TILT, text, written
 

@@ -12,8 +12,9 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.ensembles import run, store_layout
+from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.run import run_sweep
-from pyharness.ensembles.sweep import Sweep, solve_chunk
+from pyharness.ensembles.sweep import Sweep
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from pyharness.model.schema import SCHEMAS

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, run_program, solve
+from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.loads import listing_of, loads
 from pyharness.ensembles.one_by_one import run_each
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.solved import many_rows
-from pyharness.ensembles.sweep import Sweep, points, solve_chunk
+from pyharness.ensembles.sweep import Sweep, points
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.scene import Scene, TorqueLaw

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 
 from pyharness.ensembles import run, store, store_layout
+from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.executors import engine
 from pyharness.ensembles.forecast import forecast
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.store import opened
-from pyharness.ensembles.sweep import solve_chunk
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from tests.ensembles.killed import kill_and_resume

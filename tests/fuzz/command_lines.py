@@ -9,8 +9,8 @@ from random import Random
 from pyharness.cli.main import VERBS
 from pyharness.cli.options import FORMATS, Parser
 from pyharness.history.ablation import entries
-from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import METHODS
+from pyharness.methods.solver import PREPARED
 from pyharness.model.listing import PROGRAMS, names_of
 from tests.fuzz.strategies import mutated_word, number, scene_bytes, scene_text, tolerance
 

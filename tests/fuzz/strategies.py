@@ -13,8 +13,8 @@ from typing import Any
 
 from pyharness import InputError, Scene, TorqueLaw
 from pyharness.compare.random_scenes import Draw, draw
-from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import METHODS
+from pyharness.methods.solver import PREPARED
 from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Triple, Wave
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from pyharness import InputError, Scene, TorqueLaw, prepare, read_scene, solve
 from pyharness.cli.main import main
 from pyharness.history.limits import limit
-from pyharness.methods.prepared import PREPARED
+from pyharness.methods.solver import PREPARED
 from pyharness.model.errors import printable
 from pyharness.model.trajectory import Trajectory
 from tests.fuzz import campaign as fuzz

@@ -10,7 +10,7 @@ import pytest
 
 from pyharness import InputError
 from pyharness.cli.main import main
-from pyharness.ensembles.sweep import solve_chunk
+from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims.atlas import Atlas, atlas_of, bits, shares, sum_of_points
 from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED

@@ -14,8 +14,8 @@ from pyharness.cli.main import main
 from pyharness.compare.random_scenes import draw
 from pyharness.ensembles.sweep import Solver
 from pyharness.methods.plan import plan
-from pyharness.methods.prepared import PREPARED
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
+from pyharness.methods.solver import PREPARED
 from pyharness.model.listing import original
 from tests.conftest import Printed
 

@@ -21,14 +21,16 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-import pyharness.methods.prepared as room
+import pyharness.methods.prepared as preparing
 import pyharness.methods.solve as solving
+import pyharness.methods.solver as solver_module
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.bench.growth import growth
 from pyharness.bench.savings import _saving
 from pyharness.cli.main import main
-from pyharness.methods.plan import EITHER, Plan, closed_form, plan
-from pyharness.methods.prepared import Solver
+from pyharness.methods.plan import EITHER, Plan, plan
+from pyharness.methods.problem import closed_form
+from pyharness.methods.solver import Solver
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 
@@ -188,7 +190,7 @@ def test_call_leaks_no_reference() -> None:
         return tracemalloc.get_traced_memory()[0]
 
     left_behind()
-    watched = solver, start, out, room._check, solver.plan, Solver
+    watched = solver, start, out, solver_module._check, solver.plan, Solver
     counts = [sys.getrefcount(each) for each in watched]
     tracemalloc.start()
     left = [left_behind() for _ in range(5)]
@@ -301,7 +303,7 @@ def test_another_kernel_may_stand_in_its_place(monkeypatch: pytest.MonkeyPatch) 
         assert not packed.flags.writeable
         return answers.pop(0)
 
-    monkeypatch.setattr(room, "extension", lambda: SimpleNamespace(solve_packed=kernel))
+    monkeypatch.setattr(solver_module, "extension", lambda: SimpleNamespace(solve_packed=kernel))
     solver = prepare(PUSHED)
     for found, status, steps, word in (
         (np.array([1.0, 2.0, 3.0]), 3, 7, "refused"),
@@ -388,7 +390,7 @@ def test_everyone_does_what_the_plan_says(case: int) -> None:
     def other(scene: Scene, method: str = "auto", *rest: Any, **named: Any) -> Plan:
         return plan(scene, "taylor" if method == "auto" else method, *rest, **named)
 
-    with patch.object(solving, "plan", other), patch.object(room, "plan", other):
+    with patch.object(solving, "plan", other), patch.object(preparing, "plan", other):
         found, solver = solve(scene, [1.0], tolerance=1e-6), prepare(scene, tolerance=1e-6)
     solver(_omega(scene), 1.0)
     assert found.steps == solve(scene, [1.0], "taylor", 1e-6).steps > 0
@@ -446,7 +448,7 @@ def test_wave_without_effect_is_not_packed(solver: Solver) -> None:
 
 
 def test_examples_in_the_docstrings_run() -> None:
-    for each in (room, solving):
+    for each in (preparing, solving):
         result = doctest.testmod(each)
         assert (result.attempted >= 2, result.failed) == (True, 0)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare
-from pyharness.methods.prepared import Solver
+from pyharness.methods.solver import Solver
 from tests.random_scenes import NASTY, moments, plain, triple
 
 ROUNDING = 2.0**-53

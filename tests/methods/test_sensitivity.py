@@ -11,7 +11,8 @@ import pytest
 
 import pyharness.methods.sensitivity as room
 from pyharness import Scene, TorqueLaw, case_scene, prepare, run_program, solve, subset
-from pyharness.methods import linearised, prepared, taylor
+from pyharness.methods import linearised, taylor
+from pyharness.methods import solver as solver_module
 from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, motion_growth
 from pyharness.model.codes import Statuses
 from pyharness.model.same_motion import scaled, unscaled
@@ -178,7 +179,7 @@ def test_what_the_series_finds_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> 
         return np.ones(3), Statuses.SENSITIVE, 7, np.array([1e-6, 3e9])
 
     kernel = SimpleNamespace(solve_packed=packed)
-    monkeypatch.setattr(prepared, "extension", lambda: kernel)
+    monkeypatch.setattr(solver_module, "extension", lambda: kernel)
     solver = prepare(PUSHED, "taylor")
     assert solver(PUSHED.omega, 2.0).tolist() == [1.0] * 3
     assert (solver.status, solver.error, solver.growth) == ("sensitive", 1e-6, 3e9)

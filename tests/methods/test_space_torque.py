@@ -21,10 +21,10 @@ from pyharness import (
 )
 from pyharness.compare.random_scenes import draw
 from pyharness.methods.plan import plan
-from pyharness.methods.prepared import PREPARED
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
 from pyharness.methods.sensitivity import motion_growth
+from pyharness.methods.solver import PREPARED
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.inertia import principal_axes
 from pyharness.model.listing import corrected

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from pyharness.cli.main import main
-from pyharness.methods.prepared import PREPARED, prepare
+from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.methods.solve import solve
+from pyharness.methods.solver import PREPARED
 from pyharness.model.effort import suggested
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.listing import corrected

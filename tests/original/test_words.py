@@ -204,6 +204,7 @@ def test_page_is_printed_from_the_exact_value() -> None:
 
 def test_words_change_what_they_should() -> None:
     """Case 2 has its stop in every word, IER = 129 in 24 bits, a last digit in the machine's."""
+    assert tuple(WORDS) == WORD_NAMES
     scene = case_scene(2)
     for name in WORD_NAMES:
         run = run_program(scene, original("runge-kutta"), "python", word=name)

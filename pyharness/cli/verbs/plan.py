@@ -4,8 +4,8 @@ import argparse
 
 from pyharness.cli import options as shared
 from pyharness.methods.plan import plan
-from pyharness.methods.prepared import PREPARED
 from pyharness.methods.report import plan_report
+from pyharness.methods.solver import PREPARED
 
 OPTIONS = {
     **shared.SCENE,

@@ -15,8 +15,9 @@ import numpy as np
 
 from pyharness.compare.candidates import listed, solved
 from pyharness.compare.checks import may_hold
-from pyharness.methods.prepared import PREPARED, Solver, prepare
+from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import METHODS
+from pyharness.methods.solver import PREPARED, Solver
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing

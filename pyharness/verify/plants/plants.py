@@ -19,8 +19,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pyharness.methods.prepared import CODES as _CODES
 from pyharness.methods.registry import METHODS
+from pyharness.methods.solver import CODES as _CODES
 from pyharness.model import extension
 from pyharness.model.codes import Methods, Places
 from pyharness.model.listing import Listing, flagged
@@ -118,7 +118,7 @@ def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextMan
     kernel = SimpleNamespace(
         solve_packed=lambda packed, *rest: change(packed, entry(packed, *rest))
     )
-    return patch("pyharness.methods.prepared.extension", lambda: kernel)
+    return patch("pyharness.methods.solver.extension", lambda: kernel)
 
 
 def _stale_solver() -> AbstractContextManager[Any]:

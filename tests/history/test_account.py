@@ -15,8 +15,9 @@ from pyharness.history.claims.ledger import claim, claims, outcome
 from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, REPRODUCED
 from pyharness.history.limits import limit
 from pyharness.model.facts import facts, shipped
-from pyharness.model.listing import Listing, names_of, original, switches
+from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, original, switches
 from pyharness.model.scene_file import case_scene
+from pyharness.original.cards import deck
 from pyharness.original.cells import subsets
 from pyharness.original.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
@@ -209,3 +210,23 @@ def test_emulated_words_are_told_of_where_they_are_had() -> None:
     assert "--word cdc48" in _document("docs/reconstruction.md")
     assert entry("dialect-cdc")["certainty"] == "probable"
     assert (shipped("docs") / "words.md").exists()
+
+
+def test_numbers_of_readme_home_page_and_reconstruction_are_those_of_runs_and_cards() -> None:
+    scene = case_scene(3)
+    printed, mended = (
+        run_program(scene, each("runge-kutta")) for each in (original, corrected)
+    )  # fmt: skip
+    assert printed.stop is not None
+    truth = reference(scene, scene.times()).omega
+    errors = [np.abs(r.omega - truth[: r.steps]).max(axis=0) for r in (printed, mended)]
+    assert 0.5e6 < (errors[0] / errors[1]).min() < (errors[0] / errors[1]).max() < 2e6
+    told = _document("README.md")
+    assert f"stops at step {printed.stop.step} because a translational *velocity*" in told
+    assert printed.stop.variable.startswith("V")
+    assert "with errors a million times those of the sixth" in told
+    home = _document("pyharness/edition/templates/index.html")
+    for name in (told, home):
+        assert f"after {MECHANISM['stopped']['step']} steps" in name
+    cards = sum(len(deck(each).cards) for each in PROGRAMS)
+    assert f"one row for each of {cards} cards" in _document("docs/reconstruction.md")

@@ -31,7 +31,7 @@ _LEDGER = (
 _DATA = (*_LEDGER[:1], *words("kind"), *_LEDGER[1:])
 KINDS = {
     "result": "what the programs gave, and what is concluded of it",
-    "theory": "equations, methods and their errors, whoever runs them",
+    "theory": "equations, methods, their errors and what causes them",
     "design": "how programs and cases were made",
     "history": "what others did, and what the author did",
     "recommendation": "neither true nor false, and so not testable",

@@ -20,6 +20,7 @@ from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.values import Number, Numbers, three, three_floats
+from pyharness.model.waves import with_merged_waves
 
 
 class InertiaSolver(Solver):
@@ -149,7 +150,7 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
     """Return a solver of a scene with a full inertia matrix."""
     from pyharness.methods.plan import plan
 
-    about_principal, _ = principal(replace(scene, attitude=None))
+    about_principal = with_merged_waves(principal(replace(scene, attitude=None))[0])
     return InertiaSolver(plan(about_principal, method, tolerance), tolerance, method, effort, scene)
 
 
@@ -160,5 +161,5 @@ def prepared_inertia_attitude(
     from pyharness.methods.prepared_attitude import attitude_plan
 
     about_principal, _ = principal(replace(scene, attitude=scene.attitude or IDENTITY))
-    chosen = attitude_plan(about_principal, method, tolerance)
+    chosen = attitude_plan(with_merged_waves(about_principal), method, tolerance)
     return InertiaAttitudeSolver(chosen, tolerance, method, effort, scene)

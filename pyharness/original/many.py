@@ -7,6 +7,7 @@ from typing import SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyharness.model.arrays import above_zero, from_zero, is_finite, one_count, rows, spread
 from pyharness.model.codes import Blocks
 from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
@@ -19,7 +20,6 @@ from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, several, truth, whole
 from pyharness.original.compiled import stop_reads_velocity
 from pyharness.original.equations import card_torque
-from pyharness.original.many_input import above_zero, from_zero, is_finite, one_count, rows, spread
 
 _LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
 _PIECES = 8  # for each thread, as bodies may end early

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.methods.many_starts import buffer_of
+from pyharness.model.arrays import buffer_of
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.shown import short_repr

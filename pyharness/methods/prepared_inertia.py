@@ -10,10 +10,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.methods.many_starts import buffer_of, many_starts, rows_of
+from pyharness.methods.many_starts import many_starts
 from pyharness.methods.plan import Plan
 from pyharness.methods.prepared_attitude import AttitudeSolver
 from pyharness.methods.solver import Solver, no_buffer
+from pyharness.model.arrays import buffer_of, rows_of
 from pyharness.model.attitude import IDENTITY, Quaternion, product, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.principal import principal

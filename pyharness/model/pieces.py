@@ -1,10 +1,16 @@
 """Work on many bodies, in pieces that threads take."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
+
+# Some milliseconds, after which Python looks at the user.
+_PIECE = 1 << 18
+# That no thread is worth.
+_SMALL = 256
 
 
 def share(
@@ -32,3 +38,19 @@ def share(
             given_up[0] = 1
             pool.shutdown(cancel_futures=True)
             raise
+
+
+def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
+    """Call `work` for the pieces that n bodies fall into, in so many threads.
+
+    It is given a number too, which is not 0 where the rest is not wanted any more.
+
+    Pieces as large as each other: a body alone in one would be solved another way.
+    """
+    if not n:
+        return
+    given_up = np.zeros(1, dtype=np.int32)
+    count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
+    ends = [n * piece // count for piece in range(count + 1)]
+    pieces = [slice(*each) for each in itertools.pairwise(ends)]
+    share(lambda piece: work(piece, given_up), pieces, threads, given_up)

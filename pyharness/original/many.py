@@ -7,7 +7,17 @@ from typing import SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyharness.model.arrays import above_zero, from_zero, is_finite, one_count, rows, spread
+from pyharness.model.arrays import (
+    ABOVE_ZERO,
+    FINITE,
+    FROM_ZERO,
+    Rule,
+    count_bodies,
+    only_one,
+    rows_of,
+    spread,
+    threads_of,
+)
 from pyharness.model.codes import Blocks
 from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
@@ -24,6 +34,13 @@ from pyharness.original.equations import card_torque
 _LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
 _PIECES = 8  # for each thread, as bodies may end early
 _NOT_REACHED = -1
+# The shape of what a body is given, and what is allowed.
+_GIVEN: dict[str, tuple[tuple[int, ...], Rule]] = {
+    "omega0": ((3,), FINITE),
+    "torque_constant": ((3,), FINITE),
+    "step_size": ((), ABOVE_ZERO),
+    "lipschitz": ((), FROM_ZERO),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,36 +136,32 @@ def run_many(
     NotBuiltError
         Where the extension is not built.
     """
-    given = moments is not None or coefficients is not None
-    checked_scene(scene, any_axes=given)
+    kind = only_one({"moments": moments, "coefficients": coefficients})
+    checked_scene(scene, any_axes=bool(kind))
     checked_listing(listing)
-    if moments is not None and coefficients is not None:
-        raise InputError("moments and coefficients are both given; allowed: one of them")
     may_stop, velocity = truth("may_stop", may_stop), truth("velocity", velocity)
-    threads = whole("threads", threads)
-    if threads < 1:
-        raise InputError(f"threads is {threads}; allowed: a whole number from 1")
-    by_moments = moments is not None or (coefficients is None and scene.moments is not None)
-    if moments is None and coefficients is None:
-        moments, coefficients = scene.moments, scene.coefficients
+    threads = threads_of(threads)
     law = scene.torque
-    inputs = {
-        "body": rows("moments", moments, 3, above_zero)
-        if by_moments
-        else rows("coefficients", coefficients, 3, is_finite),
-        "omega": rows("omega0", scene.omega if omega0 is None else omega0, 3, is_finite),
-        "constant": rows(
-            "torque_constant", law.constant if torque_constant is None else torque_constant, 3,
-            is_finite,
-        ),
-        "step_size": rows(
-            "step_size", scene.step_size if step_size is None else step_size, 1, above_zero
-        ),
-        "lipschitz": rows("lipschitz", lipschitz, 1, from_zero),
+    given = {
+        "moments": moments, "coefficients": coefficients, "omega0": omega0,
+        "torque_constant": torque_constant, "step_size": step_size, "lipschitz": lipschitz,
     }  # fmt: skip
-    if law.frame == "space" and inputs["constant"].any():
+    scene_values = {
+        "moments": scene.moments, "coefficients": scene.coefficients, "omega0": scene.omega,
+        "torque_constant": law.constant, "step_size": scene.step_size,
+    }  # fmt: skip
+    kind = kind or ("coefficients" if scene.moments is None else "moments")
+    by_moments = kind == "moments"
+    body = {kind: ((3,), ABOVE_ZERO if by_moments else FINITE)}
+    inputs = {
+        name: rows_of(name, scene_values.get(name) if given[name] is None else given[name], *shape,
+                      rule=rule)
+        for name, (shape, rule) in {**body, **_GIVEN}.items()
+    }  # fmt: skip
+    n = count_bodies(inputs)
+    inputs["body"] = inputs.pop(kind)
+    if law.frame == "space" and inputs["torque_constant"].any():
         raise InputError(SPACE_TORQUE)
-    n = one_count(inputs)
     _check_ends(inputs["step_size"], scene.steps)
     check_bodies(scene, listing.program, n, effort)
     wanted = _steps(at, scene.steps)
@@ -157,7 +170,7 @@ def run_many(
             f"at: {len(wanted)} rows of {n} bodies; allowed: {most_steps()} in all, what fits in "
             "this machine's memory"
         )
-    first = np.zeros(3)
+    first = np.zeros((1, 3))
     if listing.has("initial-torque"):
         cards = card_torque(scene) if by_moments else None
         if cards is None:
@@ -192,10 +205,10 @@ def _run(
     """Run what was checked."""
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
-    body, omega, constant, first = (
-        spread(inputs[name], n, 3) for name in ("body", "omega", "constant", "first")
+    body, omega, constant, first, step_size, lipschitz = (
+        spread(inputs[name], n)
+        for name in ("body", "omega0", "torque_constant", "first", "step_size", "lipschitz")
     )
-    step_size, lipschitz = (spread(inputs[name], n, 1) for name in ("step_size", "lipschitz"))
     computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
     prints_ier = listing.program != "runge-kutta"
     # The kernel takes one row at least.

@@ -3,19 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyharness.model.arrays import buffer_of
+from pyharness.model.batch_result import BatchResult
 from pyharness.model.errors import InputError
-from pyharness.model.extension import ENDS
-from pyharness.model.shown import short_repr
-from pyharness.model.trajectory import WITH_ALL_ROWS, Array
-
-_RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
+from pyharness.model.trajectory import Array
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble(BatchResult):
     """The ends of many scenes.
 
     Attributes
@@ -29,21 +25,7 @@ class Ensemble:
         Quaternions from body to space, scalar first; None where they were not asked for.
     """
 
-    omega: Array
-    status: NDArray[np.int8]
     attitude: Array | None = None
-
-    @property
-    def ended(self) -> NDArray[np.str_]:
-        """How each ended, in words: complete, sensitive, overflow, refused, gave up."""
-        return np.array(ENDS)[self.status]
-
-    __repr__ = short_repr
-
-    @property
-    def has_result(self) -> NDArray[np.bool_]:
-        """Where there is one."""
-        return np.isin(self.status, _RESULTS)
 
 
 def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> Ensemble:

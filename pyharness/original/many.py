@@ -18,6 +18,7 @@ from pyharness.model.arrays import (
     spread,
     threads_of,
 )
+from pyharness.model.batch_result import BatchResult
 from pyharness.model.codes import Blocks
 from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
@@ -25,7 +26,6 @@ from pyharness.model.extension import columns, extension
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
 from pyharness.model.pieces import share
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
-from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, several, truth, whole
 from pyharness.original.compiled import stop_reads_velocity
@@ -43,24 +43,24 @@ _GIVEN: dict[str, tuple[tuple[int, ...], Rule]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class ProgramEnsemble:
-    """What a program made of n bodies; NaN, and -1 of `ier`, where a row was not reached.
+@dataclass(frozen=True, eq=False, repr=False)
+class ProgramEnsemble(BatchResult):
+    """The rows that a program gave for n bodies; NaN, and -1 of `ier`, for rows not reached.
 
     Attributes
     ----------
-    at : ndarray of int, shape (m,)
-        The steps whose rows these are, from 1.
     omega : ndarray, shape (n, m, 3)
         Angular velocity about the body axes, rad/s.
+    status : ndarray of int8, shape (n,)
+        COMPLETE, STOPPED or OVERFLOW of pyharness/model/codes.py.
+    at : ndarray of int, shape (m,)
+        The steps whose rows these are, from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Velocity along the body axes, m/s.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
         The TIME that TAPE5 got, s; in one row for all NaN where no body has the row.
     n_rows : ndarray of int32, shape (n,)
         Steps that hold a result.
-    status : ndarray of int8, shape (n,)
-        COMPLETE, STOPPED or OVERFLOW of pyharness/model/codes.py.
     stop_variable : ndarray of int8, shape (n,)
         What ended a run: 1-3 U1-U3, 4-6 V1-V3, 7 the norm of U, 8 that of U and V; 0 for nothing.
     stop_quotient : ndarray, shape (n,)
@@ -71,16 +71,12 @@ class ProgramEnsemble:
     """
 
     at: NDArray[np.int32]
-    omega: Array
     velocity: Array | None
     recorded_time: Array
     n_rows: NDArray[np.int32]
-    status: NDArray[np.int8]
     stop_variable: NDArray[np.int8]
     stop_quotient: Array
     ier: NDArray[np.int32] | None
-
-    __repr__ = short_repr
 
 
 # As text: else its signature shows what NumPy makes of ArrayLike, 300 characters for each.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.ensembles.atlas_maps import region_panels, thinned, values_of
-from pyharness.ensembles.loads import loads
+from pyharness.ensembles.batches import loads
 from pyharness.ensembles.store import Store
 from pyharness.ensembles.sweep import Sweep
 from pyharness.methods.linearised import jacobians

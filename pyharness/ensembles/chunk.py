@@ -1,6 +1,6 @@
 """Scenes of a sweep solved: a chunk of its grid, or any of its scenes."""
 
-from pyharness.ensembles.loads import loads
+from pyharness.ensembles.batches import loads
 from pyharness.ensembles.reductions import empty, reduced
 from pyharness.ensembles.solved import Solved
 from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.ensembles.batches import looped_fields
 from pyharness.ensembles.chunk import solve_chunk, solve_points
 from pyharness.ensembles.executors import Engine
-from pyharness.ensembles.loads import looped_fields
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import scratch
 from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread

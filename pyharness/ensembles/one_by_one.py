@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.ensembles.loads import Load
+from pyharness.ensembles.batches import Load
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.codes import Statuses

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.ensembles.loads import Load
+from pyharness.ensembles.batches import Load
 from pyharness.ensembles.one_by_one import Ends, ProgramRows, run_each, solve_each
 from pyharness.methods.many import Ensemble, solve_many
 from pyharness.methods.registry import REGISTRY, requested_tolerance

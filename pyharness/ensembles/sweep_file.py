@@ -11,8 +11,8 @@ from typing import Any
 from pyharness.ensembles.asked import asked_of
 from pyharness.ensembles.atlas import check_page
 from pyharness.ensembles.axes import Axis, axis_of
+from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
-from pyharness.ensembles.loads import listing_of
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import Solver, Sweep
 from pyharness.methods.registry import REGISTRY, requested_tolerance

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, run_program, solve
+from pyharness.ensembles.batches import listing_of, loads
 from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.loads import listing_of, loads
 from pyharness.ensembles.one_by_one import run_each
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.solved import many_rows

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness.ensembles.axes import axis_of
-from pyharness.ensembles.loads import loads
+from pyharness.ensembles.batches import loads
 from pyharness.ensembles.sweep import points, spread
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError

@@ -14,7 +14,8 @@ from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
 from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.sweep import Solver, Sweep
+from pyharness.ensembles.sweep import Sweep
+from pyharness.methods.batch import Solver
 from pyharness.methods.registry import REGISTRY, requested_tolerance
 from pyharness.methods.solver import PREPARED
 from pyharness.model.errors import InputError, kind_of, unknown
@@ -51,9 +52,9 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
     path : path
         Of the file. A scene file named in it is looked for beside it.
     claims : mapping, optional
-        Where the function of each claim stands, as in ``package.module:name``. It takes what was
-        `Solved` of n scenes, and returns 1 for each that the claim holds of, 0 where it fails, 2
-        where it says nothing.
+        Where the function of each claim stands, as in ``package.module:name``. It takes a
+        `SolvedBatch` of n scenes, and returns 1 for each that the claim holds of, 0 where it
+        fails, 2 where it says nothing.
 
     Raises
     ------

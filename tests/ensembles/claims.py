@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.ensembles.solved import Solved
+from pyharness.methods.solved_batch import SolvedBatch
 
 CLAIMS = {"stays": "tests.ensembles.claims:stays"}
 
 
-def stays(solved: Solved) -> NDArray[Any]:
+def stays(solved: SolvedBatch) -> NDArray[Any]:
     """Whether the middle component is at the end what it was, to a tenth; silent where it was 0."""
     before = solved.omega0[:, 1]
     holds = np.abs(solved.omega[:, 1] - before) <= 0.1 * np.abs(before)

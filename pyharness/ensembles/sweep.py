@@ -49,8 +49,6 @@ class Sweep:
         The most scenes in a chunk.
     text, fingerprint : str
         The file's text, and the SHA-256 of that and of what it refers to.
-    picture : str
-        The page of the atlas that draws it; empty for none.
     """
 
     name: str
@@ -61,7 +59,6 @@ class Sweep:
     chunk: int
     text: str
     fingerprint: str
-    picture: str = ""
 
     @property
     def dimensions(self) -> dict[str, int]:

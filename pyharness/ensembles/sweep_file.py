@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.ensembles.asked import asked_of
-from pyharness.ensembles.atlas import check_page
 from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
@@ -32,7 +31,7 @@ from pyharness.model.scene_file import (
 )
 from pyharness.model.values import finite, number, truth, whole
 
-_KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk", "picture")
+_KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
 _SOLVE = (
     *("method", "tolerance", "t_end"),
     *("program", "listing", "reading", "lipschitz", "may_stop"),
@@ -94,13 +93,9 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
     if not 1 <= chunk <= _MOST_IN_CHUNK:
         raise InputError(f"chunk is {chunk}; allowed: 1 to {_MOST_IN_CHUNK} scenes")
     digest = hashlib.sha256(text.encode() + more).hexdigest()
-    picture = data.get("picture", "")
-    if not isinstance(picture, str):
-        raise InputError(f"picture is {kind_of(picture)}; it must be text")
-    sweep = Sweep(name, scene, axes, solver, reductions, chunk, text, digest, picture)
+    sweep = Sweep(name, scene, axes, solver, reductions, chunk, text, digest)
     _check_reductions(sweep)
     _check_solvers(sweep)
-    check_page(sweep)
     return sweep
 
 

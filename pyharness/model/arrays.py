@@ -29,11 +29,9 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
     shape and for what is no real number; with a `rule` for the first number that breaks it.
     """
     found = numbers_of(where, values)
+    own = found.shape[-len(shape) :] if shape else ()
     spare = found.ndim - len(shape)
-    own = found.shape[max(spare, 0) :]
-    if spare not in (0, 1) or any(
-        isinstance(want, int) and have != want for have, want in zip(own, shape, strict=True)
-    ):
+    if spare not in (0, 1) or (own != shape and not _fits(own, shape)):
         one, many = ", ".join(map(str, shape)), ", ".join(map(str, ("n", *shape)))
         allowed = f"({one}{',' * (len(shape) == 1)}) or ({many})" if shape else "one number or (n,)"
         raise InputError(f"{where}: shape {found.shape}; allowed: {allowed}")
@@ -53,6 +51,8 @@ def numbers_of(where: str, values: object) -> Array:
         raise InputError(
             f"{where}: {kind_of(values)} that is no array of numbers; allowed: rows of one length"
         ) from error
+    if found.dtype == np.float64:
+        return found
     if found.dtype.kind == "O":
         floats = [number(where, each) for each in found.flat]
         return np.array(floats).reshape(found.shape)
@@ -71,10 +71,11 @@ def waves_of(where: str, values: object) -> Array:
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
     """Return the number of bodies; InputError for an array with neither one row nor that many."""
-    counts = [len(each) for each in rows.values()]
+    counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
-    for name, each in rows.items():
-        check_rows(name, each, n)
+    if not counts <= {1, n}:
+        for name, each in rows.items():
+            check_rows(name, each, n)
     return n
 
 
@@ -119,7 +120,13 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 def spread(rows: Array, n: int) -> Array:
     """Return an array with a row for each of n bodies, in one piece."""
+    if len(rows) == n:
+        return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
+
+
+def _fits(own: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
+    return all(isinstance(want, str) or have == want for have, want in zip(own, shape, strict=True))
 
 
 def _check_rule(where: str, values: Array, rule: Rule) -> None:

@@ -14,14 +14,14 @@ from pyharness.bench.ensemble_contenders import (
     draw,
     own_ensembles,
 )
-from pyharness.bench.ensemble_measure import STEPS, shortest
+from pyharness.bench.ensemble_measure import SLOW, STEPS, clock_of
+from pyharness.compare.timing import seconds
 from pyharness.methods.many import Ensemble, solve_many
 from pyharness.methods.prepared import prepare
 from pyharness.model.trajectory import Array
 
 SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
 _BATCH, _ROUNDS = 0.02, 5
-_MANY = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ def sizes(seed: str, most: int, say: Callable[[str], None] = lambda _: None) -> 
     free, pushed = draw(seed, most)
     found, n = [], 1
     while n <= most:
-        say(f"{n} bodies")
-        runs = {"prepared": _prepared(free.part(slice(0, n)))}
+        runs: dict[str, Callable[[], object]] = {"prepared": _prepared(free.part(slice(0, n)))}
         for method in own_ensembles():
             load = (free if method.torque_free else pushed).part(slice(0, n))
             runs[method.name] = method.prepare(load, SETTINGS[method.name], 1)
-        rounds = _ROUNDS if n <= _MANY else 2
-        seconds = {name: _best(run, rounds) / n for name, run in runs.items()}
-        found.append(Size(n, seconds))
+        say(f"{n} bodies")
+        clocks = [clock_of(1)] * len(runs)
+        times = seconds([*runs.values()], _BATCH, _ROUNDS, statistic=min, clocks=clocks, slow=SLOW)
+        found.append(Size(n, {name: time / n for name, time in zip(runs, times, strict=True)}))
         n *= 10
     return found
 
@@ -68,11 +68,6 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
     """Return a call of a solver made beforehand, which has the closed form alone."""
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
-
-
-def _best(run: Callable[[], object], rounds: int) -> float:
-    run()
-    return min(shortest(run, _BATCH) for _ in range(rounds))
 
 
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:

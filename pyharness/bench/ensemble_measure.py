@@ -1,14 +1,13 @@
 """Rates of ensembles: bodies a second at an error, and steps of RK4 a second.
 
-Each contender gets the coarsest setting whose error keeps the one asked for, on a sample, and then
+Each contender gets the coarsest setting whose error is at most the target, on a sample, and then
 as many bodies as it can do in a part of a second. All are called in turn, in rounds, and the
-shortest call counts: what else the machine does can but lengthen it. On one core what counts is the
-time that the core was ours.
+shortest time of a call counts, as what else the machine does can only lengthen it: on one core in
+the processor's time.
 """
 
-import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter, process_time
 
 import numpy as np
@@ -19,6 +18,7 @@ from pyharness.bench.ensemble_contenders import (
     EnsembleLoad,
     EnsembleMaker,
 )
+from pyharness.compare.timing import Clock, batch_seconds, seconds, silenced
 from pyharness.methods.plan import FINEST
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
@@ -28,7 +28,7 @@ STEPS = 300  # of RK4, where steps a second are asked for
 ROUNDS = 9
 # s; who takes less gets more bodies, and so does who is much faster with more, up to the second.
 _CALL, _LONG_CALL = 0.03, 0.5
-_SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
+SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; of calls in a round
 _MOST_STEPS = 1 << 14
 Say = Callable[[str], None]
@@ -44,7 +44,7 @@ class Rate:
     threads: int  # 0: as many as its package takes
     setting: float | None
     bodies: int  # of a call
-    seconds: float  # the shortest call
+    seconds: float  # the shortest time of a call
     error: float  # largest of the sample
 
     @property
@@ -118,31 +118,30 @@ def _rates(
     place: str,
     say: Say,
 ) -> Iterator[Rate]:
-    ready: list[tuple[EnsembleContender, float, int, int, float, Callable[[], Array]]] = []
+    ready: list[tuple[Rate, Callable[[], Array]]] = []
     for each in contenders:
         if (each.torque_free and sample.load.torque is not None) or (
             target is None and each.setting != "steps"
         ):
             continue
         say(f"{place}: {each.name}")
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with silenced():
             setting = _setting(each, sample, target)
             if setting is None:
                 found.refused.append((place, each.name, "no setting reaches it"))
                 continue
+            shown = None if each.setting == "none" else setting
             for threads in each.threads:
                 load, run = _enough(each.prepare, sample.load, setting, threads)
-                ready.append((each, setting, threads, load.n, sample.error(run()), run))
-    seconds = [np.inf] * len(ready)
-    for number in range(1, ROUNDS + 1):
-        say(f"{place}: round {number} of {ROUNDS}")
-        for k, (_, _, threads, _, _, run) in enumerate(ready):
-            if number <= 3 or seconds[k] < _SLOW:
-                seconds[k] = min(seconds[k], shortest(run, _BATCH, threads))
-    for best, (each, setting, threads, n, error, _) in zip(seconds, ready, strict=True):
-        shown = None if each.setting == "none" else setting
-        yield Rate(sample.load.name, target, each.name, threads, shown, n, best, error)
+                rate = Rate(sample.load.name, target, each.name, threads, shown, load.n, 0.0,
+                            sample.error(run()))  # fmt: skip
+                ready.append((rate, run))
+    times = seconds(
+        [run for _, run in ready], _BATCH, ROUNDS, lambda text: say(f"{place}: {text}"), min,
+        [clock_of(rate.threads) for rate, _ in ready], SLOW,
+    )  # fmt: skip
+    for (rate, _), best in zip(ready, times, strict=True):
+        yield replace(rate, seconds=best)
 
 
 def _setting(each: EnsembleContender, sample: _Sample, target: float | None) -> float | None:
@@ -184,22 +183,12 @@ def _enough(
         part = load.part(slice(0, n))
         run = prepare(part, setting, threads)
         run()  # what is compiled
-        taken = shortest(run, 0.0, threads)
+        taken = batch_seconds(run, clock=clock_of(threads))
         if n == load.n or taken > (_LONG_CALL if n / taken > 1.5 * before else _CALL):
             return part, run
         n, before = min(load.n, 8 * n), n / taken
 
 
-def shortest(run: Callable[[], object], length: float, threads: int = 1) -> float:
-    """Return the time of the shortest call (s), among as many as fit in so many seconds, or one.
-
-    Of a call on one core the time of the processor, else that of the clock on the wall.
-    """
-    clock = process_time if threads == 1 else perf_counter
-    best, spent = np.inf, 0.0
-    while spent <= length:
-        begin = clock()
-        run()
-        one = clock() - begin
-        best, spent = min(best, one), spent + one
-    return best
+def clock_of(threads: int) -> Clock:
+    """Return what a call is timed by: the processor's time on one core, else that on the wall."""
+    return process_time if threads == 1 else perf_counter

@@ -21,7 +21,7 @@ from pyharness.model.report import (
 )
 
 _DRIFT = (
-    "One process and one run: the shortest calls of interleaved rounds, on one core in the "
+    "One process and one run: the shortest times of interleaved rounds, on one core in the "
     "processor's time, on more in that on the wall. Times drift with the machine and with what "
     "else it does: compare the ratios, not the rates."
 )

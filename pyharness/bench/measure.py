@@ -16,7 +16,7 @@ import numpy as np
 
 from pyharness.bench.contenders import Contender, Maker
 from pyharness.compare.candidates import End, Ready, not_finite
-from pyharness.compare.timing import seconds
+from pyharness.compare.timing import seconds, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
@@ -242,8 +242,7 @@ def _first_calls(
             break
         try:
             begin = perf_counter()
-            with np.errstate(all="ignore"), warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with silenced():
                 warnings.simplefilter("error", UserWarning)
                 ready = make(load.horizon, setting)
                 ready.run()

@@ -69,28 +69,47 @@ class Rates:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
-    """A load with the ends of its first bodies, which are as random as any."""
+class _Task:
+    """Bodies to be solved to a target error, or in `STEPS` steps of RK4 where there is no target.
+
+    The error is that of a sample: the first bodies, which are as random as any.
+    """
 
     load: EnsembleLoad
-    ends: dict[int, Array]
+    target: float | None
+    sample: EnsembleLoad
+    ends: Array  # of the sample, (n, 3)
 
     @property
-    def few(self) -> EnsembleLoad:
-        """The bodies whose ends are known."""
-        return self.load.part(slice(0, SAMPLE))
+    def place(self) -> str:
+        """The task in words."""
+        return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
+
+    def takes(self, each: EnsembleContender) -> bool:
+        """Whether the task is one for a contender."""
+        torque = self.load.torque is not None and each.torque_free
+        return not torque and (self.target is not None or each.setting == "steps")
 
     def error(self, omega: Array) -> float:
         """Return the largest error, each over the body's largest omega at start and end."""
-        worst = 0.0
-        for i in range(min(SAMPLE, len(omega))):
-            if i not in self.ends:
-                self.ends[i] = self.load.part([i]).ends()[0]
-            end = self.ends[i]
-            size = max(np.abs(end).max(), np.abs(self.load.omega0[i]).max())
-            found = float(np.abs(omega[i] - end).max() / size)
-            worst = max(worst, found if np.isfinite(found) else np.inf)
-        return worst
+        n = min(len(omega), len(self.ends))
+        ends, starts = self.ends[:n], self.sample.omega0[:n]
+        sizes = np.maximum(np.abs(ends).max(axis=1), np.abs(starts).max(axis=1))
+        errors = np.abs(omega[:n] - ends).max(axis=1) / sizes
+        return float(np.where(np.isfinite(errors), errors, np.inf).max())
+
+    def setting(self, each: EnsembleContender) -> float | None:
+        """Return the coarsest setting with at most the target error; None where there is none."""
+        if self.target is None:
+            return float(STEPS)
+        for setting in _ladder(each, self.target):
+            try:
+                omega = each.prepare(self.sample, setting, each.threads[0])()
+            except (InputError, RuntimeError, ValueError):
+                continue
+            if self.error(omega) <= self.target:
+                return setting
+        return None
 
 
 def measure_ensembles(
@@ -102,61 +121,37 @@ def measure_ensembles(
     """Measure all on all loads, to all errors; RK4 on the last load, in `STEPS` steps too."""
     found = Rates(seed, loads[0].n)
     for load in loads:
-        sample = _Sample(load, {})
-        tasks: list[float | None] = [*TARGETS, *([None] if load is loads[-1] else [])]
-        for target in tasks:
-            place = load.name + (f", {target:g}" if target else f", {STEPS} steps of RK4")
-            found.rows.extend(_rates(sample, target, contenders, found, place, say))
+        sample = load.part(slice(0, SAMPLE))
+        ends = sample.ends()
+        for target in (*TARGETS, None) if load is loads[-1] else TARGETS:
+            task = _Task(load, target, sample, ends)
+            found.rows.extend(_rates(task, contenders, found, say))
     return found
 
 
 def _rates(
-    sample: _Sample,
-    target: float | None,
-    contenders: Sequence[EnsembleContender],
-    found: Rates,
-    place: str,
-    say: Say,
+    task: _Task, contenders: Sequence[EnsembleContender], found: Rates, say: Say
 ) -> Iterator[Rate]:
     ready: list[tuple[Rate, Callable[[], Array]]] = []
-    for each in contenders:
-        if (each.torque_free and sample.load.torque is not None) or (
-            target is None and each.setting != "steps"
-        ):
-            continue
-        say(f"{place}: {each.name}")
+    for each in filter(task.takes, contenders):
+        say(f"{task.place}: {each.name}")
         with silenced():
-            setting = _setting(each, sample, target)
+            setting = task.setting(each)
             if setting is None:
-                found.refused.append((place, each.name, "no setting reaches it"))
+                found.refused.append((task.place, each.name, "no setting reaches it"))
                 continue
             shown = None if each.setting == "none" else setting
             for threads in each.threads:
-                load, run = _enough(each.prepare, sample.load, setting, threads)
-                rate = Rate(sample.load.name, target, each.name, threads, shown, load.n, 0.0,
-                            sample.error(run()))  # fmt: skip
+                load, run = _enough(each.prepare, task.load, setting, threads)
+                rate = Rate(load.name, task.target, each.name, threads, shown, load.n, 0.0,
+                            task.error(run()))  # fmt: skip
                 ready.append((rate, run))
     times = seconds(
-        [run for _, run in ready], _BATCH, ROUNDS, lambda text: say(f"{place}: {text}"), min,
+        [run for _, run in ready], _BATCH, ROUNDS, lambda text: say(f"{task.place}: {text}"), min,
         [clock_of(rate.threads) for rate, _ in ready], SLOW,
     )  # fmt: skip
     for (rate, _), best in zip(ready, times, strict=True):
         yield replace(rate, seconds=best)
-
-
-def _setting(each: EnsembleContender, sample: _Sample, target: float | None) -> float | None:
-    """Return the coarsest setting that keeps to an error on the sample; None where none does."""
-    if target is None:
-        return float(STEPS)
-    few = sample.few
-    for setting in _ladder(each, target):
-        try:
-            omega = each.prepare(few, setting, each.threads[0])()
-        except (InputError, RuntimeError, ValueError):
-            continue
-        if sample.error(omega) <= target:
-            return setting
-    return None
 
 
 def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:

@@ -26,7 +26,7 @@ from pyharness.methods.many_space import (
     NO_ATTITUDE,
     acts_in_space,
     inertia_scenes,
-    space_bodies,
+    solve_in_space,
 )
 from pyharness.methods.plan import FINEST
 from pyharness.methods.registry import REGISTRY, check_attitude, requested_tolerance
@@ -139,7 +139,12 @@ def solve_many(
     }  # fmt: skip
     if isinstance(scene, Scene):
         if acts_in_space(scene, torques.values()):
-            return _solve_in_space(scene, t_end, {**torques, **kinds, **starts}, out, **settings)
+            _, asked = _chosen(method, tolerance)
+            checked_scene(scene, any_axes=True, any_torque=True)
+            return solve_in_space(
+                scene, t_end, {**torques, **kinds, **starts}, out, method=method, tolerance=asked,
+                effort=checked_effort(effort), threads=threads_of(threads),
+            )  # fmt: skip
         if kind == "inertia" or (scene.inertia is not None and not kind):
             given = from_rows(inertia_scenes(scene, {**torques, **kinds}))
             own = {name: value for name, value in own.items() if name in starts}
@@ -187,22 +192,6 @@ def solve_many(
 def _is_special(scene: Scene) -> bool:
     checked_scene(scene, any_axes=True, any_torque=True)
     return scene.inertia is not None or scene.torque.in_space
-
-
-def _solve_in_space(
-    scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
-    method: str, tolerance: Number | None, effort: float, threads: int,
-) -> Ensemble:  # fmt: skip
-    """Solve bodies of a torque about the axes of space."""
-    _, asked = _chosen(method, tolerance)
-    bodies = space_bodies(
-        checked_scene(scene, any_axes=True, any_torque=True), t_end, method, arrays
-    )
-    found = place_for(out, bodies.n, with_attitude=True)
-    assert found.attitude is not None
-    ends = bodies.solve(method, asked, checked_effort(effort), threads_of(threads))
-    found.omega[:], found.status[:], found.attitude[:] = ends
-    return found
 
 
 def _solve_groups(

@@ -3,13 +3,14 @@
 Torques about the axes of space are solved one body after the other, by prepared solvers.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.methods.ensemble import Ensemble, place_for
 from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import check_torque
 from pyharness.model.arrays import count_bodies, row_of, rows_of, waves_of
@@ -28,47 +29,20 @@ NO_ATTITUDE = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class SpaceBodies:
-    """Bodies for a call each: arrays of one row are shared by all."""
-
-    n: int
-    scene_of: Callable[[int], Scene]  # an InputError of a body refuses that body alone
-    omega0: Array
-    attitude0: Array
-    times: Array
-
-    def solve(
-        self, method: str, tolerance: float, effort: float, threads: int
-    ) -> tuple[Array, NDArray[np.int8], Array]:
-        """Return angular velocities, statuses and attitudes."""
-        omega, attitude = np.full((self.n, 3), np.nan), np.full((self.n, 4), np.nan)
-        status = np.full(self.n, Statuses.REFUSED, np.int8)
-
-        def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
-            for i in range(piece.start, piece.stop):
-                if given_up[0]:
-                    return
-                try:
-                    solver = prepare(self.scene_of(i), method, tolerance, effort, attitude=True)
-                    start, turn = row_of(self.omega0, i), row_of(self.attitude0, i)
-                    omega[i], attitude[i] = solver(start, float(row_of(self.times, i)), turn)
-                except InputError:
-                    continue
-                status[i] = ENDS.index(solver.status)
-
-        for_each_piece(enter, self.n, threads)
-        return omega, status, attitude
-
-
 def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
     """Whether a torque about the axes of space acts: that of a scene, or arrays in its frame."""
     named = any(each is not None for each in arrays)
     return scene.torque.in_space or (scene.torque.frame == "space" and named)
 
 
-def space_bodies(scene: Scene, t_end: Any, method: str, arrays: dict[str, Any]) -> SpaceBodies:
-    """Return the bodies of a scene and of arrays, None where `solve_many` was given no array."""
+def solve_in_space(
+    scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
+    method: str, tolerance: float, effort: float, threads: int,
+) -> Ensemble:  # fmt: skip
+    """Solve the bodies of a scene and of arrays, None where `solve_many` was given no array.
+
+    An InputError of a body refuses that body alone.
+    """
     check_torque(scene, method, attitude=True)
     if arrays["coefficients"] is not None or scene.coefficients is not None:
         raise InputError(
@@ -84,7 +58,28 @@ def space_bodies(scene: Scene, t_end: Any, method: str, arrays: dict[str, Any]) 
     times = rows_of("t_end", t_end)
     n = count_bodies({**rows, "omega0": starts, "attitude0": attitudes, "t_end": times})
     at_rest = replace(scene, omega=_REST, attitude=None)
-    return SpaceBodies(n, lambda i: scene_of_row(at_rest, rows, i), starts, attitudes, times)
+    found = place_for(out, n, with_attitude=True)
+    assert found.attitude is not None
+    # The starts may lie where the results go.
+    omega, attitude = np.full((n, 3), np.nan), np.full((n, 4), np.nan)
+    found.status[:] = Statuses.REFUSED
+
+    def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
+        for i in range(piece.start, piece.stop):
+            if given_up[0]:
+                return
+            try:
+                body = scene_of_row(at_rest, rows, i)
+                solver = prepare(body, method, tolerance, effort, attitude=True)
+                start, turn = row_of(starts, i), row_of(attitudes, i)
+                omega[i], attitude[i] = solver(start, float(row_of(times, i)), turn)
+            except InputError:
+                continue
+            found.status[i] = ENDS.index(solver.status)
+
+    for_each_piece(enter, n, threads)
+    found.omega[:], found.attitude[:] = omega, attitude
+    return found
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:

@@ -11,7 +11,6 @@ from pyharness.model.arrays import (
     ABOVE_ZERO,
     FINITE,
     FROM_ZERO,
-    Rule,
     count_bodies,
     only_one,
     rows_of,
@@ -34,13 +33,6 @@ from pyharness.original.equations import card_torque
 _LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
 _PIECES = 8  # for each thread, as bodies may end early
 _NOT_REACHED = -1
-# The shape of what a body is given, and what is allowed.
-_GIVEN: dict[str, tuple[tuple[int, ...], Rule]] = {
-    "omega0": ((3,), FINITE),
-    "torque_constant": ((3,), FINITE),
-    "step_size": ((), ABOVE_ZERO),
-    "lipschitz": ((), FROM_ZERO),
-}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,22 +130,21 @@ def run_many(
     may_stop, velocity = truth("may_stop", may_stop), truth("velocity", velocity)
     threads = threads_of(threads)
     law = scene.torque
-    given = {
-        "moments": moments, "coefficients": coefficients, "omega0": omega0,
-        "torque_constant": torque_constant, "step_size": step_size, "lipschitz": lipschitz,
-    }  # fmt: skip
-    scene_values = {
-        "moments": scene.moments, "coefficients": scene.coefficients, "omega0": scene.omega,
-        "torque_constant": law.constant, "step_size": scene.step_size,
-    }  # fmt: skip
-    kind = kind or ("coefficients" if scene.moments is None else "moments")
+    if not kind:
+        moments, coefficients = scene.moments, scene.coefficients
+        kind = "coefficients" if moments is None else "moments"
     by_moments = kind == "moments"
-    body = {kind: ((3,), ABOVE_ZERO if by_moments else FINITE)}
+    bodies, rule = (moments, ABOVE_ZERO) if by_moments else (coefficients, FINITE)
+    omega0 = scene.omega if omega0 is None else omega0
+    torque_constant = law.constant if torque_constant is None else torque_constant
+    step_size = scene.step_size if step_size is None else step_size
     inputs = {
-        name: rows_of(name, scene_values.get(name) if given[name] is None else given[name], *shape,
-                      rule=rule)
-        for name, (shape, rule) in {**body, **_GIVEN}.items()
-    }  # fmt: skip
+        kind: rows_of(kind, bodies, 3, rule=rule),
+        "omega0": rows_of("omega0", omega0, 3, rule=FINITE),
+        "torque_constant": rows_of("torque_constant", torque_constant, 3, rule=FINITE),
+        "step_size": rows_of("step_size", step_size, rule=ABOVE_ZERO),
+        "lipschitz": rows_of("lipschitz", lipschitz, rule=FROM_ZERO),
+    }
     n = count_bodies(inputs)
     inputs["body"] = inputs.pop(kind)
     if law.frame == "space" and inputs["torque_constant"].any():
@@ -174,30 +165,14 @@ def run_many(
         else:
             with np.errstate(over="ignore"):
                 first = np.array(cards) / inputs["body"]
-    return _run(
-        scene,
-        listing,
-        by_moments,
-        {**inputs, "first": first},
-        n,
-        wanted,
-        may_stop,
-        velocity,
-        threads,
-    )
+    inputs["first"] = first
+    return _run(scene, listing, by_moments, inputs, n, wanted, may_stop, velocity, threads)
 
 
 def _run(
-    scene: Scene,
-    listing: Listing,
-    by_moments: bool,
-    inputs: dict[str, Array],
-    n: int,
-    wanted: NDArray[np.int32],
-    may_stop: bool,
-    velocity: bool,
-    threads: int,
-) -> ProgramEnsemble:
+    scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
+    wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
+) -> ProgramEnsemble:  # fmt: skip
     """Run what was checked."""
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())

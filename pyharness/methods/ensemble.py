@@ -17,12 +17,12 @@ class Ensemble(BatchResult):
     Attributes
     ----------
     omega : ndarray, shape (n, 3)
-        Angular velocity about the body axes, rad/s; NaN where there is no result.
+        Angular velocities about the body axes, rad/s; NaN where there is no result.
     status : ndarray of int8, shape (n,)
-        How each ended: 0 complete, 2 overflow, 3 refused, 4 gave up, 6 sensitive, which is a result
-        too.
+        How each body ended: 0 complete, 2 overflow, 3 refused, 4 gave up, 6 sensitive. A sensitive
+        result is a result too.
     attitude : ndarray, shape (n, 4), or None
-        Quaternions from body to space, scalar first; None where they were not asked for.
+        Quaternions from body to space, scalar first; None if they were not requested.
     """
 
     attitude: Array | None = None

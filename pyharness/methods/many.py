@@ -1,7 +1,7 @@
-"""Many bodies in one call: side by side in the kernel, and on several cores where asked.
+"""Many bodies in one call: side by side in the kernel, and on several cores if requested.
 
-The result of a body depends on that body alone: no other body, no order and no number of threads
-changes a bit of it.
+The result of a body depends on that body alone: it is bit for bit the same whatever the other
+bodies, their order and the number of threads.
 """
 
 from collections.abc import Sequence
@@ -76,46 +76,48 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        What is not given as an array is taken from it; or all scenes, and no arrays.
+        The scene that supplies what no array supplies; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
-        Time of the results, s, on either side of 0.
+        Times of the results, s, on either side of 0.
     omega0, moments, coefficients, torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Starts (rad/s), moments (kg m2) or A, B, C, torque (N m; 1/s2 for bodies of coefficients)
-        and its rate, of each body or of all.
+        Initial angular velocities (rad/s), moments (kg m2) or A, B, C, torques (N m; 1/s2 for
+        bodies given by coefficients) and their rates. An array of one row is shared by all bodies.
     inertia : array, shape (n, 3, 3) or (3, 3)
         Full inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the
         axes of the matrix. Finding the principal axes takes some tenths of a millisecond a body.
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        Waves of torque: an amplitude of three, and the frequency (rad/s).
+        Waves of torque: three components of the amplitude, and the frequency (rad/s).
     attitude0 : array, shape (n, 4) or (4,)
-        Quaternions at time 0, body to space, scalar first; with them the attitudes are found.
+        Quaternions at time 0, from body to space, scalar first. If they are given, attitudes are
+        returned.
     method : str
         A name in `PREPARED`; `auto` is the closed form for each body without torque and for each
         sphere, and the series for any other.
     tolerance : float
-        As in `prepare`: largest error at the end, relative to the largest omega on the way; by
-        default the method's own.
+        The largest error at the end, relative to the largest omega from 0 to the end, as in
+        `prepare`; by default the method's own.
     step : float, optional
-        Of the methods with a fixed step, s; by default the scene's.
+        Step size of the methods with a fixed step, s; by default the scene's.
     effort : float
-        Factor on the work for a body, beyond which its status is `gave up`.
+        Factor on the work limit of a body, beyond which its status is `gave up`.
     threads : int
-        Cores at work: the kernel holds no lock.
+        The number of threads: the kernel releases the interpreter's lock.
     out : Ensemble, or array of shape (n, 3), optional
-        What to write into: the result of a call before with as many bodies, or an array for omega.
+        Where to write: the result of an earlier call with as many bodies, or an array for omega.
 
     Returns
     -------
     Ensemble
-        A body that can't be solved has NaN and its status, and spoils no other: so has one with a
-        number that is not finite, or a moment that is not above 0.
+        The ends. A body that can't be solved, such as one with a number that is not finite or a
+        moment that is not above 0, has NaN and a status that says so; it affects no other body.
 
     Raises
     ------
     InputError
-        For arrays that do not fit together, an unknown method, one that can't take what is asked.
+        If the arrays differ in their numbers of rows, or the method is unknown or can't solve such
+        bodies.
     NotBuiltError
-        Where the extension is not built.
+        If the extension is not built.
 
     Examples
     --------
@@ -198,7 +200,7 @@ def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Solve scenes of several kinds, each as if alone: about which axes the body and torque are."""
+    """Solve scenes that differ in the axes of body and torque, each kind in a call of its own."""
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):
         raise InputError(NO_ATTITUDE)
@@ -221,7 +223,7 @@ def _solve_groups(
 
 
 class _Bodies:
-    """What the kernel is given, checked: arrays of one row are shared by all bodies."""
+    """The checked arguments of the kernel; an array of one row is shared by all bodies."""
 
     def __init__(
         self, given: dict[str, Any], t_end: Any, code: int, tolerance: float, effort: float

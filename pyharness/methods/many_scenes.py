@@ -1,4 +1,4 @@
-"""Scenes as the arrays of `solve_many`; a full inertia matrix as principal moments and axes."""
+"""Scenes as the arrays of `solve_many`; full inertia matrices as principal moments and axes."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ from pyharness.model.trajectory import Array
 
 
 class Axes:
-    """Principal axes of bodies with a full inertia matrix; one row is that of all bodies."""
+    """The principal axes of bodies with full inertia matrices; one row is shared by all bodies."""
 
     def __init__(self, axes: Array, turns: Array) -> None:
         """Take axes, columns of (n, 3, 3), and the same rotations as quaternions, (n, 4)."""

@@ -1,4 +1,4 @@
-"""Many bodies as a scene for each: torques about the axes of space, and full inertia matrices.
+"""Many bodies as single scenes: torques about the axes of space, and full inertia matrices.
 
 Torques about the axes of space are solved one body after the other, by prepared solvers.
 """

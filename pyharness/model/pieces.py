@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-# Some milliseconds, after which Python looks at the user.
+# Bodies of a piece: some milliseconds, after which Python checks for a signal.
 _PIECE = 1 << 18
-# That no thread is worth.
+# Bodies that are too few for a thread.
 _SMALL = 256
 
 
@@ -41,11 +41,10 @@ def share(
 
 
 def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
-    """Call `work` for the pieces that n bodies fall into, in so many threads.
+    """Call `work` for pieces of n bodies, in a number of threads.
 
-    It is given a number too, which is not 0 where the rest is not wanted any more.
-
-    Pieces as large as each other: a body alone in one would be solved another way.
+    `work` takes a piece and an array of one number, which is not 0 once the user has interrupted.
+    All pieces have nearly the same size, as a body alone in a piece would be solved in another way.
     """
     if not n:
         return

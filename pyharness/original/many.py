@@ -1,4 +1,4 @@
-"""The programs of the appendix on many bodies in one call, with the bits of the single runs."""
+"""The programs of the appendix for many bodies in one call, bit for bit as in single runs."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -46,20 +46,22 @@ class ProgramEnsemble(BatchResult):
     status : ndarray of int8, shape (n,)
         COMPLETE, STOPPED or OVERFLOW of pyharness/model/codes.py.
     at : ndarray of int, shape (m,)
-        The steps whose rows these are, from 1.
+        The steps of these rows, from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Velocity along the body axes, m/s.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
-        The TIME that TAPE5 got, s; in one row for all NaN where no body has the row.
+        The TIME that was written to TAPE5, s. A single row for all bodies has NaN at a step that
+        no body reached.
     n_rows : ndarray of int32, shape (n,)
-        Steps that hold a result.
+        The number of steps with a result.
     stop_variable : ndarray of int8, shape (n,)
-        What ended a run: 1-3 U1-U3, 4-6 V1-V3, 7 the norm of U, 8 that of U and V; 0 for nothing.
+        The variable that ended a run: 1-3 U1-U3, 4-6 V1-V3, 7 the norm of U, 8 the norm of U and
+        V; 0 if the stop test did not end it.
     stop_quotient : ndarray, shape (n,)
-        Change of K over change of U (1/s) there; infinite where U did not change, NaN where nothing
-        ended the run.
+        The change of K over the change of U (1/s) where the stop test ended a run: infinite if U
+        did not change, NaN if the test did not end the run.
     ier : ndarray of int32, shape (n, m), or None
-        IER as the collocation programs print it.
+        IER as the collocation programs print it; None for the Runge-Kutta program.
     """
 
     at: NDArray[np.int32]
@@ -88,41 +90,43 @@ def run_many(
     threads: SupportsIndex = 1,
     effort: Number = 1.0,
 ) -> ProgramEnsemble:
-    """Run the compiled program of a listing on n bodies: for each the bits of its `run_program`.
+    """Run a listing's compiled program for n bodies, each bit for bit as `run_program` does.
 
     Parameters
     ----------
     scene : Scene
-        What all have in common.
+        The scene that supplies what no array supplies.
     listing : Listing
         The program, its active defects and readings.
     omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
-        In place of the scene's; one of `moments` and `coefficients` at the most.
+        Values in place of the scene's: angular velocities (rad/s), moments (kg m2) or A, B, C, and
+        torques (N m). At most one of `moments` and `coefficients` may be given.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
-        The scene's step size, and 500/s.
+        Step sizes (s; by default the scene's) and constants of the stop test (1/s).
     may_stop : bool
         Whether the stop test, which only the Runge-Kutta program has, may end runs.
     velocity : bool
-        Whether the velocity is wanted.
+        Whether to return the velocities.
     at : sequence of int, optional
-        The steps whose rows are wanted, from 1, in any order; the last step by default.
+        The steps whose rows to return, from 1, in any order; by default the last step.
     threads : int
-        Threads that share the bodies; no bit depends on this.
+        The number of threads that share the bodies; no bit depends on it.
     effort : float
-        Factor on the steps of all bodies, times waves, that are run without being asked for.
+        Factor on the work limit: steps times waves of all bodies.
 
     Returns
     -------
     ProgramEnsemble
-        A row for each body; one for all where nothing was given as an array.
+        The results of n bodies. An array of one row is shared by all bodies; without any longer
+        array n is 1.
 
     Raises
     ------
     InputError
-        For what `run_program` refuses of any body, naming its row, and for arrays that don't fit
-        together or in memory.
+        If `run_program` would refuse a body (the message names its row), or if the arrays differ
+        in their numbers of rows, or do not fit in memory.
     NotBuiltError
-        Where the extension is not built.
+        If the extension is not built.
     """
     kind = only_one({"moments": moments, "coefficients": coefficients})
     checked_scene(scene, any_axes=bool(kind))

@@ -3,7 +3,6 @@
 from pyharness.ensembles.batches import batches
 from pyharness.ensembles.reductions import empty, reduced
 from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points
-from pyharness.methods.solved_batch import SolvedBatch
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
@@ -19,7 +18,6 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
     for members, batch in batches(sweep, where):
-        solved = SolvedBatch(batch)
         for asked in sweep.reductions:
-            found[asked.name][members] = reduced(asked, solved)
+            found[asked.name][members] = reduced(asked, batch)
     return found

@@ -52,7 +52,7 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
         Of the file. A scene file named in it is looked for beside it.
     claims : mapping, optional
         Where the function of each claim stands, as in ``package.module:name``. It takes a
-        `SolvedBatch` of n scenes, and returns 1 for each that the claim holds of, 0 where it
+        `Batch` of n scenes, and returns 1 for each that the claim holds of, 0 where it
         fails, 2 where it says nothing.
 
     Raises

@@ -1,17 +1,20 @@
-"""Batches: scenes that one call solves, as a scene and the arrays in which they differ."""
+"""Batches: a scene and the arrays in which others differ from it, solved by one call."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.methods.ensemble import Ensemble
 from pyharness.methods.many import solve_many
 from pyharness.methods.many_space import scene_of_row
-from pyharness.methods.registry import METHODS, REGISTRY
+from pyharness.methods.registry import METHODS, REGISTRY, requested_tolerance
 from pyharness.methods.solve import solve
 from pyharness.methods.solver import PREPARED
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
@@ -44,7 +47,10 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Scenes that share the method or program that solves them.
+    """Scenes that share the method or program that solves them, and their results.
+
+    A result is computed when it is first read. The functions of claims may read `omega0`, `omega`,
+    `status`, `n_rows` and `stop_variable`, and call `rows` and `by_method`.
 
     Attributes
     ----------
@@ -82,12 +88,106 @@ class Batch:
         """Moments, (n, 3), or (1, 3) where all scenes have the same."""
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
+    @property
+    def is_program(self) -> bool:
+        """Whether a program solves the batch, and not a method."""
+        return self.listing is not None
+
+    @cached_property
+    def omega(self) -> Array:
+        """Omega at the end, (n, 3); NaN where the end was not reached."""
+        return self._program.omega[:, -1] if self.is_program else self._ends.omega
+
+    @property
+    def status(self) -> NDArray[np.int8]:
+        """How each scene ended, (n,), as in `pyharness.model.codes.Statuses`."""
+        return (self._program if self.is_program else self._ends).status
+
+    @property
+    def n_rows(self) -> NDArray[np.int32]:
+        """The number of steps for which a program gave a row, (n,)."""
+        return self._program.n_rows
+
+    @property
+    def stop_variable(self) -> NDArray[np.int8]:
+        """The variable that ended a program, (n,), from 1 as in `STOP_VARIABLES`; 0 for none."""
+        return self._program.stop_variable
+
+    def sample_steps(self, samples: int) -> list[int]:
+        """Return the steps of a program that are nearest to `samples` equal parts of the time."""
+        steps = self.scene.steps
+        return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
+
+    def rows(self, samples: int) -> Array:
+        """Return omega at the ends of `samples` equal parts of the time, (n, samples, 3).
+
+        A method solves each anew from the start, so that errors do not add up; a program has the
+        steps nearest to them.
+        """
+        if samples not in self._rows:
+            if self.is_program:
+                found = self.run(self.sample_steps(samples)).omega
+            else:
+                parts = [(i + 1) / samples for i in range(samples - 1)]
+                ends = [self._solve_own(self.t_end * part).omega for part in parts]
+                found = np.stack([*ends, self.omega], axis=1)
+            self._rows[samples] = found
+        return self._rows[samples]
+
+    def attitudes(self, samples: int) -> Array:
+        """Return quaternions at the same times, (n, samples, 4), from (1, 0, 0, 0) at the start."""
+        ends = []
+        for i in range(samples):
+            part = (i + 1) / samples
+            found = self._solve_own(self.t_end * part, attitude0=IDENTITY)
+            assert found.attitude is not None
+            ends.append(found.attitude)
+        return np.stack(ends, axis=1)
+
+    def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
+        """Return omega (n, 3) by another method, after a `part` of the time."""
+        return self._solve(method, tolerance, self.t_end * part).omega
+
+    def from_start(self, omega0: Array) -> "Batch":
+        """Return the same batch from other starts, (n, 3)."""
+        return replace(self, arrays={**self.arrays, "omega0": omega0})
+
+    def run(self, at: list[int]) -> ProgramEnsemble:
+        """Return the rows of all scenes by the program, at steps in ascending order.
+
+        A scene that the program can't take is refused alone; there is then no IER.
+        """
+        if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all
+            try:
+                return self._run(self.scene, self.arrays, at)
+            except InputError:  # of some scene
+                pass
+        return self._run_each(at)
+
     def scene_of(self, i: int) -> Scene:
         """Return the scene with index `i`; InputError where its numbers are no scene."""
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(replace(self.scene, attitude=None), own, i)
 
-    def solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
+    @cached_property
+    def _ends(self) -> Ensemble:
+        return self._solve_own(self.t_end)
+
+    @cached_property
+    def _program(self) -> ProgramEnsemble:
+        return self.run([self.scene.steps])
+
+    @cached_property
+    def _rows(self) -> dict[int, Array]:
+        return {}
+
+    def _solve_own(self, t_end: Array, **more: tuple[float, ...]) -> Ensemble:
+        method = self.solver.method
+        assert method is not None
+        tolerance = requested_tolerance(method, self.solver.tolerance)
+        return self._solve(method, tolerance, t_end, **more)
+
+    def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
         """Return the ends of all scenes by a method: in one call where it takes arrays."""
         if method not in PREPARED:
             return self._solve_each(method, tolerance, t_end)
@@ -110,18 +210,6 @@ class Batch:
             if found.has_all_rows:
                 ends[i] = found.omega[-1]
         return Ensemble(ends, status)
-
-    def run(self, at: list[int]) -> ProgramEnsemble:
-        """Return the rows of all scenes by the program, at steps in ascending order.
-
-        A scene that the program can't take is refused alone; there is then no IER.
-        """
-        if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all
-            try:
-                return self._run(self.scene, self.arrays, at)
-            except InputError:  # of some scene
-                pass
-        return self._run_each(at)
 
     def _run_each(self, at: list[int]) -> ProgramEnsemble:
         n, steps = len(self.omega0), np.array(at, np.int32)

@@ -233,6 +233,6 @@ def test_what_is_no_number_is_no_flip() -> None:
     rows = np.stack([middle * 0.0, middle, middle * 0.0], axis=1)[None, :, :]
     solved = SimpleNamespace(
         omega0=rows[:, 0], rows=lambda samples: rows[:, 1 : 1 + samples],
-        batch=SimpleNamespace(bodies=np.array([[1.0, 2.0, 3.0]])),
+        bodies=np.array([[1.0, 2.0, 3.0]]),
     )  # fmt: skip
     assert REDUCTIONS["flips"].compute(solved, {"samples": 4}).tolist() == [2]  # type: ignore[arg-type]

@@ -13,7 +13,6 @@ from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, JUDGED, 
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.methods.batch import Batch, Solver
-from pyharness.methods.solved_batch import SolvedBatch
 from pyharness.model.listing import Listing, corrected, original, subset
 from pyharness.model.scene import Triple
 from pyharness.model.scene_file import case_scene
@@ -34,12 +33,12 @@ STARTS = [*starts(), *_random(20)]
 
 def _solved(
     omega0: list[Triple] | Array, listing: Listing | None, steps: int = 100, **more: Any
-) -> SolvedBatch:
+) -> Batch:
     """Return what a sweep hands over."""
     scene = replace(case_scene(4), steps=steps)
     starts = {"omega0": np.array(omega0)}
     batch = Batch(scene, Solver(), listing, np.full(len(omega0), 1.0), starts)
-    return SolvedBatch(replace(batch, **more))
+    return replace(batch, **more)
 
 
 def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[int]:

@@ -19,7 +19,6 @@ from pyharness.history.claims.ledger import claim, claims
 from pyharness.history.claims.rules import Runs
 from pyharness.methods.batch import Batch
 from pyharness.methods.many import solve_many
-from pyharness.methods.solved_batch import SolvedBatch
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
 from pyharness.model.scene import Scene, TorqueLaw
@@ -130,27 +129,26 @@ FUNCTIONS = {name: f"{__name__}:{name}" for name in JUDGED}
 """Where the function of each stands, for a sweep."""
 
 
-def __getattr__(name: str) -> Callable[[SolvedBatch], NDArray[np.int8]]:
+def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
     if name not in JUDGED:
         raise AttributeError(name)
     return partial(codes, name)
 
 
-def codes(identity: str, solved: SolvedBatch) -> NDArray[np.int8]:
+def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     """Return for each start of a sweep whether a claim holds of the programs.
 
     Silent where the sweep is of no case of Table 1, or varies more of it than starts, readings and
     steps. Of the case a claim is about nothing is asked: it is the claim's own.
     """
-    batch = solved.batch
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
     if "steps" in entry["assumptions"]:
         chosen = replace(chosen, steps=batch.scene.steps)
     one = _laboratory(batch, chosen)
     if one is None:
-        return np.full(len(solved.omega0), SILENT, np.int8)
-    return judged(entry, _bench(one, solved), len(solved.omega0))
+        return np.full(len(batch.omega0), SILENT, np.int8)
+    return judged(entry, _bench(one, batch), len(batch.omega0))
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
@@ -161,9 +159,9 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 
 
 @lru_cache(maxsize=2)
-def _bench(one: Laboratory, solved: SolvedBatch) -> Starts:
+def _bench(one: Laboratory, batch: Batch) -> Starts:
     # Two: of the steps asked for, and of those of claims that do not hang on them.
-    return Starts(one, solved.omega0)
+    return Starts(one, batch.omega0)
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:

@@ -16,9 +16,7 @@ from pyharness.bench.ensemble_contenders import (
 )
 from pyharness.bench.ensemble_measure import SLOW, STEPS, clock_of
 from pyharness.compare.timing import seconds
-from pyharness.methods.many import Ensemble, solve_many
 from pyharness.methods.prepared import prepare
-from pyharness.model.trajectory import Array
 
 SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
 _BATCH, _ROUNDS = 0.02, 5
@@ -88,23 +86,18 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 def needed(method: str, bodies: int) -> None:
     """Print the bytes of arrays in and out, and the growth of this process up to its peak."""
-    _, load = draw("memory", 512)
-
-    def run(omega0: Array, torque: Array | None) -> Ensemble:
-        return solve_many(
-            load.scene, HORIZON, omega0=omega0, torque_constant=torque, method=method,
-            tolerance=1e-12, step=HORIZON / STEPS,
-        )  # fmt: skip
-
-    free = method == "closed-form"
-    run(load.omega0, None if free else load.torque)
+    own = next(each for each in own_ensembles() if each.name == method)
+    load = draw("memory", 512)[0 if own.torque_free else 1]
+    own.prepare(load, SETTINGS[method], 1)()
     before = _resident("VmRSS")
     source = np.random.default_rng(1)
-    given = [np.empty((bodies, 3)) for _ in range(1 if free else 2)]
+    given = [np.empty((bodies, 3)) for _ in range(1 if own.torque_free else 2)]
     for array in given:
         source.random(out=array)
-    found = run(given[0], None if free else given[1])
-    arrays = sum(each.nbytes for each in given) + found.omega.nbytes + found.status.nbytes
+    many = EnsembleLoad("memory", given[0], None if own.torque_free else given[1])
+    omega = own.prepare(many, SETTINGS[method], 1)()
+    statuses = bodies  # a byte each
+    arrays = sum(each.nbytes for each in given) + omega.nbytes + statuses
     print(arrays, _resident("VmHWM") - before)
 
 

@@ -23,6 +23,7 @@ module space_torque
   ! one in some thousand does; three do not.
   real(dp), parameter :: TRUSTED = 0.1_dp
   real(dp), parameter :: MARGIN = 1.5_dp        ! of a difference that is the error itself
+  real(dp), parameter :: ONE_SAMPLE = 10.0_dp   ! another may be so much larger
   ! Of the largest omega, in turn about every axis: the perturbation of every other integration.
   real(dp), parameter :: PERTURBATION(3) = 2.0_dp**(-52)*[1.0_dp, -0.8_dp, 0.6_dp]
   real(dp), parameter :: SHORTER = 0.5_dp
@@ -153,8 +154,8 @@ contains
     found(3) = spent
     if (status == COMPLETE .and. .not. error + blurred <= tolerance) then
       status = SENSITIVE
-      ! Rounding of the torque is amplified as that of omega is.
-      found(1) = max(found(1), min(1.0_dp, blurred*(error/ROUNDING)))
+      ! Of amplified rounding errors there is one sample.
+      found(1) = ONE_SAMPLE*found(1)
     end if
     if (status == GAVE_UP) then
       if (marches == 1) now%ahead = MARCHES*now%ahead

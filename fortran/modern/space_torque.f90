@@ -23,7 +23,7 @@ module space_torque
   ! one in some thousand does; three do not.
   real(dp), parameter :: TRUSTED = 0.1_dp
   real(dp), parameter :: MARGIN = 1.5_dp        ! of a difference that is the error itself
-  real(dp), parameter :: ONE_SAMPLE = 10.0_dp   ! another may be so much larger
+  real(dp), parameter :: ONE_SAMPLE = 4.0_dp    ! another may be so much larger
   ! Of the largest omega, in turn about every axis: the perturbation of every other integration.
   real(dp), parameter :: PERTURBATION(3) = 2.0_dp**(-52)*[1.0_dp, -0.8_dp, 0.6_dp]
   real(dp), parameter :: SHORTER = 0.5_dp

@@ -285,7 +285,7 @@ def test_no_record_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 # One in the languages, one in a prepared solver: all are what `verify --self-test` is run for.
 @pytest.mark.parametrize("name", ["sign-in-both", "stale-solver"])
 def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
-    chosen = Selection(seed="fixed", draws=12, thin=True)
+    chosen = Selection(seed="fixed", draws=12, thin=True, only=BY_NAME[name].kinds)
     with BY_NAME[name].planted():
         caught = self_test._caught(BY_NAME[name], chosen)
     assert caught.passed
@@ -293,12 +293,16 @@ def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
 
 
 def test_plant_that_nothing_catches_is_a_failure(capsys: pytest.CaptureFixture[str]) -> None:
-    harmless = Plant("harmless", "no fault at all", nullcontext)
+    harmless = Plant("harmless", "no fault at all", nullcontext, ("cells",))
     with patch.object(self_test, "PLANTS", (harmless,)):
         assert main(["verify", "--self-test"]) == 1
     output = capsys.readouterr().out
     assert "FAILED harmless" in output
     assert "1 plants and a control: 1 not as it should be" in output
+
+
+def test_every_kind_but_the_record_has_a_plant() -> None:
+    assert {kind for plant in PLANTS for kind in plant.kinds} == set(KINDS) - {"golden"}
 
 
 def test_plants_leave_nothing_behind() -> None:

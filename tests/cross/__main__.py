@@ -41,7 +41,10 @@ CALLING = (
     "--deselect=tests/original/test_programs.py::test_every_cell_agrees",
     "--deselect=tests/original/test_programs.py::test_nasty_scenes_agree",
     # The same kernels on many more bodies, the slowest of all with checks.
-    "--deselect=tests/methods/test_many_alone.py::test_no_bit_depends_on_other_bodies",
+    "--ignore=tests/methods/test_many_alone.py",
+    # How soon a kernel ends is no question of bits, and how pip builds none of kernels.
+    "--deselect=tests/methods/test_interruption.py::test_kernel_ends_at_once",
+    "--ignore=tests/model/test_build.py",
 )
 # Recursion: the entries release the lock, so that two threads may well be in one of them.
 CHECKED = (

@@ -67,7 +67,7 @@ contains
     integer, intent(out) :: status          !! 0 complete, 2 overflow, 4 gave up, 5 interrupted, 6
     integer(int64), intent(out) :: steps    !! of the last march
     real(dp), intent(out) :: needed         !! effort, as far as known; where it gave up
-    real(dp), intent(out) :: found(3)       !! error; growth, unknown; steps of all marches
+    real(dp), intent(out) :: found(3)       !! error; growth, unknown; steps of all integrations
     real(dp), allocatable :: before(:, :), before_q(:, :)
     type(outcome_t) :: last, now ! the march before, and this one
     real(dp) :: share         ! part of the scale that the last terms of this march may have
@@ -76,7 +76,8 @@ contains
     real(dp) :: cost, most, spent
     real(dp) :: error
     real(dp) :: blurred       ! by rounding of torques that cancel, relative
-    integer :: marches, failed
+    integer :: count          ! of integrations
+    integer :: failed
     logical :: is_perturbed   ! this integration
 
     n_rows = 0
@@ -100,35 +101,35 @@ contains
     most = effort*(MOST_STEPS/cost)
     spent = 0.0_dp
     error = NO_DIGIT
-    marches = 0
+    count = 0
     do
-      is_perturbed = mod(marches, 2) == 0
+      is_perturbed = mod(count, 2) == 0
       ! Integrations with the same local tolerance differ by their order.
       call march(problem, ratios, omega, is_perturbed, share, &
-                 order_for(share) + 2*mod(marches, 2), h, most - spent, &
+                 order_for(share) + 2*mod(count, 2), h, most - spent, &
                  1 + int(BETWEEN_LOOKS/cost, int64), times, rows, attitudes, now)
-      marches = marches + 1
+      count = count + 1
       spent = spent + real(now%steps, dp)
       if (now%status == GAVE_UP .or. now%status == INTERRUPTED) exit
-      if (marches > 1) then
+      if (count > 1) then
         error = NO_DIGIT
         if (last%n_rows == now%n_rows) then
           error = difference(rows(:, :now%n_rows), before(:, :now%n_rows), now%scale, &
                              attitudes(:, 1:now%n_rows), before_q(:, :now%n_rows))
         end if
-        if (error <= merge(1.0_dp, TRUSTED, marches > 2)*tolerance &
+        if (error <= merge(1.0_dp, TRUSTED, count > 2)*tolerance &
             .and. last%status == now%status) exit
         if (share_before <= LEAST_SHARE) exit
       end if
       next = FINER*share
-      if (marches > 1) next = min(next, SAFETY*share_before*(tolerance/error))
+      if (count > 1) next = min(next, SAFETY*share_before*(tolerance/error))
       last = now
       before(:, :) = rows
       before_q(:, :) = attitudes(:, 1:)
       share_before = share
       share = max(LEAST_SHARE, next)
     end do
-    if (is_perturbed .and. marches > 1 .and. now%status /= GAVE_UP &
+    if (is_perturbed .and. count > 1 .and. now%status /= GAVE_UP &
         .and. now%status /= INTERRUPTED) then
       ! The other one has the error that was found: all of it, not a hundredth.
       error = MARGIN*error
@@ -158,7 +159,7 @@ contains
       found(1) = ONE_SAMPLE*found(1)
     end if
     if (status == GAVE_UP) then
-      if (marches == 1) now%ahead = MARCHES*now%ahead
+      if (count == 1) now%ahead = MARCHES*now%ahead
       needed = (spent - real(now%steps, dp) + now%ahead)*cost/MOST_STEPS
       steps = int(spent, int64)
     end if

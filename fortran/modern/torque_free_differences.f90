@@ -28,7 +28,7 @@ module torque_free_differences
 contains
 
   subroutine torque_free_growth_bound(coefficients, omega0, t_end, bound, amplified)
-    !! A number above the growth that costs a hundredth of it; huge where none is known.
+    !! An upper bound of the growth, by a formula with a measured margin; huge where there is none.
     !! A perturbation changes the amplitudes and the frequency of a motion. The change of frequency
     !! becomes a shift of time, in proportion to the time.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C

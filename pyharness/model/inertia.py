@@ -126,7 +126,7 @@ def _turned(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant of orthonormal axes, 1 or -1, for which few digits will do."""
+    """Return the determinant of orthonormal axes, 1 or -1; in floats, as its sign is needed."""
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 

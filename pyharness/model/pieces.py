@@ -44,7 +44,7 @@ def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, thr
     """Call `work` for pieces of n bodies, in a number of threads.
 
     `work` takes a piece and an array of one number, which is not 0 once the user has interrupted.
-    All pieces have nearly the same size, as a body alone in a piece would be solved in another way.
+    All pieces have nearly the same size, so that no thread waits long for another.
     """
     if not n:
         return

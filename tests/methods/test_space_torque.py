@@ -299,6 +299,17 @@ def test_giving_up_says_what_would_do() -> None:
     assert solve(PUSHED, [1000.0], attitude=True, effort=advised).has_all_rows
 
 
+def test_giving_up_in_the_first_integration_counts_the_second() -> None:
+    """Here the steps of a second stay as they are, so that the work is known from the first."""
+    calm = replace(
+        PUSHED, omega=(0.0, 1.0, 10.0), torque=replace(PUSHED.torque, constant=(0.0, 0.0, 1e-9))
+    )
+    with pytest.raises(InputError, match=r"--effort") as refused:
+        solve(calm, [1000.0], attitude=True, effort=1e-4)
+    advised = float(str(refused.value).split("--effort ")[1].split(" ")[0])
+    assert solve(calm, [1000.0], attitude=True, effort=advised).has_all_rows
+
+
 def test_prepared_solver_agrees_with_solve() -> None:
     scene = SCENES["waves"]
     solver = prepare(scene, attitude=True)

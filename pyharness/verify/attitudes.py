@@ -7,7 +7,6 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.compare.checks import REFUSED, Check, Sample, bounded
-from pyharness.compare.random_scenes import draw
 from pyharness.methods.prepared import prepare
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
@@ -16,6 +15,7 @@ from pyharness.model.attitude import Quaternion, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.scenes.random_scenes import draw
 from pyharness.theory.conditioning import Conditioning, conditioning
 from pyharness.truth.reference import Reference, reference
 from pyharness.verify.selection import Selection, replay

@@ -7,13 +7,13 @@ import numpy as np
 
 from pyharness.compare.agreement import differences, distance
 from pyharness.compare.checks import Check
-from pyharness.compare.random_scenes import draw
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cells import all_cells, cell_name
 from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.scenes.random_scenes import draw
 from pyharness.verify.selection import Selection, replay
 
 # Right-hand sides of a step: at the start and at each point of collocation, or at four stages. The

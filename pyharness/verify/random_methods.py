@@ -13,12 +13,12 @@ import numpy as np
 
 from pyharness.compare.candidates import called, solved
 from pyharness.compare.checks import REFUSED, Check, Sample
-from pyharness.compare.random_scenes import Draw, draw
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import finest
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
+from pyharness.scenes.random_scenes import Draw, draw
 from pyharness.theory.conditioning import along
 from pyharness.truth.integer_series import integer_series
 from pyharness.verify.selection import Selection

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pyharness.compare.checks import may_hold, selected
-from pyharness.compare.random_scenes import weekly_seed
+from pyharness.scenes.random_scenes import weekly_seed
 
 if TYPE_CHECKING:
     from pyharness.verify.external_file import Problem

@@ -14,7 +14,7 @@ import numpy as np
 from pyharness.bench.random_loads import _BODIES, _SPEEDS, _WAVES, LAWS, _drawn
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
-from pyharness.model.turned_scenes import turned
+from pyharness.scenes.rotated import turned
 from tests.estimates.truth import Truth, truth_of
 from tests.random_scenes import NASTY, triple
 

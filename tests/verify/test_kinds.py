@@ -22,7 +22,6 @@ import pytest
 from pyharness.cli.main import main
 from pyharness.compare.checks import bounded, selected
 from pyharness.compare.orders import Order, State
-from pyharness.compare.random_scenes import _far_scale, draw, weekly_seed
 from pyharness.methods import problem
 from pyharness.methods.registry import METHODS
 from pyharness.model.facts import facts
@@ -32,6 +31,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled
 from pyharness.original.cells import all_cells, cell_name
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
+from pyharness.scenes.random_scenes import _far_scale, draw, weekly_seed
 from pyharness.verify import programs as verify_programs
 from pyharness.verify.golden import mathematics, read_record, recorded, update
 from pyharness.verify.kinds import KINDS, verify

@@ -13,9 +13,9 @@ import pytest
 from mpmath import mp
 
 from pyharness import run_program
-from pyharness.compare.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.scenes.random_scenes import draw
 from pyharness.verify.port import differences, port
 from pyharness.verify.port_process import PortProcess
 from pyharness.verify.port_protocol import ENDINGS, read_answer, request

@@ -22,7 +22,7 @@ from pyharness.model.attitude import (
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, Trajectory, turned_to_space
-from pyharness.model.turned_scenes import turned
+from pyharness.scenes.rotated import turned
 from pyharness.stress.hold import LINEAR, MIDDLING, in_steps
 from pyharness.stress.run import Attempt, Trial, bounded, described, in_turn, replay
 from pyharness.stress.trials import separatrix

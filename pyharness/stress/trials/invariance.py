@@ -18,10 +18,10 @@ from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
-from pyharness.model.turned_scenes import shifted, turned
+from pyharness.scenes.rescaled import scaled
+from pyharness.scenes.rotated import shifted, turned
 from pyharness.stress.hold import OURS, apart, finest_and_middling
 from pyharness.stress.run import LISTINGS, Attempt, Trial, bounded, described, in_turn, replay
 from pyharness.theory.conditioning import Conditioning, conditioning

@@ -11,8 +11,8 @@ from pyharness.compare.candidates import End, not_finite
 from pyharness.compare.checks import Check
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
-from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.scenes.rescaled import scaled
 from pyharness.stress.hold import (
     ALL,
     MIDDLING,

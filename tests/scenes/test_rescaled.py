@@ -10,7 +10,7 @@ import pytest
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError
-from pyharness.model.same_motion import factor_near_one, scaled
+from pyharness.scenes.rescaled import factor_near_one, scaled
 
 _METHODS = ("auto", "taylor", "quick", "gauss-2", "gauss-8", "rk4", "improved-euler", "taylor-3")
 _LAW = TorqueLaw(

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
-from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
-from pyharness.model.turned_scenes import turned
+from pyharness.scenes.rescaled import scaled
+from pyharness.scenes.rotated import turned
 
 COARSEST = 1e-3
 # Drawn last: a number of a seed stands for what it stood for before these had a flag.

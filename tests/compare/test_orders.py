@@ -8,6 +8,7 @@ from typing import Any, Never
 import numpy as np
 import pytest
 
+from pyharness.checks.plants.planted_twins import plant_in_twin
 from pyharness.compare import orders
 from pyharness.compare.comparison import compare_programs
 from pyharness.compare.orders import Order, measured_order, order_of
@@ -21,7 +22,6 @@ from pyharness.original.programs import PROGRAM_REGISTRY, Program
 from pyharness.scenes.rescaled import scaled
 from pyharness.theory.conditioning import ROUNDING
 from pyharness.truth.reference import reference
-from pyharness.verify.plants.planted_twins import plant_in_twin
 from pyharness.views.render import render
 
 

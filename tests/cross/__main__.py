@@ -10,8 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from pyharness.compare.checks import Check
-from pyharness.compare.checks_report import checks_report, summary
+from pyharness.checks.check import Check
+from pyharness.checks.report import checks_report, summary
 from pyharness.model.facts import facts
 from pyharness.views.render import render
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
@@ -35,8 +35,8 @@ CALLING = (
     "tests/model",
     "tests/original",
     "tests/compare/test_candidates.py",
-    "tests/stress/test_motions.py::test_bounds_hold",
-    "tests/stress/test_run.py::test_bounds_hold",
+    "tests/checks/test_motions.py::test_bounds_hold",
+    "tests/checks/test_stress.py::test_bounds_hold",
     # Every digest has been computed by then, with traps where there are any.
     "--deselect=tests/original/test_programs.py::test_every_cell_agrees",
     "--deselect=tests/original/test_programs.py::test_nasty_scenes_agree",

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping
 
-from pyharness.compare.checks import Check
+from pyharness.checks.check import Check
 from tests.cross.digests import replay
 
 

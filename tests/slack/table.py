@@ -16,6 +16,10 @@ from unittest.mock import patch
 
 import numpy as np
 
+from pyharness.checks.plants.plants import changed, instead
+from pyharness.checks.port_process import PortError
+from pyharness.checks.stress import TRIALS, trial
+from pyharness.checks.trials import length, step_size
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.attitude import product
@@ -26,12 +30,8 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.linear_solver import SINGULAR
 from pyharness.original.vectors import Answer
-from pyharness.stress.run import TRIALS, trial
-from pyharness.stress.trials import length, step_size
 from pyharness.theory import brouwer
 from pyharness.truth.reference import Reference, reference
-from pyharness.verify.plants.plants import changed, instead
-from pyharness.verify.port_process import PortError
 
 # Half a unit in the last place of 1, and a whole one.
 U = 2.0**-53
@@ -40,21 +40,21 @@ ULP = 2.0 * U
 _RUN = "pyharness.original.programs.Program.run"
 _COMPILED = "pyharness.original.compiled.run"
 _IN_WORD = "pyharness.original.in_word.run"
-_ANSWER = "pyharness.verify.port.read_answer"
-_DECK = "pyharness.verify.decks.run_deck"
-_DRAWN = "pyharness.verify.random_methods"
+_ANSWER = "pyharness.checks.port.read_answer"
+_DECK = "pyharness.checks.decks.run_deck"
+_DRAWN = "pyharness.checks.random_methods"
 _SOLVE = "pyharness.compare.candidates.solve"
 _ANSWERED = "pyharness.compare.candidates._answered"
 _END = "pyharness.compare.candidates.Candidate.end"
-_NEAR_SEPARATRIX = "pyharness.stress.trials.separatrix.run_method"
-_HELD = "pyharness.stress.hold.run_method"
-_TURNED = "pyharness.stress.trials.invariance"
-_ATTITUDES = "pyharness.verify.attitudes.solve"
-_TURNING = "pyharness.stress.trials.attitude.solve"
-_PREPARED = "pyharness.verify.attitudes.prepare"
-_REGIONS = "pyharness.stress.trials.regions"
-_STEPS = "pyharness.stress.trials.step_size"
-_MATRICES = "pyharness.stress.trials.matrices"
+_NEAR_SEPARATRIX = "pyharness.checks.trials.separatrix.run_method"
+_HELD = "pyharness.checks.hold.run_method"
+_TURNED = "pyharness.checks.trials.invariance"
+_ATTITUDES = "pyharness.checks.attitudes.solve"
+_TURNING = "pyharness.checks.trials.attitude.solve"
+_PREPARED = "pyharness.checks.attitudes.prepare"
+_REGIONS = "pyharness.checks.trials.regions"
+_STEPS = "pyharness.checks.trials.step_size"
+_MATRICES = "pyharness.checks.trials.matrices"
 
 # A room that is imported while something is planted would keep it.
 for _name in TRIALS:
@@ -340,7 +340,7 @@ def form_for_all(
 
 
 def other_library() -> AbstractContextManager[Any]:
-    return patch("pyharness.verify.golden.mathematics", lambda: "another")
+    return patch("pyharness.checks.golden.mathematics", lambda: "another")
 
 
 def without(found: Iterator[Any] | dict[str, Any], size: float) -> Any:
@@ -381,7 +381,7 @@ def some_bits(size: float) -> AbstractContextManager[Any]:
     calls = itertools.count()
     # Seven jobs are made alone before they are made at once.
     return patch(
-        "pyharness.stress.trials.threads.bits", lambda job: bytes(7 <= next(calls) < 7 + size)
+        "pyharness.checks.trials.threads.bits", lambda job: bytes(7 <= next(calls) < 7 + size)
     )
 
 
@@ -403,7 +403,7 @@ VERIFY = (
     exact("cells/two-term/case-3/corrected", on(_COMPILED, bit_off), ULP),
     exact("random/0/program", on(_COMPILED, bit_off), ULP),
     exact("words/two-term/case-3/corrected", on(_IN_WORD, bit_off), ULP),
-    exact("words/vectors", on("pyharness.verify.words.answers", without_answer)),
+    exact("words/vectors", on("pyharness.checks.words.answers", without_answer)),
     exact("port/two-term/case-3/original", on(_ANSWER, partial(bit_off, name="rows")), ULP),
     exact("port/runge-kutta/case-2/original", refuses(_ANSWER, PortError)),
     exact("decks/two-term/case-3/original", on(_COMPILED, bit_off), ULP),
@@ -440,7 +440,7 @@ VERIFY = (
     exact("random/0/solve-taylor", on(_SOLVE, _TIME), ULP),
     exact("random/0/solve-taylor", on(_SOLVE, ended)),
     exact("random/0/solve-taylor", refuses(_SOLVE)),
-    exact("cells/two-term/case-3/corrected", refuses("pyharness.verify.programs.case_scene"),
+    exact("cells/two-term/case-3/corrected", refuses("pyharness.checks.cells.case_scene"),
           failing="cells/refused"),
     # The last step of Case 7 ends at (.25, .91, 1.08): 4 roundings of either end of it, and h times
     # 32 of the sizes of all terms of a rate, in all 2.8, .3 and .16; in collocation times the
@@ -528,8 +528,8 @@ VERIFY = (
     # Both the record and the result may be wrong by 1e-9; where every bit counts, none.
     near("golden/taylor/case-5", on(_SOLVE, off), 2e-9),
     exact("golden/taylor/case-5", on(_SOLVE, _TIME), ULP),
-    exact("golden/taylor/case-5", on("pyharness.verify.golden.read_record", without)),
-    exact("golden/taylor", on("pyharness.verify.golden.recorded", without),
+    exact("golden/taylor/case-5", on("pyharness.checks.golden.read_record", without)),
+    exact("golden/taylor", on("pyharness.checks.golden.recorded", without),
           failing="golden/taylor/case-5-method-taylor-tolerance-1e-09"),
     # Sine and cosine of another library may differ by what rounding may do to a wave.
     near("golden/rk4/case-7", beside(other_library, on(_SOLVE, off)), 3.4e-15),
@@ -537,7 +537,7 @@ VERIFY = (
     exact("golden/two-term/case-5/corrected", on(_RUN, bit_off), ULP),
 )  # fmt: skip
 
-_SCALED = "pyharness.stress.trials.scales.run_method"
+_SCALED = "pyharness.checks.trials.scales.run_method"
 _SPHERE = "near-symmetry/{}/sphere-equal/{}"
 _FREE = f"{_TURNED}.end"
 
@@ -652,9 +652,9 @@ STRESS = (
     near("attitude/closed-form/space/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
     # What the way there errs in omega, 16 roundings that the way may amplify, turns the way back.
     near("attitude/closed-form/back/random-0", on(_TURNING, turned_off, call=2), 3.9e-12),
-    near("attitude/angles/3-1-3/1", on("pyharness.stress.trials.attitude.angles", degrees_off),
+    near("attitude/angles/3-1-3/1", on("pyharness.checks.trials.attitude.angles", degrees_off),
          64.0 * U),
-    near("attitude/angles/3-2-1/pole", on("pyharness.stress.trials.attitude.angles", degrees_off),
+    near("attitude/angles/3-2-1/pole", on("pyharness.checks.trials.attitude.angles", degrees_off),
          64.0 * U),
     exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
     exact("matrices/two-term/1e-02/bits", linear(bit_off), ULP),
@@ -700,7 +700,7 @@ STRESS = (
     Slack("step-size/rk4/case-5/crossing", crossing_off, 0.3, 0.2),
     # Where the wobble of a spin has doubled.
     near("step-size/rk4/case-4/diverges",
-         on("pyharness.stress.divergence.smallest_divergent", value_off), 0.0575),
+         on("pyharness.checks.divergence.smallest_divergent", value_off), 0.0575),
     exact("threads/linear-solver", some_bits),
 )  # fmt: skip
 

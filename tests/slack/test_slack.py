@@ -13,11 +13,11 @@ from unittest.mock import patch
 import pytest
 
 import pyharness
-from pyharness.compare.checks import Check, Sample
-from pyharness.stress.run import TRIALS, stress
-from pyharness.verify.kinds import KINDS, verify
-from pyharness.verify.port import port
-from pyharness.verify.selection import Selection
+from pyharness.checks.check import Check, Sample
+from pyharness.checks.kinds import KINDS, verify
+from pyharness.checks.port import port
+from pyharness.checks.selection import Selection
+from pyharness.checks.stress import TRIALS, stress
 from tests.ports import documented_command, sample
 from tests.slack.table import SLACK, Slack, kept
 
@@ -59,7 +59,7 @@ def _failing(places: set[Place]) -> Iterator[None]:
 
 
 # What plants don't touch and limits are made of.
-_KEPT = ("verify.methods", "stress.hold", "stress.trials.torque", "stress.trials.scales")
+_KEPT = ("checks.methods", "checks.hold", "checks.trials.torque", "checks.trials.scales")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -100,7 +100,7 @@ def test_every_kind_and_every_trial_has_a_plant() -> None:
 
 def _sites() -> Iterator[tuple[str, range]]:
     """Yield the places of the source where a check is made that can fail."""
-    for path in sorted([*PACKAGE.glob("verify/*.py"), *PACKAGE.glob("stress/**/*.py")]):
+    for path in sorted([*PACKAGE.glob("checks/*.py"), *PACKAGE.glob("checks/trials/*.py")]):
         for node in ast.walk(ast.parse(path.read_text())):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
                 continue

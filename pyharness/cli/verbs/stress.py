@@ -2,10 +2,10 @@
 
 import argparse
 
+from pyharness.checks.stress import TRIALS, Outcome, stress, trial, worst
+from pyharness.checks.stress_report import stress_report
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError, unknown
-from pyharness.stress.report import stress_report
-from pyharness.stress.run import TRIALS, Outcome, stress, trial, worst
 
 FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"

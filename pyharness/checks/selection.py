@@ -1,0 +1,47 @@
+"""What to verify: which checks, which random draws, which record."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pyharness.checks.check import may_hold, selected
+from pyharness.scenes.random_scenes import weekly_seed
+
+if TYPE_CHECKING:
+    from pyharness.checks.external_file import Problem
+
+DRAWS = 1000
+RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What to verify."""
+
+    only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; all where empty
+    seed: str = field(default_factory=weekly_seed)  # of the random draws; by default the week
+    draws: int = DRAWS  # how many of them
+    record: Path = RECORD  # the folder of the golden record, by default that of the checkout
+    # with published figures; None for those that come with the project
+    problems: Sequence["Problem"] | None = None
+    thin: bool = False  # a part that touches every kind, for `verify --self-test`
+
+    def asks(self, id: str) -> bool:
+        """Whether the check of that name is asked for."""
+        return selected(id, self.only)
+
+    def may_ask(self, id: str) -> bool:
+        """Whether a check below that name may be asked for."""
+        return may_hold(id, self.only)
+
+    def replay_of_draw(self, id: str) -> str:
+        """Return the command that repeats a check of a random draw."""
+        draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
+        return f"{replay(id)}{draws} --seed {shlex.quote(self.seed)}"
+
+
+def replay(id: str) -> str:
+    """Return the command that repeats one check."""
+    return f"python -m pyharness verify --only {id}"

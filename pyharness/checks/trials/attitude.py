@@ -1,0 +1,321 @@
+"""Attitude without torque: separatrix, symmetry, a million revolutions, poles of the angles."""
+
+import math
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from pyharness.checks.check import REFUSED, Check
+from pyharness.checks.hold import LINEAR, MIDDLING, in_steps
+from pyharness.checks.stress import Attempt, Trial, bounded, described, in_turn, replay
+from pyharness.checks.trials import separatrix
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
+from pyharness.model.attitude import (
+    SEQUENCES,
+    Quaternion,
+    angle_between,
+    angles,
+    product,
+    unit_quaternion,
+)
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.trajectory import Array, Trajectory, turned_to_space
+from pyharness.scenes.rotated import turned
+from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
+from pyharness.theory.promises import may_refuse
+from pyharness.truth.elliptic import torque_free
+from pyharness.truth.free_attitude import free_attitude, period_of
+
+_FORMS = ("closed-form", "auto")
+_SERIES = ("taylor", "dop853")
+_TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
+# An angle in degrees is rounded when it is formed, converted and read again, and three add up.
+_ANGLES = 64.0 * ROUNDING
+_BODIES = 8
+
+_START: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
+_MOTIONS = {
+    "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0), attitude=_START),
+    "tumbling": Scene(
+        "tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0), attitude=_START
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A problem turned as a whole, body or space, and its attitude turned back."""
+
+    scene: Callable[[Scene], Scene]
+    back: Callable[[Array], Array]
+
+
+def _about_body(turn: Quaternion, vectors: Callable[[Triple], Triple], moments: bool) -> Turn:
+    w, x, y, z = turn
+
+    def scene(given: Scene) -> Scene:
+        other = turned(given, vectors, body=moments)
+        return replace(other, attitude=product(given.attitude or _START, turn))
+
+    return Turn(scene, lambda q: _product(q, (w, -x, -y, -z)))
+
+
+TURNS = {
+    # Axes 1, 2, 3 of the turned body are 2, 3, 1 of the body.
+    "cyclic": _about_body((0.5, 0.5, 0.5, 0.5), lambda v: (v[1], v[2], v[0]), True),
+    "half-turn": _about_body((0.0, 1.0, 0.0, 0.0), lambda v: (v[0], -v[1], -v[2]), False),
+    # The axes of space are anybody's choice.
+    "space": Turn(
+        lambda scene: replace(scene, attitude=product(_START, scene.attitude or _START)),
+        lambda q: _from_left((_START[0], -_START[1], -_START[2], -_START[3]), q),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Known:
+    """A scene and a time (s), and what is known of it, each computed once where it is asked for."""
+
+    scene: Scene
+    time: float
+
+    @cached_property
+    def truth(self) -> Array:
+        """The attitude."""
+        return np.array([float(x) for x in free_attitude(self.scene, self.time)])
+
+    @cached_property
+    def flow(self) -> Conditioning:
+        """What the flow makes of small errors until then."""
+        return conditioning(self.scene, self.time)
+
+    def limit(self, name: str, tolerance: float) -> float:
+        """Return the largest error of an angle that a method may have (rad)."""
+        return ATTITUDE if name in _FORMS else self.flow.angle_limit(tolerance, self.time)
+
+
+def _attempts() -> Iterator[Attempt]:
+    for circumstance, scene, time in circumstances():
+        known = Known(scene, time)
+        for name in (*_FORMS, *_SERIES):
+            for tolerance in _TOLERANCES.get(name, (METHODS["closed-form"].finest,)):
+                make = partial(_held, known, name, tolerance)
+                yield Attempt(f"{name}/{circumstance}/{tolerance:.0e}", make, scene)
+    for motion, scene in _MOTIONS.items():
+        turn = 2.0 * math.pi / max(map(abs, scene.omega))
+        for k in range(2, 13):
+            known = Known(scene, 10.0 ** (0.5 * k) * turn)
+            make = partial(_held, known, "closed-form", METHODS["closed-form"].finest)
+            yield Attempt(f"closed-form/revolutions-{10.0 ** (0.5 * k):.0f}/{motion}", make, scene)
+    for number in range(_BODIES):
+        scene = _random_scene(number)
+        montgomery = partial(_montgomery, scene)
+        yield Attempt(f"closed-form/montgomery/random-{number}", montgomery, scene)
+        for name in ("closed-form", "taylor"):
+            for what, each in TURNS.items():
+                make = partial(_turned, scene, name, each)
+                yield Attempt(f"{name}/{what}/random-{number}", make, scene)
+            yield Attempt(f"{name}/back/random-{number}", partial(_back, scene, name), scene)
+    for sequence in SEQUENCES:
+        for power in range(1, 18):
+            make = partial(_angles, sequence, 10.0**-power if power < 17 else 0.0)
+            yield Attempt(f"angles/{sequence}/{power if power < 17 else 'pole'}", make)
+
+
+def circumstances() -> Iterator[tuple[str, Scene, float]]:
+    """Return name, scene and time of each input that methods are held to the truth in."""
+    for name, scene, time in separatrix.circumstances():
+        yield f"separatrix-{name}", replace(scene, attitude=_START), time
+    for k in range(1, 17, 3):
+        for sign in (1.0, -1.0):
+            moments = (3.0, 3.0 * (1.0 + sign * 10.0**-k), 2.0)
+            scene = Scene("", (0.3, 1.0, -0.6), moments=moments, attitude=_START)
+            yield f"symmetry-{sign * 10.0**-k:.0e}", in_steps(scene, 20.0), 20.0
+    for name, moments, omega in (
+        ("symmetric", (3.0, 3.0, 2.0), (0.3, 1.0, -0.6)),
+        ("sphere", (3.0, 3.0, 3.0), (0.3, 1.0, -0.6)),
+        ("steady", (3.0, 2.5, 2.0), (0.0, -1.0, 0.0)),
+        ("rest", (3.0, 2.5, 2.0), (0.0, 0.0, 0.0)),
+        ("needle", (1.0, 1.0 - 2.0**-41, 1e-12), (0.3, 1.0, -0.6)),
+        ("plate", (5.0, 3.0, 2.0), (0.3, 1.0, -0.6)),
+    ):
+        scene = Scene(name, omega, moments=moments, attitude=_START)
+        yield name, in_steps(scene, 20.0), 20.0
+
+
+def _random_scene(number: int) -> Scene:
+    """Return a body, a start and an attitude that no one chose."""
+    source = random.Random(f"attitude {number}")
+    low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
+    moments = (source.uniform(abs(low - middle), low + middle), low, middle)
+    x, y, z = (source.uniform(-3.0, 3.0) for _ in range(3))
+    attitude = (source.gauss(0, 1), source.gauss(0, 1), source.gauss(0, 1), source.gauss(0, 1))
+    return Scene(f"random-{number}", (x, y, z), moments=moments, attitude=attitude)
+
+
+def _held(known: Known, name: str, tolerance: float, id: str) -> Iterator[Check]:
+    """Hold a method's angle to the truth, and what the motion conserves to the same limit."""
+    scene, time = known.scene, known.time
+    try:
+        found = solve(scene, [time], name, tolerance, attitude=True)
+    except InputError as refusal:
+        may = may_refuse(name, scene, time)
+        yield Check(f"{id}/angle", may, None, None, replay(id), f"{REFUSED}{refusal}")
+        return
+    assert found.attitude is not None
+    limit = known.limit(name, tolerance)
+    # Not the angle alone: signs are continuous.
+    apart = 2.0 * float(np.linalg.norm(found.attitude[0] - known.truth))
+    if limit > LINEAR:
+        yield described(f"{id}/angle", apart, "the flow leaves no two digits")
+    else:
+        yield bounded(f"{id}/angle", apart, limit)
+    off = abs(float(np.linalg.norm(found.attitude)) - 1.0)
+    yield bounded(f"{id}/length", off, 8.0 * ROUNDING)
+    if name in _FORMS:
+        # An angle turns the angular momentum by no more than itself; moments multiply, and the
+        # turning takes two products.
+        limit = ATTITUDE + _omega_limit(scene)
+        yield bounded(f"{id}/momentum", _momentum_drift(scene, found), limit)
+
+
+def _omega_limit(scene: Scene) -> float:
+    """Return what the error of omega, 16 roundings, makes of the angular momentum, relative."""
+    momentum = np.array(scene.moments) * scene.omega
+    size = float(np.linalg.norm(momentum)) or 1.0
+    largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
+    return 16.0 * ROUNDING * math.sqrt(3.0) * largest / size
+
+
+def _momentum_drift(scene: Scene, found: Trajectory) -> float:
+    start = np.array([scene.attitude]), (np.array(scene.moments) * scene.omega)[None, :]
+    before = turned_to_space(*start)[0]
+    change = found.angular_momentum("space")[0] - before
+    return float(np.linalg.norm(change)) / (float(np.linalg.norm(before)) or 1.0)
+
+
+def _montgomery(scene: Scene, id: str) -> Iterator[Check]:
+    """Hold the turn of one period about the angular momentum to the area that omega goes round.
+
+    It is 2 E T/L less the solid angle on the side of the axis that keeps its sign: no invariant,
+    and the only check that sees a wrong rate of the turn.
+    """
+    period = float(period_of(scene) or 0.0)
+    momentum = np.array(scene.moments) * scene.omega
+    size = float(np.linalg.norm(momentum))
+    energy = 0.5 * float(momentum @ scene.omega)
+    area = _solid_angle(scene, period)
+    wanted = 2.0 * energy * period / size - area
+    q = solve(scene, [period], "closed-form", 1e-14, attitude=True).attitude
+    assert q is not None
+    w, x, y, z = scene.attitude or _START
+    turn = _product(q, (w, -x, -y, -z))[0]
+    along = turned_to_space(np.array([scene.attitude]), momentum[None, :] / size)[0]
+    found = 2.0 * math.atan2(float(turn[1:] @ along), float(turn[0]))
+    apart = abs(math.remainder(found - wanted, 2.0 * math.pi))
+    # The time is rounded, and so are the terms.
+    limit = ATTITUDE + 8.0 * ROUNDING * (2.0 * energy * period / size + 2.0 * math.pi)
+    yield bounded(id, apart, limit)
+
+
+def _solid_angle(scene: Scene, period: float) -> float:
+    """Return the solid angle of the path of the angular momentum in the body.
+
+    Trapezoids are as good as any rule for what is periodic and smooth; omega comes from the
+    elliptic functions in decimals.
+    """
+    moments = np.array(scene.moments)
+    before, count, rows = math.inf, 32, np.empty((0, 3))
+    while True:
+        times = [period * n / count for n in range(count)]
+        rows = np.array([[float(x) for x in torque_free(scene, t)] for t in times])
+        m = rows * moments
+        m /= np.linalg.norm(m, axis=1, keepdims=True)
+        third = int(np.argmax(np.abs(m).min(axis=0)))
+        axes = [(third + 1) % 3, (third + 2) % 3, third]
+        m, omega = m[:, axes], rows[:, axes]
+        if m[0, 2] < 0.0:
+            # A half turn about the first axis.
+            m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
+        rate = np.cross(m, omega)
+        found = float(((m[:, 0] * rate[:, 1] - m[:, 1] * rate[:, 0]) / (1.0 + m[:, 2])).mean())
+        if abs(found - before) * period < 4.0 * ROUNDING * math.pi or count >= 1024:
+            return found * period
+        before, count = found, 2 * count
+
+
+def _turned(scene: Scene, name: str, turn: Turn, id: str) -> Iterator[Check]:
+    """Hold the attitude of the turned problem, turned back, to that of the problem itself."""
+    time, tolerance = 5.0, 1e-12
+    plain, other = (
+        solve(each, [time], name, tolerance, attitude=True).attitude
+        for each in (scene, turn.scene(scene))
+    )
+    assert plain is not None
+    assert other is not None
+    apart = 2.0 * float(np.linalg.norm(turn.back(other) - plain))
+    yield bounded(id, apart, 2.0 * Known(scene, time).limit(name, tolerance) + 8.0 * ROUNDING)
+
+
+def _back(scene: Scene, name: str, id: str) -> Iterator[Check]:
+    """Hold a way forth and back to the start."""
+    time, tolerance = 5.0, 1e-12
+    there = solve(scene, [time], name, tolerance, attitude=True)
+    assert there.attitude is not None
+    x, y, z = there.omega[0].tolist()
+    a, b, c, d = there.attitude[0].tolist()
+    start = replace(scene, omega=(x, y, z), attitude=(a, b, c, d))
+    again = solve(start, [-time], name, tolerance, attitude=True).attitude
+    assert again is not None
+    forth, back = Known(scene, time), Known(start, -time)
+    # What the way there errs in omega turns the way back.
+    errs = forth.flow.limit(tolerance if name == "taylor" else 16.0 * ROUNDING)
+    turns = errs * back.flow.amplification * math.sqrt(3.0) * back.flow.largest * time
+    limit = forth.limit(name, tolerance) + back.limit(name, tolerance) + turns
+    yield bounded(id, float(angle_between(again, np.array([scene.attitude]))[0]), limit)
+
+
+def _angles(sequence: str, off: float, id: str) -> Iterator[Check]:
+    """Hold angles beside a pole to what SciPy's matrices make of them."""
+    from scipy.spatial.transform import Rotation
+
+    source, worst = random.Random(f"{sequence} {off}"), 0.0
+    for _ in range(20):
+        first, last = source.uniform(-math.pi, math.pi), source.uniform(-math.pi, math.pi)
+        pole = source.choice((0.0, math.pi) if sequence == "3-1-3" else (-math.pi, math.pi))
+        tilt = math.copysign(1.0, 1.0 - pole) * off + (pole if sequence == "3-1-3" else 0.5 * pole)
+        q: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        for axis, angle in zip(sequence.split("-"), (first, tilt, last), strict=True):
+            turn = [math.cos(0.5 * angle), 0.0, 0.0, 0.0]
+            turn[int(axis)] = math.sin(0.5 * angle)
+            q = product(q, (turn[0], turn[1], turn[2], turn[3]))
+        told = angles(np.array([q]), sequence)[0]
+        letters = "".join(" XYZ"[int(axis)] for axis in sequence.split("-"))
+        back = Rotation.from_euler(letters, told, degrees=True).as_quat(scalar_first=True)
+        worst = max(worst, float(angle_between(np.array([q]), back[None, :])[0]))
+    yield bounded(id, worst, _ANGLES)
+
+
+def _product(q: Array, by: Quaternion) -> Array:
+    a, b, c, d = q.T
+    return np.array(product((a, b, c, d), by)).T
+
+
+def _from_left(by: Quaternion, q: Array) -> Array:
+    a, b, c, d = q.T
+    return np.array(product(by, (a, b, c, d))).T
+
+
+TRIAL = Trial(
+    "attitude",
+    "attitude without torque: separatrix, symmetry, 1e6 revolutions, axes turned, poles of angles",
+    "closed form: some twenty roundings of each component at any time, 4.4e-15 rad. Others: the "
+    "tolerance and rounding, amplified by the flow and turned all the way. Montgomery: 2 E T/L "
+    "less the solid angle, to the rounding of its terms. Angles: of three, rounded thrice.",
+    in_turn("attitude", _attempts),
+)

@@ -1,0 +1,232 @@
+"""Invariance: what must come out the same, or turned, when the problem is turned.
+
+Where the operations of a method are those of the turned problem in another order of axes, with
+other signs or other exponents, not a bit may differ; where they are not, the bound holds.
+"""
+
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from itertools import pairwise
+
+import numpy as np
+
+from pyharness.checks.check import Check
+from pyharness.checks.hold import OURS, apart, finest_and_middling
+from pyharness.checks.stress import LISTINGS, Attempt, Trial, bounded, described, in_turn, replay
+from pyharness.compare.candidates import called, solved, unstopped
+from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
+from pyharness.methods.solve import finest, solve
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.trajectory import Array
+from pyharness.scenes.rescaled import scaled
+from pyharness.scenes.rotated import shifted, turned
+from pyharness.theory.conditioning import Conditioning, conditioning
+
+_ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
+_PREPARED = ("quick", "auto")
+
+_BODY = (40.0, 30.0, 20.0)
+_START = (0.3, 1.1, 2.7)
+_PUSHED = TorqueLaw(constant=(10.0, -20.0, 15.0))
+_DRIVEN = TorqueLaw(
+    (3.0, 2.0, -4.0), (0.0, 1.0, 2.0), (((20.0, 0.0, 5.0), 7.0),), (((0.0, 30.0, 0.0), 11.0),)
+)
+
+
+def _random_scene(seed: int) -> Scene:
+    """Return a body, a start and a torque that no one chose."""
+    source = random.Random(seed)
+
+    def vector(size: float) -> Triple:
+        first, second, third = (source.uniform(-size, size) for _ in range(3))
+        return first, second, third
+
+    low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
+    moments = (source.uniform(abs(low - middle), low + middle), low, middle)
+    law = TorqueLaw(vector(20.0), vector(5.0), ((vector(20.0), source.uniform(0.1, 20.0)),))
+    return Scene(f"random-{seed}", vector(3.0), moments=moments, torque=law)
+
+
+_FREE = Scene("free", _START, moments=_BODY, step_size=0.01, steps=300)
+SCENES = {
+    "free": (_FREE, 3.0),
+    "pushed": (replace(_FREE, name="pushed", torque=_PUSHED, steps=200), 2.0),
+    "driven": (replace(_FREE, name="driven", torque=_DRIVEN, steps=200), 2.0),
+    **{f"random-{seed}": (_random_scene(seed), 1.0) for seed in range(8)},
+}
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A way to turn a problem: the scene, and the result back.
+
+    The turned motion takes the time over `faster`. `bitwise` are the methods and programs whose
+    operations turn with it, so that no bit may differ.
+    """
+
+    turn: Callable[[Scene], Scene]
+    faster: float
+    back: Callable[[Array], Array]
+    bitwise: tuple[str, ...]
+
+
+def _signs(first: float, second: float, third: float) -> Symmetry:
+    def turn(v: Triple) -> Triple:
+        return first * v[0], second * v[1], third * v[2]
+
+    return Symmetry(
+        lambda scene: turned(scene, turn, body=False),
+        1.0,
+        lambda omega: omega * [first, second, third],
+        # Rounding to nearest knows no sign. Radau and LSODA difference their Jacobian in a
+        # direction of their own.
+        (*OURS, *_PREPARED, "dop853", "rk45", *FIXED_STEP, *PROGRAMS),
+    )
+
+
+def _faster(factor: float, *bitwise: str) -> Symmetry:
+    return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
+
+
+# Exponents alone change, and ours compare only what has the same unit. SciPy's first step is
+# not so, and the implicit row scaling of LEQT1F compares powers of the step.
+_POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
+SYMMETRIES = {
+    # Each axis does what the next does: products of the next two, in this order. The series of
+    # Taylor and the sums of the others add over the axes, or multiply them, in a fixed order.
+    "cyclic": Symmetry(
+        lambda scene: turned(scene, lambda v: (v[1], v[2], v[0]), body=True),
+        1.0,
+        lambda omega: np.asarray(np.roll(omega, 1)),
+        ("closed-form", "gauss-2", "gauss-4", "gauss-8", *FIXED_STEP, "runge-kutta"),
+    ),
+    "signs-12": _signs(-1.0, -1.0, 1.0),
+    "signs-23": _signs(1.0, -1.0, -1.0),
+    "times-2**7": _faster(2.0**7, *_POWERS_OF_TWO),
+    "times-2**-9": _faster(2.0**-9, *_POWERS_OF_TWO),
+    "times-1.7": _faster(1.7),
+}
+
+
+def _attempts() -> Iterator[Attempt]:
+    for circumstance, (scene, time) in SCENES.items():
+        for name in (*_ADAPTIVE, *FIXED_STEP):
+            if name == "closed-form" and circumstance != "free":
+                continue
+            for tolerance in _tolerances(name, scene, time):
+                asked = scene, time, name, tolerance
+                ways = {what: partial(_turned, each, *asked) for what, each in SYMMETRIES.items()}
+                ways["back"] = partial(_back, *asked)
+                if name not in FIXED_STEP:
+                    ways["split"] = partial(_split, *asked)
+                for way, make in ways.items():
+                    yield Attempt(f"{name}/{way}/{circumstance}/{tolerance:.0e}", make, scene)
+        for listing in LISTINGS:
+            for what, symmetry in SYMMETRIES.items():
+                make = partial(_program, listing, scene, symmetry)
+                name = f"{listing.program}/{what}/{circumstance}/{listing.label}"
+                yield Attempt(name, make, scene)
+
+
+def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
+    if name in FIXED_STEP:
+        return [1.0]
+    if name == "closed-form":
+        return [METHODS[name].finest]
+    return finest_and_middling(name, scene, time)
+
+
+def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
+    """Return omega at `time`; NaN where a prepared kernel did not get there."""
+    return (called if name in _PREPARED else solved)(name, tolerance).end(scene, time).omega
+
+
+def _turned(
+    symmetry: Symmetry, scene: Scene, time: float, name: str, tolerance: float, id: str
+) -> Iterator[Check]:
+    """Hold the turned problem against the problem itself."""
+    try:
+        plain = end(scene, time, name, tolerance)
+        other = symmetry.back(end(symmetry.turn(scene), time / symmetry.faster, name, tolerance))
+    except InputError as refusal:
+        yield Check(id, False, None, None, replay(id), f"refused: {refusal}")
+        return
+    if name in symmetry.bitwise:
+        yield bounded(id, float(np.count_nonzero(plain != other)), 0.0, "bits")
+        return
+    flow = _flow(scene.name, 0.0, time)
+    difference = float(np.abs(plain - other).max()) / flow.largest
+    # Either may be wrong by what the method is allowed.
+    limit = 2.0 * flow.limit(tolerance)
+    yield described(id, difference) if name in FIXED_STEP else bounded(id, difference, limit)
+
+
+def _back(scene: Scene, time: float, name: str, tolerance: float, id: str) -> Iterator[Check]:
+    there = end(scene, time, name, tolerance)
+    start = shifted(scene, there, time)
+    # A method of SciPy may meet a little less on the way back.
+    coarser = tolerance
+    if name in SCIPY_METHODS:
+        coarser = max(tolerance, 1.1 * finest(name, start, -time))
+    again = end(start, -time, name, coarser)
+    flow, back = _flow(scene.name, 0.0, time), _flow(scene.name, time, -time)
+    difference = float(np.abs(again - scene.omega).max()) / flow.largest
+    if name in FIXED_STEP:
+        yield described(id, difference, "not reversible")
+        return
+    # The error of the way there is an error of the start of the way back.
+    limit = flow.limit(tolerance) * back.amplification + back.limit(coarser)
+    yield bounded(id, difference, limit)
+
+
+def _split(scene: Scene, time: float, name: str, tolerance: float, id: str) -> Iterator[Check]:
+    # Always the same three.
+    source = random.Random("cuts")
+    cuts = sorted(source.uniform(0.0, time) for _ in range(3))
+    omega = np.array(scene.omega)
+    flow = _flow(scene.name, 0.0, time)
+    limit = flow.limit(tolerance)
+    for begin, stop in pairwise([0.0, *cuts, time]):
+        omega = end(shifted(scene, omega, begin), stop - begin, name, tolerance)
+        piece = _flow(scene.name, begin, stop - begin)
+        rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
+        # What is left of the way carries on the error of each piece.
+        limit += piece.limit(tolerance) * rest
+    whole = end(scene, time, name, tolerance)
+    difference = float(np.abs(omega - whole).max()) / flow.largest
+    yield bounded(id, difference, limit, f"{len(cuts)} cuts")
+
+
+@cache
+def _flow(circumstance: str, begin: float, length: float) -> Conditioning:
+    scene = SCENES[circumstance][0]
+    omega = np.array(scene.omega)
+    if begin > 0.0:
+        omega = solve(scene, [begin], "taylor", METHODS["taylor"].finest).omega[-1]
+    return conditioning(shifted(scene, omega, begin), length)
+
+
+def _program(listing: Listing, scene: Scene, symmetry: Symmetry, id: str) -> Iterator[Check]:
+    plain, other = (unstopped(listing).rows(each).omega for each in (scene, symmetry.turn(scene)))
+    n = min(len(plain), len(other))
+    other = np.array([symmetry.back(row) for row in other]).reshape(-1, 3)
+    if listing.program in symmetry.bitwise:
+        count = np.count_nonzero(plain[:n] != other[:n]) + 3 * abs(len(plain) - len(other))
+        yield bounded(id, float(count), 0.0, "bits")
+        return
+    size = float(np.abs(plain[:n]).max(initial=0.0)) or 1.0
+    yield described(id, apart(plain, other) / size)
+
+
+TRIAL = Trial(
+    "invariance",
+    "forth and back, in pieces, axes turned, two signs changed, omega scaled against time",
+    "no bit where rounding can't tell the two apart: the same operations in another order of "
+    "axes, with other signs, with other exponents; else the tolerance and rounding of each "
+    "solution, amplified by the flow that follows it",
+    in_turn("invariance", _attempts),
+)

@@ -1,0 +1,119 @@
+"""Angular velocities from 1e-300 to 1e300 rad/s, time scaled to match."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Check
+from pyharness.checks.hold import (
+    ALL,
+    MIDDLING,
+    Truth,
+    describe_programs,
+    hold,
+    in_steps,
+    run_method,
+    truth_of,
+)
+from pyharness.checks.stress import Attempt, Trial, in_turn, replay
+from pyharness.compare.candidates import End, not_finite
+from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.scenes.rescaled import scaled
+from pyharness.theory.conditioning import Conditioning, conditioning
+
+_TIME = 15.0  # s
+_FREE = Scene("scales", (0.5, 1.0, -0.7), moments=(40.0, 30.0, 20.0))
+_DRIVEN = replace(
+    _FREE, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
+)
+_TENS = (-300, -250, -200, -160, -150, -100, -50, 0, 50, 100, 150, 200, 300)
+_TWOS = (-996, -500, -100, 100, 498, 996)
+# Squares and cubes of the scale have to be numbers too.
+_DRIVEN_TWOS = (-320, -100, 100, 320)
+
+
+def circumstances() -> Iterator[tuple[str, Scene, float]]:
+    """Return name, scene and time of each input."""
+    scene = in_steps(_FREE, _TIME)
+    named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
+    named += [(f"2^{power}", math.ldexp(1.0, power)) for power in _TWOS]
+    for name, factor in named:
+        yield name, replace(scaled(scene, factor), name=name), _TIME / factor
+
+
+def _bit_for_bit(name: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
+    """Hold one of our methods to the same digits where a power of two scales the motion."""
+    time = scene.step_size * scene.steps
+    plain = cache(lambda: _tried(name, scene, time))
+
+    def same(factor: float, other: Scene, id: str) -> Iterator[Check]:
+        # In the order of the calls: the motion itself first.
+        first, run = plain(), _tried(name, other, time / factor)
+        with np.errstate(invalid="ignore"):
+            wrong = float(np.abs(run.omega / factor - first.omega).max())
+        passed = run.ended == first.ended and run.has_result and wrong == 0.0
+        note = "" if run.has_result else run.ended
+        yield Check(id, passed, wrong, 0.0, replay(id), note)
+
+    for power in powers:
+        factor = math.ldexp(1.0, power)
+        other = scaled(scene, factor)
+        yield Attempt(f"{name}/{kind}-2^{power}", partial(same, factor, other), other)
+
+
+def _beyond(name: str, scene: Scene, id: str) -> Iterator[Check]:
+    """Hold a method to say so where omega leaves the range of numbers."""
+    run = _tried(name, scene, 1e300)
+    silent = run.has_result
+    note = "a silent wrong number" if silent else run.ended
+    yield Check(id, not silent, float(silent), 0.0, replay(id), note)
+
+
+def _tried(name: str, scene: Scene, time: float) -> End:
+    try:
+        return run_method(name, scene, time, None if name in FIXED_STEP else MIDDLING)
+    except InputError as refusal:
+        return not_finite(f"refused: {refusal}")
+
+
+@cache
+def _flow() -> Conditioning:
+    return conditioning(_FREE, _TIME)
+
+
+def _truth(scene: Scene, time: float) -> Truth:
+    """Return the truth: the flow does to a scaled motion what it does to the motion."""
+    size = max(map(abs, scene.omega)) / max(map(abs, _FREE.omega))
+    return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
+
+
+def _attempts() -> Iterator[Attempt]:
+    for name, scene, time in circumstances():
+        yield from hold(name, scene, time, truth=_truth)
+        yield from describe_programs(name, scene)
+    free, driven = in_steps(_FREE, _TIME), in_steps(_DRIVEN, 3.0)
+    for name in ALL:
+        if name not in SCIPY_METHODS:
+            yield from _bit_for_bit(name, "same", free, _TWOS)
+    for name in ALL:
+        if name not in (*SCIPY_METHODS, "closed-form"):
+            yield from _bit_for_bit(name, "same-driven", driven, _DRIVEN_TWOS)
+    law = TorqueLaw((1e10, 2e10, -1e10))
+    # Of a sphere, which no coupling makes turn ever faster on the way.
+    scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
+    for name in ALL:
+        yield Attempt(f"{name}/beyond", partial(_beyond, name, scene), scene)
+
+
+TRIAL = Trial(
+    "scales",
+    "omega from 1e-300 to 1e300 rad/s, time scaled to match",
+    "as of the separatrix, relative to omega; ours scaled by a power of two: the same bits. "
+    "Where omega leaves the range of numbers: a status that says so.",
+    in_turn("scales", _attempts),
+)

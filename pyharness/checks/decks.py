@@ -12,8 +12,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pyharness.checks.check import Check
-from pyharness.checks.selection import Selection, replay
+from pyharness.checks.cells import of_cell
+from pyharness.checks.check import Check, Name
+from pyharness.checks.selection import Selection
 from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, original, switches
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.original.cells import cell_name
@@ -39,34 +40,29 @@ def listings(program: str) -> list[Listing]:
 def decks(chosen: Selection) -> Iterator[Check]:
     """Hold every deck against the port; none without a compiler, and `verify` says so."""
     asked = [
-        (f"decks/{cell_name(listing, case)}", listing, case)
+        (of_cell("decks", listing, case), listing, case)
         for program in PROGRAMS
         for listing in listings(program)
         for case in case_numbers()
+        if not chosen.thin or cell_name(listing, case) in _THIN
     ]
-    asked = [
-        each for each in asked
-        if chosen.asks(each[0])
-        and (not chosen.thin or each[0].removeprefix("decks/") in _THIN)
-    ]  # fmt: skip
-    if not asked:
-        return
-    if compiler() is None:
+    asked = [each for each in asked if chosen.asks(each[0].id)]
+    if not asked or compiler() is None:
         return
     with TemporaryDirectory() as folder, ThreadPoolExecutor(_AT_ONCE) as pool:
         solver_object(Path(folder))
         yield from pool.map(partial(_held, Path(folder)), asked)
 
 
-def _held(folder: Path, asked: tuple[str, Listing, int]) -> Check:
-    id, listing, case = asked
+def _held(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
+    name, listing, case = asked
     scene = case_scene(case)
     port = PROGRAM_REGISTRY[listing.program].run(scene, listing)
     assert port.velocity is not None
     try:
         deck = run_deck(deck_text(listing, scene, "gfortran"), folder)
     except RuntimeError as failure:
-        return Check(id, False, None, None, replay(id), str(failure))
+        return name.judged(False, str(failure))
     wanted = np.column_stack([port.recorded_time, port.omega, port.velocity])
     found = deck.tape5[: port.steps]
     faults = []
@@ -79,7 +75,7 @@ def _held(folder: Path, asked: tuple[str, Listing, int]) -> Check:
     faults += _after(deck, port.steps, overflowed)
     with np.errstate(all="ignore"):
         apart = float(np.abs(found - wanted[: len(found)]).max(initial=0.0))
-    return Check(id, not faults, apart, 0.0, replay(id), ", ".join(faults))
+    return name.judged(not faults, ", ".join(faults), apart, 0.0)
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pyharness.checks.check import REFUSED, Check, bounded, may_hold, selected
+from pyharness.checks.check import REFUSED, Check, Name, may_hold, selected
 from pyharness.checks.external_file import UNITS, Problem, Value, problems
 from pyharness.compare.candidates import called, listed, solved
 from pyharness.methods.problem import closed_form
@@ -51,7 +51,7 @@ _Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
-    """Hold every method that can take a problem against its published figures.
+    """Judge every method that can take a problem by its published figures.
 
     Checks are ``external/<problem>/<time>/<method>``; value and limit are in the problem's unit, of
     the component that is worst against its limit.
@@ -69,34 +69,57 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
                 yield from _pointings(problem, [each for each in values if each.pointing], only)
 
 
+def _names(
+    problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
+) -> list[tuple[int, Name]]:
+    """Return the row and the name of each requested check, none where a method can't take it."""
+    given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
+    places = [f"{problem.name}/{value.time}" for value in values]
+    names = [
+        Name("external", method, place, quantity=quantity, command=f"verify{given}")
+        for place in places
+    ]
+    asked = [(row, name) for row, name in enumerate(names) if selected(name.id, only)]
+    times = [float(value.time) for value in values]
+    return asked if asked and _can_take(method, problem.scene, times) else []
+
+
+def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
+    """Return the check of a method that gave nothing at a time.
+
+    The figures of a user's file may be for a time that takes a method too long.
+    """
+    given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
+    if refusal:
+        return name.judged(given, f"{REFUSED}{refusal}")
+    return name.judged(False, f"ended before t = {float(value.time):g} s")
+
+
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
-    """Hold every method that carries the attitude to the printed ones, as an angle (rad)."""
+    """Judge every method that propagates the attitude by the printed ones, as an angle (rad)."""
     scene, times = problem.scene, [float(value.time) for value in values]
     for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
-        ids = [f"external/{problem.name}/{each.time}/{method}/attitude" for each in values]
-        if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
+        asked = _names(problem, values, method, only, "attitude")
+        if not asked:
             continue
+        found, refusal, tolerance = np.empty((0, 4)), "", 0.0
         try:
             tolerance = max(_TOLERANCES.get(method, 0.0), finest(method, scene, times[-1]))
-            run = solved(method, tolerance).rows(scene, times)
-        except InputError as refusal:
-            may = problem.path is not None and method not in _MAY_NOT_REFUSE
-            for id in filter(lambda id: selected(id, only), ids):
-                yield Check(id, may, None, None, _replay(problem, id), f"{REFUSED}{refusal}")
-            continue
-        rounding = _turns(scene, times)
-        for row, (id, value) in enumerate(zip(ids, values, strict=True)):
-            if not selected(id, only):
+            attitude = solved(method, tolerance).rows(scene, times).attitude
+            found = found if attitude is None else attitude
+        except InputError as reason:
+            refusal = str(reason)
+        rounding = _turns(scene, times) if len(found) else np.zeros(0)
+        for row, name in asked:
+            pointing = values[row].pointing
+            if row >= len(found):
+                yield _without(problem, name, refusal, values[row])
                 continue
-            again = _replay(problem, id)
-            if run.attitude is None or row >= len(run.attitude):
-                yield Check(id, False, None, None, again, f"ended before t = {times[row]:g} s")
-                continue
-            assert value.pointing is not None
-            wanted = np.array([value.pointing.attitude])
-            error = float(angle_between(run.attitude[row : row + 1], wanted)[0])
-            limit = value.pointing.accuracy + tolerance + float(rounding[row])
-            yield bounded(id, error, limit, again, "angle, rad")
+            assert pointing is not None
+            wanted = np.array([pointing.attitude])
+            error = float(angle_between(found[row : row + 1], wanted)[0])
+            limit = pointing.accuracy + tolerance + float(rounding[row])
+            yield name.bounded(error, limit, "angle, rad")
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
@@ -120,30 +143,22 @@ def _turns(scene: Scene, times: Sequence[float]) -> Array:
 
 
 def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
-    scene = problem.scene
-    times = [float(value.time) for value in values]
-    rounding = _rounding(scene, values)
-    given = problem.path is not None
+    rounding = _rounding(problem.scene, values)
     for method in (*_SOLVED, *PROGRAMS):
-        ids = [f"external/{problem.name}/{value.time}/{method}" for value in values]
-        if not (any(selected(id, only) for id in ids) and _can_take(method, scene, times)):
+        asked = _names(problem, values, method, only)
+        if not asked:
             continue
         results, refusal = _as_far_as_solved(partial(_results, problem, method), values)
-        for row, (id, value) in enumerate(zip(ids, values, strict=True)):
-            if not selected(id, only):
-                continue
-            replay = _replay(problem, id)
+        for row, name in asked:
+            value = values[row]
             if row >= len(results):
-                # The figures of a file may be for a time that takes a method too long.
-                may = bool(refusal) and given and method not in _MAY_NOT_REFUSE
-                note = f"{REFUSED}{refusal}" if refusal else f"ended before t = {times[row]:g} s"
-                yield Check(id, may, None, None, replay, note)
+                yield _without(problem, name, refusal, value)
             elif (result := results[row]) is not None:
-                yield _check(id, problem.unit, value, result, rounding[value.time], replay)
+                yield _check(name, problem.unit, value, result, rounding[value.time])
             else:
                 # In the problems that come with the project LEQT1F solves the longest steps.
                 note = "no step long enough for the linear equations"
-                yield Check(id, given, None, None, replay, note)
+                yield name.judged(problem.path is not None, note)
 
 
 def _as_far_as_solved(
@@ -238,9 +253,7 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     return result
 
 
-def _check(
-    id: str, unit: str, value: Value, result: _Result, rounding: Array, replay: str
-) -> Check:
+def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array) -> Check:
     factor = UNITS[unit]
     omega, error = result
     judged = []
@@ -253,7 +266,7 @@ def _check(
     # NaN is the worst of all, and no comparison shows it.
     worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     distance, limit, note = worst
-    return bounded(id, distance, limit, replay, note)
+    return name.bounded(distance, limit, note)
 
 
 def _scale(scene: Scene, omega: Array) -> float:
@@ -327,8 +340,3 @@ def _triples(triple: Triple | None) -> Iterator[Triple]:
         if x:
             first, second, third = np.array(triple) * (1.0 + _STEP_ASIDE * (np.arange(3) == axis))
             yield float(first), float(second), float(third)
-
-
-def _replay(problem: Problem, id: str) -> str:
-    given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
-    return f"python -m pyharness verify{given} --only {id}"

@@ -10,14 +10,15 @@ import platform
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pyharness.checks.check import Check
-from pyharness.checks.selection import RECORD, Selection, replay
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.selection import RECORD, Selection
 from pyharness.compare.agreement import ulps
 from pyharness.compare.candidates import listed, solved
 from pyharness.methods.problem import closed_form
@@ -74,7 +75,7 @@ def recorded() -> Iterator[Recorded]:
             yield Recorded(name, f"case-{case}", printed, scene, stated)
 
 
-def golden(chosen: Selection) -> Iterator[Check]:
+def golden(chosen: Selection) -> Iterator[Attempt]:
     """Hold what is produced now against the record.
 
     Programs and fixed-step methods to the last bit; methods that state an error within it,
@@ -87,36 +88,28 @@ def golden(chosen: Selection) -> Iterator[Check]:
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
     libraries = {file["mathematics"] for file in known.values()}
     due = list(recorded())
+    options = "" if chosen.record == RECORD else f" --record {shlex.quote(str(chosen.record))}"
+    same_library = libraries == {mathematics()}
     for each in due:
-        id = f"golden/{each.source}/{each.name}"
-        if not chosen.asks(id):
-            continue
-        if entry := entries.get(each.command):
-            yield _check(id, _again(id, chosen), each, entry, libraries == {mathematics()})
-        else:
-            note = "is not recorded; verify --update records it"
-            yield Check(id, False, None, None, _again(id, chosen), note)
+        name = Name("golden", each.source, each.name, options=options)
+        yield Attempt(name, partial(_held, each, entries.get(each.command), same_library))
     for command in sorted(set(entries) - {each.command for each in due}):
-        name = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
+        rest = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
         source = next(s for s, file in known.items() if entries[command] in file["trajectory"])
-        id = f"golden/{source}/{name}"
-        if chosen.asks(id):
-            note = "is recorded and no longer produced; verify --update forgets it"
-            yield Check(id, False, None, None, _again(id, chosen), note)
+        yield Attempt(Name("golden", source, rest, options=options), _forgotten)
 
 
-def _again(id: str, chosen: Selection) -> str:
-    """Return the command that repeats a check, with its record where that is not the checkout's."""
-    if chosen.record == RECORD:
-        return replay(id)
-    return f"{replay(id)} --record {shlex.quote(str(chosen.record))}"
+def _forgotten(name: Name) -> Check:
+    return name.judged(False, "is recorded and no longer produced; verify --update forgets it")
 
 
-def _check(id: str, again: str, each: Recorded, entry: dict[str, Any], same_library: bool) -> Check:
+def _held(each: Recorded, entry: dict[str, Any] | None, same_library: bool, name: Name) -> Check:
+    if entry is None:
+        return name.judged(False, "is not recorded; verify --update records it")
     run = each.run()
     now = _entry(each, run)
     if now == entry:
-        return Check(id, True, 0.0, 0.0, again)
+        return name.judged(True, "", 0.0, 0.0)
     moved = _moved(entry, now)
     waves = each.scene.torque.sines + each.scene.torque.cosines
     if each.tolerance is not None:
@@ -124,7 +117,7 @@ def _check(id: str, again: str, each: Recorded, entry: dict[str, Any], same_libr
     elif waves and not same_library:
         limit = conditioning(each.scene, each.scene.times()[-1]).rounding
     else:
-        return Check(id, False, None, 0.0, again, moved)
+        return name.judged(False, moved, limit=0.0)
     old, new = _rows(entry), _rows(now)
     away = math.inf
     # Step, time and TIME have no error to be within.
@@ -132,7 +125,7 @@ def _check(id: str, again: str, each: Recorded, entry: dict[str, Any], same_libr
     if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
         away = float(np.abs(old[:, 3:6] - new[:, 3:6]).max(initial=0.0)) / scale
-    return Check(id, away <= limit, away, limit, again, f"within its error: {moved}")
+    return name.bounded(away, limit, f"within its error: {moved}")
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:

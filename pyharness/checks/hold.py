@@ -2,19 +2,30 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Check
-from pyharness.checks.stress import LISTINGS, Attempt, bounded, described, replay
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.judge import (
+    MOST,
+    Answer,
+    Policy,
+    Tried,
+    Truth,
+    allowed,
+    judge,
+    linear,
+    of_end,
+    reference_truth,
+)
+from pyharness.checks.stress import LISTINGS, named
 from pyharness.compare.candidates import Candidate, End, called, solved, unstopped
 from pyharness.methods.plan import FEW_DIGITS
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
-from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.theory import promises
@@ -30,111 +41,65 @@ MIDDLING = 1e-6
 # At their finest these take minutes for what the others do in seconds.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
 
-# Beyond it the linearised flow says little: only what the motion conserves is held.
-LINEAR = 0.01
-_ROWS = 10  # of a program's run that are held against the truth
-
-
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """The solution of a scene at one time (s), and what the flow makes of small errors until then.
-
-    Attributes
-    ----------
-    omega, error : ndarray of shape (3,), float
-        And of any omega (rad/s).
-    data : float
-        What the rounding of A, B and C changes, over the largest abs(omega) on the way.
-    exact : bool
-        Whether there is no torque, so that `data` and what the motion conserves are known.
-    """
-
-    time: float
-    omega: np.ndarray
-    error: float
-    flow: Conditioning
-    data: float = 0.0
-    exact: bool = False
-
-    def wrong(self, end: End) -> float:
-        """Return the error of an end, over the largest omega; infinite of one without a result."""
-        if not end.has_result:
-            return math.inf
-        return float(np.abs(end.omega - self.omega).max()) / self.flow.largest
+_ROWS = 10  # of a program's run that are compared with the truth
+_FORMS = ("closed-form", "auto")
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
     """Return the truth at `time` (s); the flow's conditioning, where it is known, as given."""
     flow = flow or conditioning(scene, time)
-    if _is_free(scene):
-        exact = torque_free(scene, time)
-        held = torque_free(scene, time, rounded=True)
-        data = max(float(abs(x - y)) for x, y in zip(exact, held, strict=True)) / flow.largest
-        omega = np.array([float(x) for x in exact])
-        return Truth(time, omega, ROUNDING * float(np.abs(omega).max()), flow, data, True)
-    # The reference's steps have 1e-22 each: where the flow amplifies more, more digits.
-    known = reference(scene, [time], precise=flow.amplification > 1e3)
-    return Truth(time, known.omega[-1], known.error, flow)
+    if not _is_free(scene):
+        return reference_truth(scene, [time], flow=flow)
+    exact = torque_free(scene, time)
+    held = torque_free(scene, time, rounded=True)
+    data = max(float(abs(x - y)) for x, y in zip(exact, held, strict=True)) / flow.largest
+    omega = np.array([[float(x) for x in exact]])
+    error = ROUNDING * float(np.abs(omega).max())
+    return Truth(np.array([time]), omega, error, flow, data=data, exact=True)
 
 
 def _is_free(scene: Scene) -> bool:
     return scene.torque.is_zero and scene.moments is not None
 
 
-# What makes checks of one method: id, scene, truth, name, tolerance (None in the scene's steps).
-Held = Callable[[Scene, Truth, str, float | None, str], Iterable[Check]]
-Circumstances = Iterable[tuple[str, Scene, float]]
+# From the truth and a tolerance, None in the scene's steps, to the checks of one method.
+Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
-def hold_all(circumstances: Circumstances) -> Iterator[Attempt]:
-    """Hold all methods against the truth in each circumstance, and describe the programs."""
+def hold_all(suite: str, circumstances: Iterable[tuple[str, Scene, float]]) -> Iterator[Attempt]:
+    """Judge all methods by the truth in each circumstance, and describe the programs."""
     for circumstance, scene, time in circumstances:
-        yield from hold(circumstance, scene, time)
-        yield from describe_programs(circumstance, scene)
+        name = named(suite, "", circumstance, scene=scene)
+        yield from hold(name, time)
+        yield from describe_programs(name)
 
 
 def hold(
-    circumstance: str,
-    scene: Scene,
+    name: Name,
     time: float,
     methods: Sequence[str] = ALL,
     truth: Callable[[Scene, float], Truth] = truth_of,
     tolerances: Callable[[str, Scene, Truth], Sequence[float | None]] | None = None,
-    held: Held | None = None,
+    judged: Judged | None = None,
 ) -> Iterator[Attempt]:
-    """Hold each method against the truth at `time`: by default at two tolerances, fine and coarse.
+    """Judge each method by the truth at `time`: by default at two tolerances, fine and coarse.
 
-    The limit is what the method promises to be wrong by on the way, amplified by the flow;
-    rounding amplified likewise; and what the truth itself may be wrong by. Where no more than two
-    digits are left it says nothing. What a torque-free motion conserves is held always: the flow
-    does not amplify it. A method that refuses a scene which it has to take fails.
+    The limit is the sum of the errors that the method promises to make, amplified by the flow;
+    rounding amplified likewise; and the error of the truth. Where no more than two digits are left
+    it says nothing. Energy and momentum without torque are judged always: the flow does not
+    amplify their errors. A method that refuses a scene which it has to take fails.
     """
+    scene = scene_of(name)
     known = cache(partial(truth, scene, time))
 
-    def settings(name: str, id: str) -> Iterator[Attempt]:
-        for tolerance in (tolerances or _tolerances)(name, scene, known()):
+    def settings(name: Name) -> Iterator[Attempt]:
+        for tolerance in (tolerances or _tolerances)(name.subject, scene, known()):
             setting = "steps" if tolerance is None else f"{tolerance:.0e}"
-            make = partial(held or _held, scene, known(), name, tolerance)
-            yield Attempt(setting, make, scene)
+            make = partial(judged or _judged, known(), tolerance)
+            yield Attempt(replace(name, setting=setting), make)
 
-    for name in methods:
-        yield Attempt(f"{name}/{circumstance}", partial(settings, name))
-
-
-def attempt(id: str, name: str, scene: Scene, time: float, run: Callable[[], End]) -> End | Check:
-    """Return what a method made of a scene, or the check of its refusal.
-
-    It may refuse no more than `may_refuse` tells.
-    """
-    try:
-        end = run()
-    except InputError as refusal:
-        why = str(refusal)
-    else:
-        if not end.is_refused:
-            return end
-        why = f"{name}: {end.ended}"
-    return Check(id, may_refuse(name, scene, time), None, None, replay(id), f"refused: {why}")
+    for method in methods:
+        yield Attempt(replace(name, subject=method), settings)
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
@@ -152,12 +117,12 @@ def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float | None]:
     if name == "closed-form" or (name == "auto" and closed_form(scene)):
         return [METHODS["closed-form"].finest]
     flow = truth.flow
-    least = FEW_DIGITS if name == "quick" else promises.finest(name, scene, truth.time)
+    least = FEW_DIGITS if name == "quick" else promises.finest(name, scene, truth.end)
     if name in GAUSS:
         # Two solutions that are to agree can't where rounding parts them: the next of the ladder.
         meetable = [each for each in promises.LADDER if each >= 4.0 * flow.rounding]
         least = max(least, min(meetable, default=math.inf))
-    radians = promises.speed(scene, flow.largest) * abs(truth.time)
+    radians = promises.speed(scene, flow.largest) * abs(truth.end)
     found = promises.tolerances(name, least, radians, flow.amplification)
     return [*found, None] if name in GAUSS else [*found]
 
@@ -173,63 +138,73 @@ def _steps(scene: Scene, time: float) -> int:
     return max(1, math.ceil(abs(time) / scene.step_size * (1.0 - 1e-6)))
 
 
-def _held(
-    scene: Scene, truth: Truth, name: str, tolerance: float | None, id: str
-) -> Iterator[Check]:
-    flow = truth.flow
-    error_id = f"{id}/error"
-    run = attempt(
-        error_id, name, scene, truth.time, partial(run_method, name, scene, truth.time, tolerance)
-    )
-    if isinstance(run, Check):
-        yield run
-        return
-    complete = run.has_result
-    # The steps after which the method rounds omega and forgets what it took off.
-    if tolerance is None:
-        rounded = 0.0 if name in GAUSS else float(_steps(scene, truth.time))
-    elif name == "auto":
-        rounded = float(run.steps)
-    else:
-        rounded = promises.steps_of(name, run.steps, run.evaluations or 0)
-    error = truth.wrong(run)
-    note = "" if complete else run.ended
-    made = made_on_the_way(name, scene, truth, tolerance)
-    if truth.exact and (name == "closed-form" or name == "auto"):
+def refusable(tried: Tried, truth: Truth, why: str) -> bool:
+    """Let those methods refuse that `may_refuse` names."""
+    return may_refuse(tried.method, tried.scene, truth.end)
+
+
+def _derived(truth: Truth, tried: Tried, answer: Answer) -> float | None:
+    """Return the limit that follows from what a method promises."""
+    made = made_on_the_way(tried, truth)
+    if truth.exact and tried.method in _FORMS:
         # It makes no errors on the way: beside its own there is the rounding of A, B and C.
-        limit = (made or 0.0) + truth.data + truth.error / flow.largest
-    elif made is None:
+        return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
+    if made is None:
         # It claims no error in steps of this size, only that it conserves.
-        limit = math.inf
-    else:
-        limit = flow.limit(made, rounded) + truth.error / flow.largest
-        if limit > LINEAR:
-            limit, note = math.inf, note or "the flow leaves no two digits"
-    if limit < math.inf or math.isnan(error) or not complete:
-        yield bounded(error_id, error, min(2.0, limit), note)
-    else:
-        yield described(error_id, error, note)
-    if truth.exact and complete:
-        lost = flow.unamplified + rounded * ROUNDING
+        return None
+    growth, steps = truth.flow.amplification, _roundings(tried, truth)
+    return linear(allowed(truth, made, growth, steps=steps))
+
+
+DERIVED = Policy("the errors that a method promises to make, amplified", _derived, refusable)
+
+
+def _roundings(tried: Tried, truth: Truth) -> float:
+    """Return the steps after which the method rounds omega and forgets what it took off."""
+    method, answer = tried.method, tried.answer
+    if tried.tolerance is None:
+        return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
+    if method == "auto":
+        return float(answer.steps)
+    return promises.steps_of(method, answer.steps, answer.evaluations or 0)
+
+
+def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
+    method, scene = name.subject, scene_of(name)
+    ask = partial(run_method, method, scene, truth.end, tolerance)
+    tried = Tried(method, tolerance, scene, lambda: of_end(method, ask()))
+    yield judge(name.of("error"), tried, truth, DERIVED)
+    answer = tried.answer
+    if truth.exact and answer.is_whole and not answer.refusal:
+        made = made_on_the_way(tried, truth)
+        lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
         if made is None:
             # Each step rounds omega, its sums, and the last iteration.
-            lost += 4.0 * ROUNDING * _steps(scene, truth.time)
+            lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
         # An error of omega changes what is conserved by no more than itself.
-        most = min(limit, total + total * total)
-        yield bounded(f"{id}/drift", conserved(scene, run.omega, flow.largest), most)
+        limit = DERIVED.limit(truth, tried, answer)
+        most = min(math.inf if limit is None else limit, total + total * total)
+        found = conserved(scene, answer.omega[-1], truth.flow.largest)
+        yield name.of("drift").bounded(found, most)
 
 
-def made_on_the_way(name: str, scene: Scene, truth: Truth, tolerance: float | None) -> float | None:
+def scene_of(name: Name) -> Scene:
+    """Return the scene of a check that has one."""
+    assert name.scene is not None
+    return name.scene
+
+
+def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
     """Return the sum of the errors that a method promises to make, over the largest omega.
 
     None where it promises none.
     """
-    if name in FIXED_STEP and truth.exact:
-        radians = promises.speed(scene, truth.flow.largest) * abs(truth.time)
-        steps = _steps(scene, truth.time)
-        return promises.fixed_step_sum(name, radians / steps, steps)
-    return tolerance
+    if tried.method in FIXED_STEP and truth.exact:
+        radians = promises.speed(tried.scene, truth.flow.largest) * abs(truth.end)
+        steps = _steps(tried.scene, truth.end)
+        return promises.fixed_step_sum(tried.method, radians / steps, steps)
+    return tried.tolerance
 
 
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
@@ -255,8 +230,9 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
     return float(worst)
 
 
-def describe_programs(circumstance: str, scene: Scene) -> Iterator[Attempt]:
+def describe_programs(name: Name) -> Iterator[Attempt]:
     """Say how far the programs, original and corrected, are from the truth over their steps."""
+    scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)
 
@@ -267,16 +243,16 @@ def describe_programs(circumstance: str, scene: Scene) -> Iterator[Attempt]:
             return np.array([[float(x) for x in torque_free(scene, t)] for t in times])
         return reference(scene, times).omega
 
-    def describe(candidate: Candidate, id: str) -> Iterator[Check]:
+    def describe(candidate: Candidate, name: Name) -> Check:
         run = candidate.rows(scene)
         scale = float(np.abs(wanted()).max(initial=max(map(abs, scene.omega)))) or 1.0
         error = apart(run.omega[rows], wanted()) / scale if len(run.omega[rows]) else None
         note = "" if run.ended == "complete" else f"{run.ended} after {run.steps} steps"
-        yield described(id, error, note)
+        return name.described(error, note)
 
     for listing in LISTINGS:
-        name = f"{listing.program}/{circumstance}/{listing.label}"
-        yield Attempt(name, partial(describe, unstopped(listing)), scene)
+        own = replace(name, subject=listing.program, setting=listing.label)
+        yield Attempt(own, partial(describe, unstopped(listing)))
 
 
 def apart(found: Array, wanted: Array) -> float:

@@ -4,22 +4,22 @@ The first part of a check's name is its kind.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import chain
 
-from pyharness.checks.attitudes import attitudes, random_attitudes
 from pyharness.checks.cells import cells, random_programs
-from pyharness.checks.check import Check
+from pyharness.checks.check import Attempts, Check, run_suites
 from pyharness.checks.decks import decks
 from pyharness.checks.external import external_checks
 from pyharness.checks.external_file import problems
 from pyharness.checks.golden import golden
-from pyharness.checks.methods import methods, orders, prepared
-from pyharness.checks.random_methods import random_methods
+from pyharness.checks.methods import attitudes, methods, prepared
+from pyharness.checks.orders import orders
+from pyharness.checks.random_methods import random_attitudes, random_methods
 from pyharness.checks.schemes import schemes
-from pyharness.checks.selection import Selection, replay
+from pyharness.checks.selection import Selection
 from pyharness.checks.stops import stops
 from pyharness.checks.words import words
-from pyharness.model.errors import InputError
 
 
 def _external(chosen: Selection) -> Iterator[Check]:
@@ -33,7 +33,7 @@ _THIN_EXTERNAL = [
     f"external/detest-b5/20/{name}" for name in ("reference", "taylor", "gauss-4", "runge-kutta")
 ]
 
-KINDS: dict[str, Callable[[Selection], Iterator[Check]]] = {
+KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # Program x case x listing x reading: Fortran against twin, bit for bit over the whole
     # trajectory, counters and stop.
     "cells": cells,
@@ -67,15 +67,6 @@ _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Make the checks asked for, one after another."""
-    for kind, checks in KINDS.items():
-        if not chosen.may_ask(kind):
-            continue
-        try:
-            yield from checks(chosen)
-        except InputError as refusal:
-            if kind in _OF_THE_USER:
-                raise
-            # Something refused what it has to take: a fault, and none of the user's.
-            note = f"ended here: {refusal}"
-            yield Check(f"{kind}/refused", False, None, None, replay(kind), note)
+    """Make the checks requested, one after another."""
+    suites = {kind: partial(attempts, chosen) for kind, attempts in KINDS.items()}
+    return run_suites(suites, chosen.only, "verify", _OF_THE_USER)

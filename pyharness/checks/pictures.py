@@ -50,14 +50,14 @@ class _Mark(NamedTuple):
 
 
 def _mark(check: Check) -> _Mark:
-    _, method, circumstance, *rest = check.id.split("/")
-    kind = re.split(r"[-^]?\d", circumstance, maxsplit=1)[0].rstrip("-")
-    rank = rest[0] if rest else ""
+    name = check.name
+    kind = re.split(r"[-^]?\d", name.circumstance, maxsplit=1)[0].rstrip("-")
+    rank = name.setting or name.quantity
     with suppress(ValueError):
         # Tolerances that vary are one series.
         rank = "coarse" if float(rank) >= _COARSE else "fine"
-    what = check.id.split("/")[-1]
-    return _Mark(method, kind, circumstance, rank, what if what in _MARKERS else "", check)
+    what = name.quantity if name.quantity in _MARKERS else ""
+    return _Mark(name.subject, kind, name.circumstance, rank, what, check)
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
@@ -68,7 +68,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    drawn = [check for check in checks if check.id.count("/") > 1 and check.value is not None]
+    drawn = [check for check in checks if check.name.circumstance and check.value is not None]
     if not drawn:
         raise InputError(
             "--plot: none of these checks has a number to draw; choose others by --only"

@@ -6,10 +6,12 @@
 import math
 import shlex
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from pyharness.checks.check import Check, selected
+from pyharness.checks.cells import of_cell
+from pyharness.checks.check import Check, Name, selected
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
 from pyharness.checks.port_protocol import VARIABLES, Answer, read_answer, request
 from pyharness.compare.agreement import ulps
@@ -40,26 +42,25 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 
     `patience`: how long to wait for an answer (s). InputError for no command.
     """
-    again = f"python -m pyharness verify --port {shlex.quote(command)}"
-    id = "port/start"
-    replay = again
+    verb = f"python -m pyharness verify --port {shlex.quote(command)}"
+    name, again = Name("port", "start"), verb
     try:
         with PortProcess(command, patience) as process:
-            for name, listing, case in cells:
-                id, replay = f"port/{name}", f"{again} --cell {name}"
-                yield _held(id, replay, process, listing, case_scene(case))
+            for cell, listing, case in cells:
+                name, again = of_cell("port", listing, case), f"{verb} --cell {cell}"
+                yield replace(_held(name, process, listing, case_scene(case)), again=again)
     except PortError as error:
-        yield Check(id, False, None, None, replay, str(error))
+        yield replace(name.judged(False, str(error)), again=again)
 
 
-def _held(id: str, again: str, process: PortProcess, listing: Listing, scene: Scene) -> Check:
+def _held(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> Check:
     answer = read_answer(process.ask(request(scene, listing)), scene.steps)
     twin = PROGRAM_REGISTRY[listing.program].run(scene, listing, "python")
     note = "; ".join(differences(twin, answer))
     wanted = _rows(twin)
     same = len(wanted) == len(answer.rows)
     apart = ulps(wanted, answer.rows) if same else math.inf
-    return Check(id, not note, apart, 0.0, again, note)
+    return name.judged(not note, note, apart, 0.0)
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:

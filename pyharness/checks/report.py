@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 from pyharness.checks.check import Check, Sample, severity
@@ -24,12 +23,12 @@ def checks_report(
         verb,
         text,
         record=lambda: {
-            "checks": [asdict(check) for check in checks],
+            "checks": [check.record() for check in checks],
             "passed": all(check.passed for check in checks),
             **extra,
             "build": build_record(),
         },
-        cases=[(each.kind, each.id, _failure(each), each.replay) for each in checks],
+        cases=[(each.suite, each.id, _failure(each), each.replay) for each in checks],
     )
 
 

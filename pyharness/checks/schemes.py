@@ -6,14 +6,16 @@ the program had before it, so that only the rounding of one step may differ.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from pyharness.checks.check import Check, bounded
-from pyharness.checks.selection import Selection, replay
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.methods import cases
+from pyharness.checks.selection import Selection
 from pyharness.model.listing import PROGRAMS, corrected
 from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.collocation_matrices import PARTS
@@ -33,28 +35,29 @@ class Stage:
     rounding: Array  # shape (n, 6); by how much the rate of another who computes it may differ
 
 
-def schemes(chosen: Selection) -> Iterator[Check]:
+def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Hold every step of the corrected programs against its scheme, omega and velocity.
 
     The value is the largest share of what rounding may do.
     """
-    for case in (7,) if chosen.thin else case_numbers():
-        for name in PROGRAMS:
-            id = f"schemes/{name}/case-{case}"
-            if chosen.asks(id):
-                yield _held(id, name, case_scene(case))
+    for case in cases(chosen, (7,)):
+        for program in PROGRAMS:
+            yield Attempt(
+                Name("schemes", program, f"case-{case}"), partial(_held, case_scene(case))
+            )
 
 
-def _held(id: str, name: str, scene: Scene) -> Check:
-    run = PROGRAM_REGISTRY[name].run(scene, corrected(name), may_stop=False)
+def _held(scene: Scene, name: Name) -> Check:
+    program = name.subject
+    run = PROGRAM_REGISTRY[program].run(scene, corrected(program), may_stop=False)
     if not is_whole(scene, run):
-        return Check(id, False, None, 1.0, replay(id), f"{run.ended}, or no velocity")
-    due, rounding = _scheme(name, scene, run)
+        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0)
+    due, rounding = _scheme(program, scene, run)
     off = np.abs(rows(run) - due)
     share = np.divide(off, rounding, out=np.zeros_like(off), where=off != 0.0)
     step, column = divmod(int(share.argmax()), 6)
     note = f"most at step {step + 1}, {'UV'[column // 3]}{column % 3 + 1}"
-    return bounded(id, float(share.max()), 1.0, replay(id), note)
+    return name.bounded(float(share.max()), 1.0, note)
 
 
 def is_whole(scene: Scene, run: Trajectory) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pyharness.checks.check import may_hold, selected
+from pyharness.checks.check import Name, may_hold, selected
 from pyharness.scenes.random_scenes import weekly_seed
 
 if TYPE_CHECKING:
@@ -29,19 +29,15 @@ class Selection:
     thin: bool = False  # a part that touches every kind, for `verify --self-test`
 
     def asks(self, id: str) -> bool:
-        """Whether the check of that name is asked for."""
+        """Whether the check of that id is requested."""
         return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
-        """Whether a check below that name may be asked for."""
+        """Whether a check below that id may be requested."""
         return may_hold(id, self.only)
 
-    def replay_of_draw(self, id: str) -> str:
-        """Return the command that repeats a check of a random draw."""
+    def drawn(self, number: int, subject: str = "") -> Name:
+        """Return the name of a check of a random draw."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
-        return f"{replay(id)}{draws} --seed {shlex.quote(self.seed)}"
-
-
-def replay(id: str) -> str:
-    """Return the command that repeats one check."""
-    return f"python -m pyharness verify --only {id}"
+        options = f"{draws} --seed {shlex.quote(self.seed)}"
+        return Name("random", subject, str(number), options=options)

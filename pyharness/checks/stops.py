@@ -4,23 +4,27 @@ Both languages could test the wrong thing alike. Here the quotients of all steps
 the program is run with constants just below and just above each that is larger than all before.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Check, bounded
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.methods import cases
 from pyharness.checks.schemes import Stage, is_whole, rows, stages
-from pyharness.checks.selection import Selection, replay
+from pyharness.checks.selection import Selection
 from pyharness.model.listing import Listing, corrected, names_of
 from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.original.cells import listing_name, subsets
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.conditioning import ROUNDING
 
 _PROGRAM = "runge-kutta"
+
+Stages = tuple[Stage, Stage, Stage, Stage]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,31 +36,37 @@ class Quotients:
     names: list[str]  # what the m of a step are called
 
 
-def stops(chosen: Selection) -> Iterator[Check]:
+def stops(chosen: Selection) -> Iterator[Attempt]:
     """Hold where the program stops, why and at which quotient against the formula.
 
     With every way of testing that a listing can have. The value is the largest share of what
     rounding may do to a quotient.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
-    for case in (3,) if chosen.thin else case_numbers():
-        if not chosen.may_ask(f"stops/case-{case}"):
-            continue
-        scene = case_scene(case)
-        run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
-        kutta = stages(scene, run) if is_whole(scene, run) else None
+    for case in cases(chosen, (3,)):
+        known = cache(partial(_run, case_scene(case)))
         for defects in subsets(ways):
             listing = Listing(_PROGRAM, defects)
-            id = f"stops/case-{case}/{listing_name(listing)}"
-            if not chosen.asks(id):
-                continue
-            if kutta is None:
-                yield Check(id, False, None, 1.0, replay(id), f"{run.ended}, or no velocity")
-            else:
-                yield _held(id, scene, listing, _quotients(scene, run, kutta, listing))
+            name = Name("stops", "", f"case-{case}", listing_name(listing))
+            yield Attempt(name, partial(_held, case_scene(case), listing, known))
 
 
-def _held(id: str, scene: Scene, listing: Listing, quotients: Quotients) -> Check:
+def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
+    """Return a run that is not stopped, and the stages of its steps where it is whole."""
+    run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
+    return run, stages(scene, run) if is_whole(scene, run) else None
+
+
+def _held(
+    scene: Scene,
+    listing: Listing,
+    known: Callable[[], tuple[Trajectory, Stages | None]],
+    name: Name,
+) -> Check:
+    run, kutta = known()
+    if kutta is None:
+        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0)
+    quotients = _quotients(scene, run, kutta, listing)
     largest = 0.0
     constants = _constants(quotients)
     for constant in constants:
@@ -65,16 +75,14 @@ def _held(id: str, scene: Scene, listing: Listing, quotients: Quotients) -> Chec
         seen = found.stop and (found.steps, found.stop.step, found.stop.variable)
         if seen != (due and (due.step, due.step, due.variable)):
             note = f"with {constant!r}: {found.stop or found.ended}, due {due or 'complete'}"
-            return Check(id, False, None, 1.0, replay(id), note)
+            return name.judged(False, note, limit=1.0)
         if found.stop and due:
             granted = quotients.rounding[due.step - 1, quotients.names.index(due.variable)]
             largest = max(largest, abs(found.stop.quotient - due.quotient) / granted)
-    return bounded(id, largest, 1.0, replay(id), f"{len(constants)} constants")
+    return name.bounded(largest, 1.0, f"{len(constants)} constants")
 
 
-def _quotients(
-    scene: Scene, run: Trajectory, kutta: tuple[Stage, Stage, Stage, Stage], listing: Listing
-) -> Quotients:
+def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -> Quotients:
     first, _, _, fourth = kutta
     after = rows(run) if listing.has("lipschitz-mismatched-pairs") else fourth.state
     velocity = listing.has("lipschitz-tests-velocity")

@@ -2,79 +2,31 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 
-from pyharness.checks import check as checks
-from pyharness.checks.check import Check, may_hold, selected, severity
-from pyharness.model.errors import InputError
+from pyharness.checks.check import Attempts, Check, Name, run_suites, severity
 from pyharness.model.listing import PROGRAMS, corrected, original
-from pyharness.model.scene import Scene
 
-# Each trial is a module of pyharness.checks.trials, loaded when it is called for.
+# Each trial is a module of pyharness.checks.trials, loaded when it is requested.
 TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),
     *("regions", "invariance", "attitude", "matrices", "threads"),
 )
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (original, corrected))
 
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What came out of one input: a check, and the input where it is a scene."""
-
-    check: Check
-    scene: Scene | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Attempt:
-    """What is tried, computed when it is asked for.
-
-    Attributes
-    ----------
-    name : str
-        What follows the name of what it is part of, after a slash: of a trial's own, method or
-        program and circumstance.
-    make : callable
-        From the whole name to checks, whose names begin with it, and parts.
-    scene : Scene or None
-        The input, where it is a scene.
-    """
-
-    name: str
-    make: Callable[[str], Iterable["Check | Attempt"]]
-    scene: Scene | None = None
-
-    def outcomes(self, whole: str, only: Sequence[str]) -> Iterator[Outcome]:
-        """Compute what `only` asks for."""
-        id = f"{whole}/{self.name}"
-        if not may_hold(id, only):
-            return
-        for made in self.make(id):
-            if isinstance(made, Attempt):
-                yield from made.outcomes(id, only)
-            elif selected(made.id, only):
-                yield Outcome(made, self.scene)
+named = partial(Name, command="stress")
+"""Return the name of a check of a trial."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A named trial: what is tried, and how the bound was derived.
-
-    ``run(only)`` yields the outcomes asked for, each computed when it is its turn.
-    """
+    """A named trial: what is tried, how the bound was derived, and the attempts `only` requests."""
 
     name: str
     title: str
     bound: str
-    run: Callable[[Sequence[str]], Iterable[Outcome]]
-
-
-def in_turn(
-    name: str, attempts: Callable[[], Iterable[Attempt]]
-) -> Callable[[Sequence[str]], Iterable[Outcome]]:
-    """Return the run of a trial that makes one attempt after the other."""
-    return lambda only: (o for attempt in attempts() for o in attempt.outcomes(name, only))
+    attempts: Callable[[Sequence[str]], Attempts]
 
 
 def trial(name: str) -> Trial:
@@ -83,44 +35,22 @@ def trial(name: str) -> Trial:
     return found
 
 
-def stress(only: Sequence[str] = ()) -> Iterator[Outcome]:
-    """Run the checks whose names begin as in `only`, as in ``separatrix/taylor``; or all."""
-    for name in TRIALS:
-        if not may_hold(name, only):
-            continue
-        try:
-            yield from trial(name).run(only)
-        except InputError as refusal:
-            # Something refused what it has to take: a fault, and none of the user's.
-            id = f"{name}/refused"
-            yield Outcome(Check(id, False, None, None, replay(name), f"ended here: {refusal}"))
+def stress(only: Sequence[str] = ()) -> Iterator[Check]:
+    """Make the checks whose ids begin as in `only`, as in ``separatrix/taylor``; or all."""
+    suites = {name: lambda name=name: trial(name).attempts(only) for name in TRIALS}
+    return run_suites(suites, only, "stress")
 
 
-def replay(id: str) -> str:
-    """Return the command that repeats one check."""
-    return f"python -m pyharness stress --only {id}"
-
-
-def bounded(id: str, value: float, limit: float, note: str = "") -> Check:
-    """Return the check that `value` does not exceed `limit`; NaN does."""
-    return checks.bounded(id, value, limit, replay(id), note)
-
-
-def described(id: str, value: float | None, note: str = "") -> Check:
-    """Return a finding without a bound, which can't fail."""
-    return checks.described(id, value, replay(id), note)
-
-
-def worst(outcomes: Iterable[Outcome]) -> dict[str, Outcome]:
-    """Return the outcome nearest to its limit, or furthest beyond, of each trial and method.
+def worst(checks: Iterable[Check]) -> dict[str, Check]:
+    """Return the check nearest to its limit, or furthest beyond, of each trial and subject.
 
     Of those that have a limit and a scene.
     """
-    found: dict[str, Outcome] = {}
-    for outcome in outcomes:
-        if outcome.scene is None or outcome.check.limit is None:
+    found: dict[str, Check] = {}
+    for check in checks:
+        if check.name.scene is None or check.limit is None:
             continue
-        name = "/".join(outcome.check.id.split("/")[:2])
-        if name not in found or severity(outcome.check) > severity(found[name].check):
-            found[name] = outcome
+        name = f"{check.suite}/{check.name.subject}"
+        if name not in found or severity(check) > severity(found[name]):
+            found[name] = check
     return found

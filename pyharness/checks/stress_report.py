@@ -23,7 +23,7 @@ def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
     """Report the failures, then a table for each trial; a trial is a picture."""
     text: list[Section] = [told_singly(checks)]
     for each in trials:
-        own = [check for check in checks if check.kind == each.name]
+        own = [check for check in checks if check.suite == each.name]
         if own:
             text.append([f"{each.name}: {each.title}", f"  bound: {each.bound}"])
             text.append([_table(own)])
@@ -35,14 +35,14 @@ def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
 def _table(checks: Sequence[Check]) -> Table:
     groups: dict[str, list[Check]] = {}
     for check in checks:
-        groups.setdefault(check.id.split("/")[1], []).append(check)
+        groups.setdefault(check.name.subject, []).append(check)
     rows = []
     for name, members in groups.items():
         judged = [check for check in members if check.limit is not None]
         failed = sum(not check.passed for check in members)
         worst = max(judged, key=severity) if judged else max(members, key=_size)
         share = severity(worst)[1] if judged else None
-        where = "/".join(worst.id.split("/")[2:]) or None
+        where = worst.name.place or None
         rows.append(
             [name, len(members), failed, len(judged), share, worst.value, worst.limit, where]
         )

@@ -3,7 +3,7 @@ from pyharness.checks.stress import stress
 
 
 def checks_of(*only: str) -> dict[str, Check]:
-    return {outcome.check.id: outcome.check for outcome in stress(only)}
+    return {check.id: check for check in stress(only)}
 
 
 def failed(*only: str) -> list[str]:

@@ -20,14 +20,15 @@ import numpy as np
 import pytest
 
 from pyharness.checks import cells as verify_programs
-from pyharness.checks.check import bounded, selected
+from pyharness.checks.check import Name, selected
 from pyharness.checks.golden import mathematics, read_record, recorded, update
+from pyharness.checks.judge import Answer, Tried
 from pyharness.checks.kinds import KINDS, verify
-from pyharness.checks.methods import _order
+from pyharness.checks.orders import judged_order
 from pyharness.checks.plants import self_test
 from pyharness.checks.plants.planted_twins import plant_in_twin
 from pyharness.checks.plants.plants import PLANTS, Plant
-from pyharness.checks.random_methods import Answer, Truth, _may_refuse, truth_of
+from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli.main import main
 from pyharness.compare.orders import Order, State
@@ -55,7 +56,7 @@ def test_checks_have_names_of_their_own_and_all_pass() -> None:
     checks = list(verify(Selection(seed="fixed", draws=12, thin=True)))
     assert [check.id for check in checks if not check.passed] == []
     assert len({check.id for check in checks}) == len(checks)
-    assert {check.kind for check in checks} == set(KINDS)
+    assert {check.suite for check in checks} == set(KINDS)
 
 
 _STOP_TEST = {
@@ -110,7 +111,7 @@ def test_fault_in_both_languages_is_seen(
 
 def test_limit_is_not_passed_by_nan() -> None:
     passed = [
-        bounded("", *pair, "").passed for pair in ((math.nan, math.inf), (2.0, 1.0), (1.0, 1.0))
+        Name("").bounded(*pair).passed for pair in ((math.nan, math.inf), (2.0, 1.0), (1.0, 1.0))
     ]
     assert passed == [False, False, True]
 
@@ -390,7 +391,7 @@ def test_what_is_not_as_due_in_both_languages_is_named(
 
 @pytest.mark.parametrize("state", ["misses", "unsettled", "singular", "sensitive", "unbounded"])
 def test_order_of_a_case_that_can_not_be_told_fails(state: State) -> None:
-    assert not _order("orders/x", Order(4, state, None, 0.01)).passed
+    assert not judged_order(Name("orders"), Order(4, state, None, 0.01)).passed
 
 
 @pytest.mark.parametrize(
@@ -411,15 +412,16 @@ def test_in_a_plain_scene_only_few_may_refuse(
     method: str, tolerance: float, why: str, growth: float, may: bool
 ) -> None:
     drawn = draw("x", 0)
-    truth = Truth([drawn.time], np.ones((1, 3)), 1.0, growth)
-    assert _may_refuse(Answer(method, tolerance, None, why), drawn, truth) == may
+    truth = replace(truth_of(drawn), flow=replace(truth_of(drawn).flow, amplification=growth))
+    tried = Tried(method, tolerance, drawn.scene, Answer)
+    assert may_refuse(tried, truth, why) == may
 
 
 def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:
     law = TorqueLaw((-1.0, 0.0, 0.0))
     slowing = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
     drawn: Any = SimpleNamespace(scene=slowing, time=1.0)
-    assert truth_of(drawn).largest == pytest.approx(1.0)
+    assert truth_of(drawn).flow.largest == pytest.approx(1.0)
 
 
 def test_far_scales_are_far() -> None:

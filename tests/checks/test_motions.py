@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw
-from pyharness.checks.stress import stress, worst
+from pyharness.checks.stress import named, stress, worst
 from pyharness.checks.trials import length, threads
 from pyharness.theory import brouwer
 from pyharness.truth.axial_top import axial_top
@@ -42,12 +42,11 @@ def test_the_axial_top_is_the_reference() -> None:
 )
 def test_bounds_hold(only: str) -> None:
     asked = only.split(",")
-    outcomes = list(stress(asked))
-    checks = [each.check for each in outcomes]
+    checks = list(stress(asked))
     assert [check.id for check in checks if not check.passed] == []
     assert {check.id.split("/")[1] for check in checks} == {each.split("/")[1] for each in asked}
     assert len({check.id for check in checks}) == len(checks)
-    assert worst(outcomes)
+    assert worst(checks)
 
 
 @pytest.mark.parametrize("name", length.MARCHERS)
@@ -55,7 +54,7 @@ def test_brouwers_law_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """To 1e4 revolutions; with four stages energy drifts there if weights lose their low words."""
     monkeypatch.setattr(length, "_FIT_FROM", 1e2)
     shorter = replace(length.MARCHERS[name], revolutions=1e4, others=1e4)
-    checks = list(length.hold(shorter, "tumbling", name))
+    checks = list(length.hold(shorter, named("length", name, "tumbling")))
     assert [check.id for check in checks if not check.passed] == []
     assert len(checks) == 3 * 8
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from pyharness.checks import hold as truth
-from pyharness.checks.check import Check
+from pyharness.checks.check import Check, Name
 from pyharness.checks.hold import in_steps
-from pyharness.checks.stress import Outcome, bounded, stress, worst
+from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
 from pyharness.compare.candidates import End
 from pyharness.methods.solve import solve
@@ -33,8 +33,7 @@ def test_bounds_hold(name: str) -> None:
     room = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}")
     some = [circumstance for circumstance, *_ in room.circumstances()][::5]
     subjects = {*promises.METHODS, *PROGRAM_REGISTRY}
-    outcomes = list(stress([f"{name}/{who}/{where}" for who in subjects for where in some]))
-    checks = [outcome.check for outcome in outcomes]
+    checks = list(stress([f"{name}/{who}/{where}" for who in subjects for where in some]))
     assert [check.id for check in checks if not check.passed] == []
     assert len({check.id for check in checks}) == len(checks)
     least = dict.fromkeys(subjects, math.inf)
@@ -91,8 +90,9 @@ def test_what_is_conserved_is_read_as_an_error_of_omega() -> None:
 
 
 def test_the_worst_is_the_nearest_to_its_limit_or_failed() -> None:
+    scene = Scene("", (1.0,) * 3, (1.0,) * 3)
     found = worst(
-        Outcome(Check(id, passed, value, limit, ""), Scene("", (1.0,) * 3, (1.0,) * 3))
+        Check(Name(*id.split("/"), scene=scene), passed, value, limit)
         for id, value, limit, passed in (
             ("a/b/1", 1e-3, 1.0, True),
             ("a/b/2", 1e-9, 1e-9, True),
@@ -101,7 +101,7 @@ def test_the_worst_is_the_nearest_to_its_limit_or_failed() -> None:
             ("a/c/2", 2.0, 1.0, False),
         )
     )
-    assert {name: each.check.id for name, each in found.items()} == {"a/b": "a/b/2", "a/c": "a/c/1"}
+    assert {name: each.id for name, each in found.items()} == {"a/b": "a/b/2", "a/c": "a/c/1"}
 
 
 def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
@@ -162,8 +162,8 @@ def test_the_worst_input_is_saved_and_its_command_gives_the_same(
         told, command = (line.removeprefix("# ") for line in path.read_text().splitlines()[:2])
         words = command.split()
         assert words[:5] == ["python", "-m", "pyharness", "stress", "--only"]
-        (outcome,) = stress([words[5]])
-        check, scene, saved = outcome.check, outcome.scene, read_scene(path)
+        (check,) = stress([words[5]])
+        scene, saved = check.name.scene, read_scene(path)
         subject = "/".join(check.id.split("/")[:2])
         assert told == f"worst of {subject}: {check.value}, limit {check.limit}"
         assert scene is not None
@@ -176,13 +176,13 @@ def test_only_what_failed_is_saved_unless_a_folder_is_given(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     scene = Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 1.5))
-    good = Outcome(bounded("separatrix/taylor/a", 1.0, 2.0), scene)
-    bad = Outcome(bounded("separatrix/quick/b", 3.0, 2.0), scene)
-    for outcomes, code, names in (
+    good = named("separatrix", "taylor", "a", scene=scene).bounded(1.0, 2.0)
+    bad = named("separatrix", "quick", "b", scene=scene).bounded(3.0, 2.0)
+    for checks, code, names in (
         ([good], 0, None),
         ([good, bad], 1, ["separatrix-quick.toml"]),
     ):
-        monkeypatch.setattr("pyharness.cli.verbs.stress.stress", lambda _, found=outcomes: found)
+        monkeypatch.setattr("pyharness.cli.verbs.stress.stress", lambda _, found=checks: found)
         assert _run(capsys, "--only", "separatrix")[0] == code
         folder = tmp_path / "worst"
         assert folder.exists() == (names is not None)

@@ -49,9 +49,8 @@ _END = "pyharness.compare.candidates.Candidate.end"
 _NEAR_SEPARATRIX = "pyharness.checks.trials.separatrix.run_method"
 _HELD = "pyharness.checks.hold.run_method"
 _TURNED = "pyharness.checks.trials.invariance"
-_ATTITUDES = "pyharness.checks.attitudes.solve"
 _TURNING = "pyharness.checks.trials.attitude.solve"
-_PREPARED = "pyharness.checks.attitudes.prepare"
+_PREPARED = "pyharness.compare.candidates.prepare"
 _REGIONS = "pyharness.checks.trials.regions"
 _STEPS = "pyharness.checks.trials.step_size"
 _MATRICES = "pyharness.checks.trials.matrices"
@@ -476,16 +475,16 @@ VERIFY = (
     ),
     # The tolerance of an angle, in radians.
     *(
-        near(f"attitudes/{name}/case-{_with_form(name)}/1.0e-06", on(_ATTITUDES, turned_off), 1e-6)
+        near(f"attitudes/{name}/case-{_with_form(name)}/1.0e-06", on(_SOLVE, turned_off), 1e-6)
         for name in ("auto", "taylor", "closed-form", "dop853", "lsoda")
     ),
-    exact("attitudes/taylor/case-5/1.0e-06", refuses(_ATTITUDES)),
+    exact("attitudes/taylor/case-5/1.0e-06", refuses(_SOLVE)),
     exact("attitudes/closed-form/case-5/1.0e-06",
-          made_by(_ATTITUDES, form_for_all)),
-    exact("attitudes/taylor/case-5/1.0e-06", on(_ATTITUDES, ended)),
+          made_by(_SOLVE, form_for_all)),
+    exact("attitudes/taylor/case-5/1.0e-06", on(_SOLVE, ended)),
     near("attitudes/prepared-taylor/case-5/-1/1.0e-06", on(_PREPARED, Turned), 1e-6),
     near("attitudes/prepared-auto/case-4/3/1.0e-06", on(_PREPARED, Turned), 1e-6),
-    near("random/0/attitude-taylor", on(_ATTITUDES, turned_off), 2.65e-7),
+    near("random/0/attitude-taylor", on(_SOLVE, turned_off), 2.65e-7),
     near("random/0/attitude-prepared", on(_PREPARED, Turned), 2.65e-7),
     exact("prepared/quick/case-5/1/1.0e-06", on(_ANSWERED, partial(ended, why="gave up"))),
     *(
@@ -635,14 +634,14 @@ STRESS = (
     near("invariance/taylor/split/free/1e-06", on(_FREE, off, call=5), 1.8e-5),
     # 40 roundings, at any time; of the angular momentum those of omega too, 16 times the largest
     # over the norm.
-    near("attitude/closed-form/plate/1e-14/angle", on(_TURNING, turned_off), 40.0 * U),
+    near("attitude/closed-form/plate/1e-14/angle", on(_SOLVE, turned_off), 40.0 * U),
     near("attitude/closed-form/revolutions-1000000/tumbling/angle",
-         on(_TURNING, turned_off), 40.0 * U),
-    near("attitude/closed-form/plate/1e-14/length", on(_TURNING, longer), 8.0 * U),
-    near("attitude/closed-form/plate/1e-14/momentum", on(_TURNING, turned_off), 78.0 * U),
-    near("attitude/taylor/plate/1e-06/angle", on(_TURNING, turned_off), 1e-6),
-    near("attitude/dop853/needle/1e-06/angle", on(_TURNING, turned_off), 1e-6),
-    exact("attitude/taylor/plate/1e-06/angle", refuses(_TURNING)),
+         on(_SOLVE, turned_off), 40.0 * U),
+    near("attitude/closed-form/plate/1e-14/length", on(_SOLVE, longer), 8.0 * U),
+    near("attitude/closed-form/plate/1e-14/momentum", on(_SOLVE, turned_off), 78.0 * U),
+    near("attitude/taylor/plate/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
+    near("attitude/dop853/needle/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
+    exact("attitude/taylor/plate/1e-06/angle", refuses(_SOLVE)),
     # 2 E T/L is 37 rad here, and 8 roundings of it and of a turn beside those of the attitude.
     near("attitude/closed-form/montgomery/random-0",
          on(_TURNING, partial(turned_off, along=True)), 3.7e-14),

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import Check, Name
 from pyharness.checks.kinds import verify
 from pyharness.checks.plants.plants import PLANTS, Plant
 from pyharness.checks.report import checks_report
@@ -59,7 +59,7 @@ def _caught(plant: Plant | None, chosen: Selection) -> Caught:
     example = ""
     for check in verify(chosen):
         if not check.passed:
-            failed[check.kind] += 1
+            failed[check.suite] += 1
             if not example or example.startswith(_NOT_ENOUGH):
                 example = check.id
     return Caught(plant, failed, example)
@@ -67,11 +67,11 @@ def _caught(plant: Plant | None, chosen: Selection) -> Caught:
 
 def as_check(caught: Caught) -> Check:
     """Return the finding as a check."""
-    name = caught.plant.name if caught.plant else "none"
+    name = Name("self-test", caught.plant.name if caught.plant else "none")
     value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
     again = "python -m pyharness verify --self-test"
     note = f"caught by {caught.counts or 'nothing'}"
-    return Check(f"self-test/{name}", caught.passed, value, None, again, note)
+    return Check(name, caught.passed, value, None, note, again)
 
 
 def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:

@@ -4,13 +4,24 @@ import math
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import REFUSED, Check
-from pyharness.checks.hold import LINEAR, MIDDLING, in_steps
-from pyharness.checks.stress import Attempt, Trial, bounded, described, in_turn, replay
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.hold import MIDDLING, in_steps, refusable, scene_of
+from pyharness.checks.judge import (
+    Answer,
+    Policy,
+    Tried,
+    Truth,
+    by_rows,
+    judge,
+    linear,
+    lively,
+    tolerance_of,
+)
+from pyharness.checks.stress import Trial, named
 from pyharness.checks.trials import separatrix
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
@@ -22,12 +33,10 @@ from pyharness.model.attitude import (
     product,
     unit_quaternion,
 )
-from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
-from pyharness.model.trajectory import Array, Trajectory, turned_to_space
+from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.rotated import turned
 from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
-from pyharness.theory.promises import may_refuse
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
@@ -77,54 +86,60 @@ TURNS = {
 }
 
 
-@dataclass(frozen=True)
-class Known:
-    """A scene and a time (s), and what is known of it, each computed once where it is asked for."""
+# What a closed form does not need: the flow of a million revolutions.
+_UNKNOWN = Conditioning(1.0, 0.0, 0.0, 0.0, 1.0)
 
-    scene: Scene
-    time: float
 
-    @cached_property
-    def truth(self) -> Array:
-        """The attitude."""
-        return np.array([float(x) for x in free_attitude(self.scene, self.time)])
+def _limit(truth: Truth, tried: Tried, answer: Answer) -> float:
+    return linear(_allowed(tried.method, tolerance_of(tried), truth.flow, truth.end))
 
-    @cached_property
-    def flow(self) -> Conditioning:
-        """What the flow makes of small errors until then."""
-        return conditioning(self.scene, self.time)
 
-    def limit(self, name: str, tolerance: float) -> float:
-        """Return the largest error of an angle that a method may have (rad)."""
-        return ATTITUDE if name in _FORMS else self.flow.angle_limit(tolerance, self.time)
+def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
+    """Return the largest error of an angle that a method may have (rad)."""
+    if method in _FORMS:
+        return ATTITUDE
+    return flow.angle_limit(tolerance * lively(flow.amplification), time)
+
+
+POLICY = Policy(
+    "the rounding of a closed form; else the tolerance, and rounding", _limit, refusable
+)
+
+
+def _truth(scene: Scene, time: float, flow: Callable[[], Conditioning]) -> Truth:
+    q = np.array([[float(x) for x in free_attitude(scene, time)]])
+    return Truth(np.array([time]), np.empty((0, 3)), 0.0, flow(), q, is_signed=True)
 
 
 def _attempts() -> Iterator[Attempt]:
     for circumstance, scene, time in circumstances():
-        known = Known(scene, time)
-        for name in (*_FORMS, *_SERIES):
-            for tolerance in _TOLERANCES.get(name, (METHODS["closed-form"].finest,)):
-                make = partial(_held, known, name, tolerance)
-                yield Attempt(f"{name}/{circumstance}/{tolerance:.0e}", make, scene)
+        name = named("attitude", "", circumstance, scene=scene)
+        flow = cache(partial(conditioning, scene, time))
+        for method in (*_FORMS, *_SERIES):
+            known = partial(_truth, scene, time, (lambda: _UNKNOWN) if method in _FORMS else flow)
+            for tolerance in _TOLERANCES.get(method, (METHODS["closed-form"].finest,)):
+                own = replace(name, subject=method, setting=f"{tolerance:.0e}")
+                yield Attempt(own, partial(_judged, known, tolerance))
     for motion, scene in _MOTIONS.items():
         turn = 2.0 * math.pi / max(map(abs, scene.omega))
         for k in range(2, 13):
-            known = Known(scene, 10.0 ** (0.5 * k) * turn)
-            make = partial(_held, known, "closed-form", METHODS["closed-form"].finest)
-            yield Attempt(f"closed-form/revolutions-{10.0 ** (0.5 * k):.0f}/{motion}", make, scene)
+            known = partial(_truth, scene, 10.0 ** (0.5 * k) * turn, lambda: _UNKNOWN)
+            where = f"revolutions-{10.0 ** (0.5 * k):.0f}"
+            name = named("attitude", "closed-form", where, motion, scene=scene)
+            yield Attempt(name, partial(_judged, known, METHODS["closed-form"].finest))
     for number in range(_BODIES):
         scene = _random_scene(number)
-        montgomery = partial(_montgomery, scene)
-        yield Attempt(f"closed-form/montgomery/random-{number}", montgomery, scene)
-        for name in ("closed-form", "taylor"):
+        name = named("attitude", "closed-form", "montgomery", f"random-{number}", scene=scene)
+        yield Attempt(name, _montgomery)
+        for method in ("closed-form", "taylor"):
+            own = replace(name, subject=method)
             for what, each in TURNS.items():
-                make = partial(_turned, scene, name, each)
-                yield Attempt(f"{name}/{what}/random-{number}", make, scene)
-            yield Attempt(f"{name}/back/random-{number}", partial(_back, scene, name), scene)
+                yield Attempt(replace(own, circumstance=what), partial(_turned, each))
+            yield Attempt(replace(own, circumstance="back"), _back)
     for sequence in SEQUENCES:
         for power in range(1, 18):
-            make = partial(_angles, sequence, 10.0**-power if power < 17 else 0.0)
-            yield Attempt(f"angles/{sequence}/{power if power < 17 else 'pole'}", make)
+            name = named("attitude", "angles", sequence, f"{power if power < 17 else 'pole'}")
+            yield Attempt(name, partial(_angles, 10.0**-power if power < 17 else 0.0))
 
 
 def circumstances() -> Iterator[tuple[str, Scene, float]]:
@@ -158,30 +173,22 @@ def _random_scene(number: int) -> Scene:
     return Scene(f"random-{number}", (x, y, z), moments=moments, attitude=attitude)
 
 
-def _held(known: Known, name: str, tolerance: float, id: str) -> Iterator[Check]:
-    """Hold a method's angle to the truth, and what the motion conserves to the same limit."""
-    scene, time = known.scene, known.time
-    try:
-        found = solve(scene, [time], name, tolerance, attitude=True)
-    except InputError as refusal:
-        may = may_refuse(name, scene, time)
-        yield Check(f"{id}/angle", may, None, None, replay(id), f"{REFUSED}{refusal}")
-        return
-    assert found.attitude is not None
-    limit = known.limit(name, tolerance)
+def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
+    """Judge a method's angle by the truth, and by the same limit what the motion conserves."""
+    scene, truth = scene_of(name), known()
+    tried = by_rows(name.subject, tolerance, scene, [truth.end])
     # Not the angle alone: signs are continuous.
-    apart = 2.0 * float(np.linalg.norm(found.attitude[0] - known.truth))
-    if limit > LINEAR:
-        yield described(f"{id}/angle", apart, "the flow leaves no two digits")
-    else:
-        yield bounded(f"{id}/angle", apart, limit)
-    off = abs(float(np.linalg.norm(found.attitude)) - 1.0)
-    yield bounded(f"{id}/length", off, 8.0 * ROUNDING)
-    if name in _FORMS:
+    yield judge(name.of("angle"), tried, truth, POLICY)
+    answer = tried.answer
+    if answer.attitude is None:
+        return
+    off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
+    yield name.of("length").bounded(off, 8.0 * ROUNDING)
+    if name.subject in _FORMS:
         # An angle turns the angular momentum by no more than itself; moments multiply, and the
         # turning takes two products.
         limit = ATTITUDE + _omega_limit(scene)
-        yield bounded(f"{id}/momentum", _momentum_drift(scene, found), limit)
+        yield name.of("momentum").bounded(_momentum_drift(scene, answer), limit)
 
 
 def _omega_limit(scene: Scene) -> float:
@@ -192,19 +199,21 @@ def _omega_limit(scene: Scene) -> float:
     return 16.0 * ROUNDING * math.sqrt(3.0) * largest / size
 
 
-def _momentum_drift(scene: Scene, found: Trajectory) -> float:
-    start = np.array([scene.attitude]), (np.array(scene.moments) * scene.omega)[None, :]
-    before = turned_to_space(*start)[0]
-    change = found.angular_momentum("space")[0] - before
+def _momentum_drift(scene: Scene, found: Answer) -> float:
+    moments = np.array(scene.moments)
+    assert found.attitude is not None
+    before = turned_to_space(np.array([scene.attitude]), (moments * scene.omega)[None, :])[0]
+    change = turned_to_space(found.attitude, moments * found.omega)[0] - before
     return float(np.linalg.norm(change)) / (float(np.linalg.norm(before)) or 1.0)
 
 
-def _montgomery(scene: Scene, id: str) -> Iterator[Check]:
+def _montgomery(name: Name) -> Check:
     """Hold the turn of one period about the angular momentum to the area that omega goes round.
 
     It is 2 E T/L less the solid angle on the side of the axis that keeps its sign: no invariant,
     and the only check that sees a wrong rate of the turn.
     """
+    scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum))
@@ -220,7 +229,7 @@ def _montgomery(scene: Scene, id: str) -> Iterator[Check]:
     apart = abs(math.remainder(found - wanted, 2.0 * math.pi))
     # The time is rounded, and so are the terms.
     limit = ATTITUDE + 8.0 * ROUNDING * (2.0 * energy * period / size + 2.0 * math.pi)
-    yield bounded(id, apart, limit)
+    return name.bounded(apart, limit)
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
@@ -249,41 +258,43 @@ def _solid_angle(scene: Scene, period: float) -> float:
         before, count = found, 2 * count
 
 
-def _turned(scene: Scene, name: str, turn: Turn, id: str) -> Iterator[Check]:
+def _turned(turn: Turn, name: Name) -> Check:
     """Hold the attitude of the turned problem, turned back, to that of the problem itself."""
-    time, tolerance = 5.0, 1e-12
+    scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     plain, other = (
-        solve(each, [time], name, tolerance, attitude=True).attitude
+        solve(each, [time], method, tolerance, attitude=True).attitude
         for each in (scene, turn.scene(scene))
     )
     assert plain is not None
     assert other is not None
     apart = 2.0 * float(np.linalg.norm(turn.back(other) - plain))
-    yield bounded(id, apart, 2.0 * Known(scene, time).limit(name, tolerance) + 8.0 * ROUNDING)
+    limit = _allowed(method, tolerance, conditioning(scene, time), time)
+    return name.bounded(apart, 2.0 * limit + 8.0 * ROUNDING)
 
 
-def _back(scene: Scene, name: str, id: str) -> Iterator[Check]:
+def _back(name: Name) -> Check:
     """Hold a way forth and back to the start."""
-    time, tolerance = 5.0, 1e-12
-    there = solve(scene, [time], name, tolerance, attitude=True)
+    scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
+    there = solve(scene, [time], method, tolerance, attitude=True)
     assert there.attitude is not None
     x, y, z = there.omega[0].tolist()
     a, b, c, d = there.attitude[0].tolist()
     start = replace(scene, omega=(x, y, z), attitude=(a, b, c, d))
-    again = solve(start, [-time], name, tolerance, attitude=True).attitude
+    again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
-    forth, back = Known(scene, time), Known(start, -time)
-    # What the way there errs in omega turns the way back.
-    errs = forth.flow.limit(tolerance if name == "taylor" else 16.0 * ROUNDING)
-    turns = errs * back.flow.amplification * math.sqrt(3.0) * back.flow.largest * time
-    limit = forth.limit(name, tolerance) + back.limit(name, tolerance) + turns
-    yield bounded(id, float(angle_between(again, np.array([scene.attitude]))[0]), limit)
+    forth, back = conditioning(scene, time), conditioning(start, -time)
+    # The error of omega at the end of the first part turns the second.
+    made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
+    turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
+    limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)
+    return name.bounded(float(angle_between(again, np.array([scene.attitude]))[0]), limit + turns)
 
 
-def _angles(sequence: str, off: float, id: str) -> Iterator[Check]:
+def _angles(off: float, name: Name) -> Check:
     """Hold angles beside a pole to what SciPy's matrices make of them."""
     from scipy.spatial.transform import Rotation
 
+    sequence = name.circumstance
     source, worst = random.Random(f"{sequence} {off}"), 0.0
     for _ in range(20):
         first, last = source.uniform(-math.pi, math.pi), source.uniform(-math.pi, math.pi)
@@ -298,7 +309,7 @@ def _angles(sequence: str, off: float, id: str) -> Iterator[Check]:
         letters = "".join(" XYZ"[int(axis)] for axis in sequence.split("-"))
         back = Rotation.from_euler(letters, told, degrees=True).as_quat(scalar_first=True)
         worst = max(worst, float(angle_between(np.array([q]), back[None, :])[0]))
-    yield bounded(id, worst, _ANGLES)
+    return name.bounded(worst, _ANGLES)
 
 
 def _product(q: Array, by: Quaternion) -> Array:
@@ -317,5 +328,5 @@ TRIAL = Trial(
     "closed form: some twenty roundings of each component at any time, 4.4e-15 rad. Others: the "
     "tolerance and rounding, amplified by the flow and turned all the way. Montgomery: 2 E T/L "
     "less the solid angle, to the rounding of its terms. Angles: of three, rounded thrice.",
-    in_turn("attitude", _attempts),
+    lambda only: _attempts(),
 )

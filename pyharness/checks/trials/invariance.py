@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from pyharness.checks.check import Check
-from pyharness.checks.hold import OURS, apart, finest_and_middling
-from pyharness.checks.stress import LISTINGS, Attempt, Trial, bounded, described, in_turn, replay
+from pyharness.checks.check import REFUSED, Attempt, Check, Name
+from pyharness.checks.hold import OURS, apart, finest_and_middling, scene_of
+from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve
@@ -114,22 +114,27 @@ SYMMETRIES = {
 
 def _attempts() -> Iterator[Attempt]:
     for circumstance, (scene, time) in SCENES.items():
-        for name in (*_ADAPTIVE, *FIXED_STEP):
-            if name == "closed-form" and circumstance != "free":
+        name = named("invariance", "", "", circumstance, scene=scene)
+        for method in (*_ADAPTIVE, *FIXED_STEP):
+            if method == "closed-form" and circumstance != "free":
                 continue
-            for tolerance in _tolerances(name, scene, time):
-                asked = scene, time, name, tolerance
-                ways = {what: partial(_turned, each, *asked) for what, each in SYMMETRIES.items()}
-                ways["back"] = partial(_back, *asked)
-                if name not in FIXED_STEP:
-                    ways["split"] = partial(_split, *asked)
+            for tolerance in _tolerances(method, scene, time):
+                ways: dict[str, Callable[[float, float, Name], Check]]
+                ways = {what: partial(_turned, each) for what, each in SYMMETRIES.items()}
+                ways["back"] = _back
+                if method not in FIXED_STEP:
+                    ways["split"] = _split
                 for way, make in ways.items():
-                    yield Attempt(f"{name}/{way}/{circumstance}/{tolerance:.0e}", make, scene)
+                    own = replace(
+                        name, subject=method, circumstance=way, quantity=f"{tolerance:.0e}"
+                    )
+                    yield Attempt(own, partial(make, time, tolerance))
         for listing in LISTINGS:
             for what, symmetry in SYMMETRIES.items():
-                make = partial(_program, listing, scene, symmetry)
-                name = f"{listing.program}/{what}/{circumstance}/{listing.label}"
-                yield Attempt(name, make, scene)
+                own = replace(
+                    name, subject=listing.program, circumstance=what, quantity=listing.label
+                )
+                yield Attempt(own, partial(_program, listing, symmetry))
 
 
 def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
@@ -145,45 +150,44 @@ def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
     return (called if name in _PREPARED else solved)(name, tolerance).end(scene, time).omega
 
 
-def _turned(
-    symmetry: Symmetry, scene: Scene, time: float, name: str, tolerance: float, id: str
-) -> Iterator[Check]:
-    """Hold the turned problem against the problem itself."""
+def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
+    """Hold the rotated problem against the problem itself."""
+    scene, method = scene_of(name), name.subject
     try:
-        plain = end(scene, time, name, tolerance)
-        other = symmetry.back(end(symmetry.turn(scene), time / symmetry.faster, name, tolerance))
+        plain = end(scene, time, method, tolerance)
+        other = symmetry.back(end(symmetry.turn(scene), time / symmetry.faster, method, tolerance))
     except InputError as refusal:
-        yield Check(id, False, None, None, replay(id), f"refused: {refusal}")
-        return
-    if name in symmetry.bitwise:
-        yield bounded(id, float(np.count_nonzero(plain != other)), 0.0, "bits")
-        return
+        return name.judged(False, f"{REFUSED}{refusal}")
+    if method in symmetry.bitwise:
+        return name.bounded(float(np.count_nonzero(plain != other)), 0.0, "bits")
     flow = _flow(scene.name, 0.0, time)
     difference = float(np.abs(plain - other).max()) / flow.largest
+    if method in FIXED_STEP:
+        return name.described(difference)
     # Either may be wrong by what the method is allowed.
-    limit = 2.0 * flow.limit(tolerance)
-    yield described(id, difference) if name in FIXED_STEP else bounded(id, difference, limit)
+    return name.bounded(difference, 2.0 * flow.limit(tolerance))
 
 
-def _back(scene: Scene, time: float, name: str, tolerance: float, id: str) -> Iterator[Check]:
-    there = end(scene, time, name, tolerance)
+def _back(time: float, tolerance: float, name: Name) -> Check:
+    scene, method = scene_of(name), name.subject
+    there = end(scene, time, method, tolerance)
     start = shifted(scene, there, time)
     # A method of SciPy may meet a little less on the way back.
     coarser = tolerance
-    if name in SCIPY_METHODS:
-        coarser = max(tolerance, 1.1 * finest(name, start, -time))
-    again = end(start, -time, name, coarser)
+    if method in SCIPY_METHODS:
+        coarser = max(tolerance, 1.1 * finest(method, start, -time))
+    again = end(start, -time, method, coarser)
     flow, back = _flow(scene.name, 0.0, time), _flow(scene.name, time, -time)
     difference = float(np.abs(again - scene.omega).max()) / flow.largest
-    if name in FIXED_STEP:
-        yield described(id, difference, "not reversible")
-        return
+    if method in FIXED_STEP:
+        return name.described(difference, "not reversible")
     # The error of the way there is an error of the start of the way back.
     limit = flow.limit(tolerance) * back.amplification + back.limit(coarser)
-    yield bounded(id, difference, limit)
+    return name.bounded(difference, limit)
 
 
-def _split(scene: Scene, time: float, name: str, tolerance: float, id: str) -> Iterator[Check]:
+def _split(time: float, tolerance: float, name: Name) -> Check:
+    scene, method = scene_of(name), name.subject
     # Always the same three.
     source = random.Random("cuts")
     cuts = sorted(source.uniform(0.0, time) for _ in range(3))
@@ -191,14 +195,14 @@ def _split(scene: Scene, time: float, name: str, tolerance: float, id: str) -> I
     flow = _flow(scene.name, 0.0, time)
     limit = flow.limit(tolerance)
     for begin, stop in pairwise([0.0, *cuts, time]):
-        omega = end(shifted(scene, omega, begin), stop - begin, name, tolerance)
+        omega = end(shifted(scene, omega, begin), stop - begin, method, tolerance)
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
-        # What is left of the way carries on the error of each piece.
+        # The rest of the way propagates the error of each piece.
         limit += piece.limit(tolerance) * rest
-    whole = end(scene, time, name, tolerance)
+    whole = end(scene, time, method, tolerance)
     difference = float(np.abs(omega - whole).max()) / flow.largest
-    yield bounded(id, difference, limit, f"{len(cuts)} cuts")
+    return name.bounded(difference, limit, f"{len(cuts)} cuts")
 
 
 @cache
@@ -210,16 +214,16 @@ def _flow(circumstance: str, begin: float, length: float) -> Conditioning:
     return conditioning(shifted(scene, omega, begin), length)
 
 
-def _program(listing: Listing, scene: Scene, symmetry: Symmetry, id: str) -> Iterator[Check]:
+def _program(listing: Listing, symmetry: Symmetry, name: Name) -> Check:
+    scene = scene_of(name)
     plain, other = (unstopped(listing).rows(each).omega for each in (scene, symmetry.turn(scene)))
     n = min(len(plain), len(other))
     other = np.array([symmetry.back(row) for row in other]).reshape(-1, 3)
     if listing.program in symmetry.bitwise:
         count = np.count_nonzero(plain[:n] != other[:n]) + 3 * abs(len(plain) - len(other))
-        yield bounded(id, float(count), 0.0, "bits")
-        return
+        return name.bounded(float(count), 0.0, "bits")
     size = float(np.abs(plain[:n]).max(initial=0.0)) or 1.0
-    yield described(id, apart(plain, other) / size)
+    return name.described(apart(plain, other) / size)
 
 
 TRIAL = Trial(
@@ -228,5 +232,5 @@ TRIAL = Trial(
     "no bit where rounding can't tell the two apart: the same operations in another order of "
     "axes, with other signs, with other exponents; else the tolerance and rounding of each "
     "solution, amplified by the flow that follows it",
-    in_turn("invariance", _attempts),
+    lambda only: _attempts(),
 )

@@ -7,8 +7,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Check
-from pyharness.checks.stress import LISTINGS, Attempt, Trial, bounded, described, in_turn
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.hold import scene_of
+from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
@@ -114,34 +115,36 @@ MARCHERS = {
 
 def _attempts() -> Iterator[Attempt]:
     for motion, scene in MOTIONS.items():
-        for name, marcher in MARCHERS.items():
-            yield Attempt(f"{name}/{motion}", partial(hold, marcher, motion), scene)
-            if name != "gauss-4":
-                make = partial(_prepared, name, motion)
-                yield Attempt(f"{name}/{motion}/prepared", make, scene)
-        yield Attempt(f"closed-form/{motion}", partial(_closed_form, motion), scene)
-        for name in ("dop853", "lsoda"):
-            yield Attempt(f"{name}/{motion}/100", partial(_scipy, name, motion), scene)
+        name = named("length", "", motion, scene=scene)
+        for method, marcher in MARCHERS.items():
+            own = replace(name, subject=method)
+            yield Attempt(own, partial(hold, marcher))
+            if method != "gauss-4":
+                yield Attempt(replace(own, setting="prepared"), _prepared)
+        yield Attempt(replace(name, subject="closed-form"), _closed_form)
+        for method in ("dop853", "lsoda"):
+            yield Attempt(replace(name, subject=method, setting="100"), _scipy)
         # A hundred steps for each of 1e4 revolutions.
         step = 2.0 * math.pi / orbit_of(motion).largest / 100.0
         stepped = replace(scene, step_size=step, steps=1_000_000)
         for listing in LISTINGS:
-            name = f"{listing.program}/{motion}/{listing.label}"
-            yield Attempt(name, partial(_program, listing, motion, stepped), stepped)
+            own = named("length", listing.program, motion, listing.label, scene=stepped)
+            yield Attempt(own, partial(_program, listing))
 
 
-def hold(marcher: Marcher, motion: str, prefix: str) -> Iterator[Check]:
+def hold(marcher: Marcher, name: Name) -> Iterator[Check]:
     """Hold one method to Brouwer's law: a bound at each horizon, and the power of the growth."""
+    motion = name.circumstance
     for what, found, steps, limits in measured(marcher, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
         for k, revolutions in enumerate(horizons):
             value = float(np.nanmax(np.abs(found[:, k])))
             note = f"{steps[k]:.0f} steps, {steps[k] ** LAWS[what]:.1e} to the power {LAWS[what]}"
-            yield bounded(f"{prefix}/{what}/{revolutions:.0f}", value, limits[k], note)
+            yield name.of(f"{what}/{revolutions:.0f}").bounded(value, limits[k], note)
         fitted = (horizons >= 0.99 * _FIT_FROM) & ~np.isnan(found).any(axis=0)
         power = brouwer.exponent(steps[fitted], found[:, fitted])
         due = LAWS[what] + (0.5 if marcher.preference else 0.0)
-        yield bounded(f"{prefix}/{what}/power", power, due + _HALFWAY, f"due {due}")
+        yield name.of(f"{what}/power").bounded(power, due + _HALFWAY, f"due {due}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,51 +208,51 @@ def starts(scene: Scene, body: Orbit) -> list[Scene]:
     return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
 
 
-def _prepared(name: str, motion: str, id: str) -> Iterator[Check]:
+def _prepared(name: Name) -> Check:
     """Hold a prepared solver, which takes the same steps, to the bits of the rows."""
-    scene = MOTIONS[motion]
-    time = 1e4 * 2.0 * math.pi / orbit_of(motion).largest
-    rows, _ = MARCHERS[name].run(scene, [time])
+    method, scene = name.subject, MOTIONS[name.circumstance]
+    time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
+    rows, _ = MARCHERS[method].run(scene, [time])
     stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
-    found = called(name, METHODS[name].finest).end(stepped, time).omega
-    yield bounded(id, float(np.count_nonzero(rows[-1] != found)), 0.0)
+    found = called(method, METHODS[method].finest).end(stepped, time).omega
+    return name.bounded(float(np.count_nonzero(rows[-1] != found)), 0.0)
 
 
-def _closed_form(motion: str, prefix: str) -> Iterator[Check]:
-    scene, body = MOTIONS[motion], orbit_of(motion)
+def _closed_form(name: Name) -> Iterator[Check]:
+    scene, body = MOTIONS[name.circumstance], orbit_of(name.circumstance)
     times = [r * 2.0 * math.pi / body.largest for r in REVOLUTIONS]
     rows = solved("closed-form", METHODS["closed-form"].finest).rows(scene, times).omega
     found = [brouwer.errors(scene, body, t, row, False) for t, row in zip(times, rows, strict=True)]
     for what in LAWS:
         gain = body.turn if what == "phase" else body.gains[what]
         limit = _CLOSED_FORM * gain + (0.0 if what == "phase" else 4.0 * brouwer.ROUNDING)
-        value = max(abs(each[what]) for each in found)
-        yield bounded(f"{prefix}/{what}", value, limit, "at any time")
+        yield name.of(what).bounded(max(abs(each[what]) for each in found), limit, "at any time")
 
 
-def _scipy(name: str, motion: str, prefix: str) -> Iterator[Check]:
-    scene = MOTIONS[motion]
-    time = 1e2 * 2.0 * math.pi / orbit_of(motion).largest
-    found = solved(name, promises.finest(name, scene, time)).end(scene, time)
-    yield from _described(prefix, motion, scene, time, found.omega)
+def _scipy(name: Name) -> Iterator[Check]:
+    scene = MOTIONS[name.circumstance]
+    time = 1e2 * 2.0 * math.pi / orbit_of(name.circumstance).largest
+    found = solved(name.subject, promises.finest(name.subject, scene, time)).end(scene, time)
+    yield from _described(name, scene, time, found.omega)
 
 
-def _program(listing: Listing, motion: str, scene: Scene, prefix: str) -> Iterator[Check]:
+def _program(listing: Listing, name: Name) -> Iterator[Check]:
     """Say what a program makes of 10 and of 1e4 revolutions."""
+    scene = scene_of(name)
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):
-        id = f"{prefix}/{count // 100}"
+        own = replace(name, setting=f"{name.setting}/{count // 100}")
         if len(found.omega) < count:
-            yield described(id, None, f"{found.ended} after {found.steps} steps")
+            yield own.described(None, f"{found.ended} after {found.steps} steps")
         else:
             row = found.omega[count - 1]
-            yield from _described(id, motion, scene, count * scene.step_size, row)
+            yield from _described(own, scene, count * scene.step_size, row)
 
 
-def _described(prefix: str, motion: str, scene: Scene, time: float, row: Array) -> Iterator[Check]:
-    for what, error in brouwer.errors(scene, orbit_of(motion), time, row).items():
+def _described(name: Name, scene: Scene, time: float, row: Array) -> Iterator[Check]:
+    for what, error in brouwer.errors(scene, orbit_of(name.circumstance), time, row).items():
         lost = what == "phase" and abs(error) > _LOST
-        yield described(f"{prefix}/{what}", error, "lost" if lost else "")
+        yield name.of(what).described(error, "lost" if lost else "")
 
 
 TRIAL = Trial(
@@ -259,5 +262,5 @@ TRIAL = Trial(
     "the step, add up to 4 sqrt(n) of one (Hoeffding), phase to the shear of the motion times "
     "n**1.5; truncation adds n times its bound. The power of the growth must be nearer to what is "
     "due, to chance (1/2, 3/2) or to a known preference (1, 2), than to the next",
-    in_turn("length", _attempts),
+    lambda only: _attempts(),
 )

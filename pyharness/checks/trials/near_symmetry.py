@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 from functools import partial
 
+from pyharness.checks.check import Attempt
 from pyharness.checks.hold import hold, hold_all, in_steps, truth_of
-from pyharness.checks.stress import Attempt, Trial, in_turn
+from pyharness.checks.stress import Trial, named
 from pyharness.model.scene import Scene, Triple
 from pyharness.theory.conditioning import Conditioning
 
@@ -40,14 +41,15 @@ def _attempts() -> Iterator[Attempt]:
     unknown = Conditioning(math.inf, 2.0, 2.0, 2.0, max(map(abs, _OMEGA)))
     for name, scene, time in circumstances():
         if time == _LONG:
-            yield from hold(name, scene, time, _CLOSED, partial(truth_of, flow=unknown))
+            own = named("near-symmetry", "", name, scene=scene)
+            yield from hold(own, time, _CLOSED, partial(truth_of, flow=unknown))
         else:
-            yield from hold_all([(name, scene, time)])
+            yield from hold_all("near-symmetry", [(name, scene, time)])
 
 
 TRIAL = Trial(
     "near-symmetry",
     "two moments, or all, that differ by 1e-1 to 1e-16 of their size, and equal ones",
     "as of the separatrix. The difference of two moments is exact, and so is no loss of digits.",
-    in_turn("near-symmetry", _attempts),
+    lambda only: _attempts(),
 )

@@ -7,18 +7,19 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import REFUSED, Attempt, Check, Name
 from pyharness.checks.hold import (
     ALL,
     MIDDLING,
-    Truth,
     describe_programs,
     hold,
     in_steps,
     run_method,
+    scene_of,
     truth_of,
 )
-from pyharness.checks.stress import Attempt, Trial, in_turn, replay
+from pyharness.checks.judge import Truth
+from pyharness.checks.stress import Trial, named
 from pyharness.compare.candidates import End, not_finite
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
@@ -46,39 +47,39 @@ def circumstances() -> Iterator[tuple[str, Scene, float]]:
         yield name, replace(scaled(scene, factor), name=name), _TIME / factor
 
 
-def _bit_for_bit(name: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
+def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
     """Hold one of our methods to the same digits where a power of two scales the motion."""
     time = scene.step_size * scene.steps
-    plain = cache(lambda: _tried(name, scene, time))
+    plain = cache(lambda: _tried(method, scene, time))
 
-    def same(factor: float, other: Scene, id: str) -> Iterator[Check]:
+    def same(factor: float, name: Name) -> Check:
         # In the order of the calls: the motion itself first.
-        first, run = plain(), _tried(name, other, time / factor)
+        first, run = plain(), _tried(method, scene_of(name), time / factor)
         with np.errstate(invalid="ignore"):
             wrong = float(np.abs(run.omega / factor - first.omega).max())
         passed = run.ended == first.ended and run.has_result and wrong == 0.0
         note = "" if run.has_result else run.ended
-        yield Check(id, passed, wrong, 0.0, replay(id), note)
+        return name.judged(passed, note, wrong, 0.0)
 
     for power in powers:
         factor = math.ldexp(1.0, power)
-        other = scaled(scene, factor)
-        yield Attempt(f"{name}/{kind}-2^{power}", partial(same, factor, other), other)
+        name = named("scales", method, f"{kind}-2^{power}", scene=scaled(scene, factor))
+        yield Attempt(name, partial(same, factor))
 
 
-def _beyond(name: str, scene: Scene, id: str) -> Iterator[Check]:
+def _beyond(name: Name) -> Check:
     """Hold a method to say so where omega leaves the range of numbers."""
-    run = _tried(name, scene, 1e300)
+    run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
-    yield Check(id, not silent, float(silent), 0.0, replay(id), note)
+    return name.judged(not silent, note, float(silent), 0.0)
 
 
 def _tried(name: str, scene: Scene, time: float) -> End:
     try:
         return run_method(name, scene, time, None if name in FIXED_STEP else MIDDLING)
     except InputError as refusal:
-        return not_finite(f"refused: {refusal}")
+        return not_finite(f"{REFUSED}{refusal}")
 
 
 @cache
@@ -93,21 +94,22 @@ def _truth(scene: Scene, time: float) -> Truth:
 
 
 def _attempts() -> Iterator[Attempt]:
-    for name, scene, time in circumstances():
-        yield from hold(name, scene, time, truth=_truth)
-        yield from describe_programs(name, scene)
+    for circumstance, scene, time in circumstances():
+        name = named("scales", "", circumstance, scene=scene)
+        yield from hold(name, time, truth=_truth)
+        yield from describe_programs(name)
     free, driven = in_steps(_FREE, _TIME), in_steps(_DRIVEN, 3.0)
-    for name in ALL:
-        if name not in SCIPY_METHODS:
-            yield from _bit_for_bit(name, "same", free, _TWOS)
-    for name in ALL:
-        if name not in (*SCIPY_METHODS, "closed-form"):
-            yield from _bit_for_bit(name, "same-driven", driven, _DRIVEN_TWOS)
+    for method in ALL:
+        if method not in SCIPY_METHODS:
+            yield from _bit_for_bit(method, "same", free, _TWOS)
+    for method in ALL:
+        if method not in (*SCIPY_METHODS, "closed-form"):
+            yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)
     law = TorqueLaw((1e10, 2e10, -1e10))
     # Of a sphere, which no coupling makes turn ever faster on the way.
     scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
-    for name in ALL:
-        yield Attempt(f"{name}/beyond", partial(_beyond, name, scene), scene)
+    for method in ALL:
+        yield Attempt(named("scales", method, "beyond", scene=scene), _beyond)
 
 
 TRIAL = Trial(
@@ -115,5 +117,5 @@ TRIAL = Trial(
     "omega from 1e-300 to 1e300 rad/s, time scaled to match",
     "as of the separatrix, relative to omega; ours scaled by a power of two: the same bits. "
     "Where omega leaves the range of numbers: a status that says so.",
-    in_turn("scales", _attempts),
+    lambda only: _attempts(),
 )

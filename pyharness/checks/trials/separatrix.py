@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import ALL, MIDDLING, describe_programs, hold, in_steps, run_method
-from pyharness.checks.stress import Attempt, Trial, in_turn, replay
+from pyharness.checks.stress import Trial, named
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene
 
@@ -50,24 +49,26 @@ def _undisturbed() -> Iterator[Attempt]:
     """Hold every method to the exact answer: a disturbance of 0 stays 0 for ever."""
     scene = in_steps(Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=_MOMENTS), _STAYS)
 
-    def stay(name: str, id: str) -> Iterator[Check]:
-        run = run_method(name, scene, _STAYS, None if name in FIXED_STEP else MIDDLING)
+    def stay(name: Name) -> Check:
+        method = name.subject
+        run = run_method(method, scene, _STAYS, None if method in FIXED_STEP else MIDDLING)
         wrong = float(np.abs(run.omega - scene.omega).max())
         # What is exactly zero keeps zero; the spin may be rounded where units are changed.
-        limit = 2.0**-52 if name == "quick" else 0.0
+        limit = 2.0**-52 if method == "quick" else 0.0
         stays = run.omega[0] == run.omega[2] == 0.0 and run.has_result
         note = "" if stays else "it left the axis"
-        yield Check(id, bool(stays and wrong <= limit), wrong, limit, replay(id), note)
+        return name.judged(bool(stays and wrong <= limit), note, wrong, limit)
 
-    for name in ALL:
-        yield Attempt(f"{name}/none", partial(stay, name), scene)
+    for method in ALL:
+        yield Attempt(named("separatrix", method, "none", scene=scene), stay)
 
 
 def _attempts() -> Iterator[Attempt]:
-    for name, scene, time in circumstances():
-        yield from hold(name, scene, time)
-        if not name.startswith("early"):
-            yield from describe_programs(name, scene)
+    for circumstance, scene, time in circumstances():
+        name = named("separatrix", "", circumstance, scene=scene)
+        yield from hold(name, time)
+        if not circumstance.startswith("early"):
+            yield from describe_programs(name)
     yield from _undisturbed()
 
 
@@ -77,5 +78,5 @@ TRIAL = Trial(
     "closed form: 1e-14 and what the rounding of A, B, C changes. Others: tolerance, or order "
     "times steps, and rounding, amplified by the flow; where that leaves less than two digits, "
     "energy and momentum, which the flow does not amplify. Undisturbed: exact.",
-    in_turn("separatrix", _attempts),
+    lambda only: _attempts(),
 )

@@ -7,9 +7,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.divergence import Runner, divergence, smallest_divergent
-from pyharness.checks.stress import LISTINGS, Attempt, Trial, bounded, described, in_turn
+from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.compare.candidates import unstopped
 from pyharness.methods.fixed_step import fixed_step
 from pyharness.methods.problem import normalized
@@ -41,50 +41,50 @@ def _attempts() -> Iterator[Attempt]:
         listings: list[Listing | None] = [each for each in LISTINGS if each.program == name]
         for case in CASES:
             for listing in listings or [None]:
-                for each in _of_case(name, case, listing):
-                    label = f"/{listing.label}" if listing else ""
-                    yield replace(each, name=f"{name}/case-{case}{label}/{each.name}")
+                yield from _of_case(name, case, listing)
 
 
-def _of_case(name: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
-    """Hold the error at the end, for every step, where it is least, and where runs diverge."""
+def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
+    """Judge the error at the end, for every step, where it is least, and where runs diverge."""
     before = listing is not None and listing.label == "original"
+    label = listing.label if listing else ""
+    place = named("step-size", method, f"case-{case}", label, scene=case_scene(case))
     scenes = {n: replace(case_scene(case), step_size=TIME / n, steps=n) for n in COUNTS}
-    error = cache(lambda count: _error(scenes[count], name, case, listing))
+    error = cache(lambda count: _error(scenes[count], method, case, listing))
 
-    def foretold(count: int, id: str) -> Iterator[Check]:
+    def foretold(count: int, name: Name) -> Check:
         found, note = error(count)
         if before:
-            yield described(id, found, note)
-            return
-        due = _forecaster(case, name).at(count)
+            return name.described(found, note)
+        due = _forecaster(case, method).at(count)
         said = f"truncation {due.truncation:.1e}, rounding below {due.rounding:.0e}"
         note = f"{said}{', ' if note else ''}{note}"
         if math.isfinite(due.bound):
-            yield bounded(id, found, due.bound, note)
-        else:
-            yield described(id, found, f"step too large to foretell; {note}")
+            return name.bounded(found, due.bound, note)
+        return name.described(found, f"step too large to foretell; {note}")
 
     for count, scene in scenes.items():
-        yield Attempt(f"{TIME / count:.0e}", partial(foretold, count), scene)
-    gauss = name.startswith("gauss")
+        own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
+        yield Attempt(own, partial(foretold, count))
+    gauss = method.startswith("gauss")
     # Nothing of order above 4 has truncation left at a step that shows rounding.
-    if not (before or gauss) and SCHEMES[name].order in (2, 4):
-        yield Attempt("crossing", partial(_crossing, name, case, lambda count: error(count)[0]))
+    if not (before or gauss) and SCHEMES[method].order in (2, 4):
+        crossing = partial(_crossing, method, case, lambda count: error(count)[0])
+        yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
     if not gauss:
-        yield Attempt("diverges", partial(_divergence, name, case, listing), case_scene(case))
+        yield Attempt(place.of("diverges"), partial(_divergence, case, listing))
 
 
-def _crossing(name: str, case: int, error: Callable[[int], float], id: str) -> Iterator[Check]:
+def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
     """Hold the step below which truncation no longer rules against that foretold.
 
     It rules where the error is that of truncation, within a factor of 2.
     """
-    forecaster = _forecaster(case, name)
+    forecaster = _forecaster(case, method)
     smallest = SMALLEST
-    if name in PARTS:
+    if method in PARTS:
         # At smaller ones the matrix is declared singular.
-        smallest = max(smallest, math.nextafter(singular_below(name), 1.0))
+        smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
     counts = [count for count in COUNTS if TIME / count >= smallest]
     ruled = [c for c in counts if 0.5 < error(c) / forecaster.at(c).truncation < 2.0]
     found = TIME / max(ruled, default=1)
@@ -93,13 +93,13 @@ def _crossing(name: str, case: int, error: Callable[[int], float], id: str) -> I
         found /= 10.0**0.25
     foretold = forecaster.crossing(smallest)
     # Half a decade from one step to the next; rounding may be a tenth or ten times as large.
-    limit = 0.25 + 1.0 / (SCHEMES[name].order + 0.5)
+    limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
     best = min(counts, key=error)
     note = (
         f"truncation down to {found:.1e} s, foretold {foretold:.1e} s; "
         f"least error {error(best):.1e} at {TIME / best:.0e} s"
     )
-    yield bounded(id, abs(math.log10(found / foretold)), limit, note)
+    return name.bounded(abs(math.log10(found / foretold)), limit, note)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
@@ -134,26 +134,24 @@ def _rows(name: str, scene: Scene) -> Trajectory:
     return fixed_step(name)(scene, scene.times(), 1.0)
 
 
-def _divergence(name: str, case: int, listing: Listing | None, id: str) -> Iterator[Check]:
+def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     """Say with which steps a run diverges, and where theory knows, hold it to that."""
-    scene = case_scene(case)
+    scene, method = case_scene(case), name.subject
     if listing is None:
-        runner: Runner = partial(_rows, name)
-        scheme = corrected("runge-kutta" if SCHEMES[name].order == 4 else "two-term")
+        runner: Runner = partial(_rows, method)
+        scheme = corrected("runge-kutta" if SCHEMES[method].order == 4 else "two-term")
     else:
         runner = unstopped(listing).rows
         scheme = listing
     if case not in _SPINNING:
         found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)
-        yield described(id, found, _from(found, TIME))
-        return
+        return name.described(found, _from(found, TIME))
     seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
     note = f"{_from(seen.found, _LONG)}, foretold from {seen.foretold:.4g} s"
     # Linear theory knows nothing of points that move, unless the equations are linear.
-    if listing is None or listing.label == "corrected" or (name in PARTS and case == 2):
-        yield bounded(id, abs(seen.found / seen.foretold - 1.0), seen.limit, note)
-    else:
-        yield described(id, seen.found, note)
+    if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
+        return name.bounded(abs(seen.found / seen.foretold - 1.0), seen.limit, note)
+    return name.described(seen.found, note)
 
 
 def _from(found: float, time: float) -> str:
@@ -186,5 +184,5 @@ TRIAL = Trial(
     "carried to the end by the linearised flow, twice that for what it changes itself; a few "
     "roundings of each step carried likewise; divergence where the amplification matrix doubles "
     "a wobble",
-    in_turn("step-size", _attempts),
+    lambda only: _attempts(),
 )

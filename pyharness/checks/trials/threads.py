@@ -13,8 +13,8 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import may_hold
-from pyharness.checks.stress import LISTINGS, Outcome, Trial, bounded
+from pyharness.checks.check import Check, may_hold
+from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.compare.candidates import listed, solved
 from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import METHODS
@@ -55,7 +55,7 @@ class Job:
     call: Callable[[], bytes]
 
 
-def _run(only: Sequence[str]) -> Iterator[Outcome]:
+def _run(only: Sequence[str]) -> Iterator[Check]:
     """Make every call alone, then all of them at once, mixed, several times each."""
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
@@ -63,8 +63,8 @@ def _run(only: Sequence[str]) -> Iterator[Outcome]:
         own = [job for job in asked if job.subject == subject]
         wrong = [job for job in differing if job.subject == subject]
         note = f"{_REPEATS * len(own)} calls in {THREADS} threads"
-        check = bounded(f"threads/{subject}", float(len(wrong)), 0.0, note)
-        yield Outcome(check, (wrong or own)[0].scene)
+        scene = (wrong or own)[0].scene
+        yield named("threads", subject, scene=scene).bounded(len(wrong), 0.0, note)
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:

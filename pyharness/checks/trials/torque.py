@@ -7,17 +7,18 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import (
-    Truth,
     apart,
-    attempt,
     describe_programs,
     finest_and_middling,
     hold,
+    refusable,
+    scene_of,
     truth_of,
 )
-from pyharness.checks.stress import LISTINGS, Attempt, Trial, bounded, described, in_turn
+from pyharness.checks.judge import AMPLIFIED, Truth, by_end, judge
+from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.compare.candidates import Candidate, called, solved, unstopped
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene, TorqueLaw, Triple
@@ -63,9 +64,9 @@ def axial(scene: Scene, time: float) -> Truth:
     waves = scene.torque.sines + scene.torque.cosines
     periods = max(frequency * time for _, frequency in waves) / (2.0 * math.pi)
     chance = min(1.0, 4.0 / math.sqrt(periods))
-    omega = np.array([float(w) for w in axial_top(scene, [time])[0]])
+    omega = np.array([[float(w) for w in axial_top(scene, [time])[0]]])
     flow = replace(flow, rounding=flow.rounding * chance + 8.0 * ROUNDING * flow.amplification)
-    return Truth(time, omega, ROUNDING * flow.largest, flow)
+    return Truth(np.array([time]), omega, ROUNDING * flow.largest, flow)
 
 
 def averaged(scene: Scene, time: float) -> Truth:
@@ -86,7 +87,7 @@ def summed(scene: Scene, time: float) -> Truth:
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
     rounding = 16.0 * ROUNDING
     flow = Conditioning(1.0, rounding, ROUNDING, rounding, largest)
-    return Truth(time, known.omega[-1], known.error, flow)
+    return Truth(known.time, known.omega, known.error, flow)
 
 
 def _wave(frequency: float) -> Circumstance:
@@ -155,55 +156,56 @@ CIRCUMSTANCES = {
 }
 
 
+POLICY = replace(AMPLIFIED, may_refuse=refusable)
+
+
 def _attempts() -> Iterator[Attempt]:
-    for name, each in CIRCUMSTANCES.items():
-        yield from hold(name, each.scene, each.time, each.methods, each.truth, _tolerances, _held)
+    for circumstance, each in CIRCUMSTANCES.items():
+        name = named("torque", "", circumstance, scene=each.scene)
+        yield from hold(name, each.time, each.methods, each.truth, _tolerances, _judged)
         if each.programs and each.truth is axial:
-            yield from _describe_axial(name, each.scene)
+            yield from _describe_axial(name)
         elif each.programs:
-            yield from describe_programs(name, each.scene)
+            yield from describe_programs(name)
 
 
 def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float]:
-    return finest_and_middling(_PREPARED.get(name, name), scene, truth.time)
+    return finest_and_middling(_PREPARED.get(name, name), scene, truth.end)
 
 
-def _held(
-    scene: Scene, truth: Truth, name: str, tolerance: float | None, id: str
-) -> Iterator[Check]:
-    """Hold one method against the truth: tolerance and rounding, amplified by the flow."""
+def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
+    """Judge one method by the truth: tolerance and rounding, amplified by the flow."""
     assert tolerance is not None
-    kind = called if name in _PREPARED else solved
-    candidate = kind(_PREPARED.get(name, name), tolerance)
-    end = attempt(id, name, scene, truth.time, partial(candidate.end, scene, truth.time))
-    if isinstance(end, Check):
-        yield end
-        return
-    limit = truth.flow.limit(tolerance) + truth.error / truth.flow.largest
-    yield bounded(id, truth.wrong(end), limit, "" if end.has_result else end.ended)
+    method = name.subject
+    kind = called if method in _PREPARED else solved
+    candidate = kind(_PREPARED.get(method, method), tolerance)
+    yield judge(
+        name, by_end(method, candidate, tolerance, scene_of(name), truth.end), truth, POLICY
+    )
 
 
-def _describe_axial(circumstance: str, scene: Scene) -> Iterator[Attempt]:
+def _describe_axial(name: Name) -> Iterator[Attempt]:
     """Say what steps a hundred radians of a wave apart make of it."""
+    scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
 
-    def describe(candidate: Candidate, id: str) -> Iterator[Check]:
+    def describe(candidate: Candidate, name: Name) -> Check:
         omega = candidate.rows(scene).omega
         error = apart(omega, truth()) / float(np.abs(truth()).max())
         note = "" if len(omega) >= scene.steps else f"ended after {len(omega)} steps"
-        yield described(id, error, note)
+        return name.described(error, note)
 
     for listing in LISTINGS:
-        name = f"{listing.program}/{circumstance}/{listing.label}"
-        yield Attempt(name, partial(describe, unstopped(listing)), scene)
-    for name in FIXED_STEP:
-        make = partial(describe, solved(name, 1.0))
-        yield Attempt(f"{name}/{circumstance}/own-steps", make, scene)
+        own = replace(name, subject=listing.program, setting=listing.label)
+        yield Attempt(own, partial(describe, unstopped(listing)))
+    for method in FIXED_STEP:
+        own = replace(name, subject=method, setting="own-steps")
+        yield Attempt(own, partial(describe, solved(method, 1.0)))
 
 
 TRIAL = Trial(
     "torque",
     "waves of 1e4 rad/s and more, torques of 1e12 and of 5e-324, resonance with the precession",
     "tolerance and rounding, amplified by the flow; a wave's rounding counts with its angle",
-    in_turn("torque", _attempts),
+    lambda only: _attempts(),
 )

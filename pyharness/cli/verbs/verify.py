@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     checks = []
     for check in verify(chosen):
         checks.append(check)
-        if len(checks) % 20 == 0 or check.kind != "cells":
+        if len(checks) % 20 == 0 or check.suite != "cells":
             shared.progress(f"{len(checks)}: {check.id}")
     if not checks:
         if chosen.may_ask("decks") and compiler() is None:

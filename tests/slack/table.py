@@ -104,6 +104,7 @@ class Turned:
     solver: Callable[..., tuple[Array, Array]]
     size: float
     status: str = "complete"
+    steps: int = 0
 
     def __call__(self, *given: Any) -> tuple[Array, Array]:
         """Turn what the solver gives."""

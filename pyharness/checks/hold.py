@@ -22,25 +22,22 @@ from pyharness.checks.judge import (
     reference_truth,
 )
 from pyharness.checks.stress import LISTINGS, named
+from pyharness.checks.tolerances import affordable
 from pyharness.compare.candidates import Candidate, End, called, solved, unstopped
-from pyharness.methods.plan import FEW_DIGITS
 from pyharness.methods.problem import closed_form
-from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
+from pyharness.methods.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.theory import promises
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.theory.promises import may_refuse
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 
 # Ours at two tolerances: near the finest, where rounding shows, and a middling one.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
-ALL = promises.METHODS
-MIDDLING = 1e-6
-# At their finest these take minutes for what the others do in seconds.
-_ONLY_MIDDLING = ("quick", "rk45", "radau")
-
+ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
+_SERIES = ("taylor", "auto", "prepared-auto")
+_TOO_MANY_RADIANS = 1e8  # of a wave, for a series
 _ROWS = 10  # of a program's run that are compared with the truth
 _FORMS = ("closed-form", "auto")
 
@@ -79,7 +76,7 @@ def hold(
     time: float,
     methods: Sequence[str] = ALL,
     truth: Callable[[Scene, float], Truth] = truth_of,
-    tolerances: Callable[[str, Scene, Truth], Sequence[float | None]] | None = None,
+    tolerances: Callable[[str, Scene, float], Sequence[float | None]] | None = None,
     judged: Judged | None = None,
 ) -> Iterator[Attempt]:
     """Judge each method by the truth at `time`: by default at two tolerances, fine and coarse.
@@ -93,38 +90,14 @@ def hold(
     known = cache(partial(truth, scene, time))
 
     def settings(name: Name) -> Iterator[Attempt]:
-        for tolerance in (tolerances or _tolerances)(name.subject, scene, known()):
+        tried_at = tolerances or partial(affordable, flow=known().flow)
+        for tolerance in tried_at(name.subject, scene, time):
             setting = "steps" if tolerance is None else f"{tolerance:.0e}"
             make = partial(judged or _judged, known(), tolerance)
             yield Attempt(replace(name, setting=setting), make)
 
     for method in methods:
         yield Attempt(replace(name, subject=method), settings)
-
-
-def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return the tolerances at which a method is tried: its finest, and one in the middle."""
-    if name in _ONLY_MIDDLING:
-        return [MIDDLING]
-    finest = promises.finest(name, scene, time)
-    return sorted({finest, max(finest, MIDDLING)})
-
-
-def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float | None]:
-    """Return the tolerances at which a method is tried, None for the scene's own steps."""
-    if name in FIXED_STEP:
-        return [None]
-    if name == "closed-form" or (name == "auto" and closed_form(scene)):
-        return [METHODS["closed-form"].finest]
-    flow = truth.flow
-    least = FEW_DIGITS if name == "quick" else promises.finest(name, scene, truth.end)
-    if name in GAUSS:
-        # Two solutions that are to agree can't where rounding parts them: the next of the ladder.
-        meetable = [each for each in promises.LADDER if each >= 4.0 * flow.rounding]
-        least = max(least, min(meetable, default=math.inf))
-    radians = promises.speed(scene, flow.largest) * abs(truth.end)
-    found = promises.tolerances(name, least, radians, flow.amplification)
-    return [*found, None] if name in GAUSS else [*found]
 
 
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
@@ -139,8 +112,17 @@ def _steps(scene: Scene, time: float) -> int:
 
 
 def refusable(tried: Tried, truth: Truth, why: str) -> bool:
-    """Let those methods refuse that `may_refuse` names."""
-    return may_refuse(tried.method, tried.scene, truth.end)
+    """Whether a method may refuse a scene; anything else that refuses is at fault.
+
+    `closed-form` where there is none. `quick`, which takes three products and leaves to the series
+    what takes too many steps. The series where a wave turns more often than anyone waits for.
+    """
+    method, scene = tried.method, tried.scene
+    if method == "closed-form":
+        return closed_form(scene) is None
+    waves = scene.torque.sines + scene.torque.cosines
+    radians = max((abs(frequency * truth.end) for _, frequency in waves), default=0.0)
+    return method == "quick" or (method in _SERIES and radians > _TOO_MANY_RADIANS)
 
 
 def _derived(truth: Truth, tried: Tried, answer: Answer) -> float | None:

@@ -12,6 +12,7 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.judge import AS_STATED, Tried, Truth, by_end, by_rows, judge, reference_truth
 from pyharness.checks.selection import Selection
+from pyharness.checks.tolerances import OF_CASES, of_case
 from pyharness.compare.agreement import ulps
 from pyharness.compare.candidates import called, solved, turning
 from pyharness.methods.plan import FEW_DIGITS
@@ -24,9 +25,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 
 START: Quaternion = (0.5, -0.1, 0.7, 0.5)
-_TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
-# Of solve_ivp no more is requested than it answers in a second.
-_SCIPY_TOLERANCES = (1e-6, 1e-9)
 # s: one time far from those of the case, and those of prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
@@ -75,7 +73,7 @@ def _solved(
 ) -> Iterator[Attempt]:
     truth = cache(partial(reference_truth, scene, times))
     for method in names:
-        for tolerance in _tolerances(method, thin):
+        for tolerance in of_case(method, thin):
             name = Name(suite, method, f"case-{case}", f"{tolerance:.1e}")
             tried = partial(solve_tried, method, tolerance, scene, times)
             yield Attempt(name, partial(_judged, tried, truth))
@@ -88,7 +86,7 @@ def _prepared(
         truth = cache(partial(reference_truth, scene, (time,)))
         where = replace(name, circumstance=f"case-{case}/{time:g}")
         for method in methods:
-            for tolerance in (1e-6,) if thin else _TOLERANCES:
+            for tolerance in (1e-6,) if thin else OF_CASES:
                 if method == "quick" and tolerance < FEW_DIGITS:
                     continue
                 own = replace(where, subject=name.subject + method, setting=f"{tolerance:.1e}")
@@ -125,12 +123,3 @@ def _same_steps(scene: Scene, name: Name) -> Check:
         rows, *_ = extension().gauss_solution(*normalized(scene), scene.omega, [time], *steps)
         wanted = rows[:, 0]
     return name.bounded(ulps(found, np.ascontiguousarray(wanted)), 0.0)
-
-
-def _tolerances(name: str, thin: bool) -> list[float]:
-    finest = METHODS[name].finest
-    if name in SCIPY_METHODS:
-        return [_SCIPY_TOLERANCES[0]] if thin else list(_SCIPY_TOLERANCES)
-    if thin:
-        return [max(finest, 1e-9)]
-    return [*(each for each in _TOLERANCES if each > finest), finest]

@@ -23,7 +23,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import read_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.theory import promises
 from tests.checks.stressed import checks_of, failed
 
 
@@ -32,7 +31,7 @@ def test_bounds_hold(name: str) -> None:
     """In one of five circumstances; all of them are what `stress` is run for."""
     room = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}")
     some = [circumstance for circumstance, *_ in room.circumstances()][::5]
-    subjects = {*promises.METHODS, *PROGRAM_REGISTRY}
+    subjects = {*truth.ALL, *PROGRAM_REGISTRY}
     checks = list(stress([f"{name}/{who}/{where}" for who in subjects for where in some]))
     assert [check.id for check in checks if not check.passed] == []
     assert len({check.id for check in checks}) == len(checks)
@@ -44,7 +43,7 @@ def test_bounds_hold(name: str) -> None:
             least[subject] = min(least[subject], check.limit)
     assert subjects == {check.id.split("/")[1] for check in checks}
     # Programs are described, never judged; some bound of every method is worth the name.
-    assert all((least[each] < 1e-3) == (each in promises.METHODS) for each in subjects), least
+    assert all((least[each] < 1e-3) == (each in truth.ALL) for each in subjects), least
     assert all(least[program] == math.inf for program in PROGRAM_REGISTRY)
 
 

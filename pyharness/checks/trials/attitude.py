@@ -9,7 +9,7 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.hold import MIDDLING, in_steps, refusable, scene_of
+from pyharness.checks.hold import in_steps, refusable, scene_of
 from pyharness.checks.judge import (
     Answer,
     Policy,
@@ -22,6 +22,7 @@ from pyharness.checks.judge import (
     tolerance_of,
 )
 from pyharness.checks.stress import Trial, named
+from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials import separatrix
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve

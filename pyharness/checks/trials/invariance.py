@@ -13,8 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 from pyharness.checks.check import REFUSED, Attempt, Check, Name
-from pyharness.checks.hold import OURS, apart, finest_and_middling, scene_of
+from pyharness.checks.hold import OURS, apart, scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.tolerances import finest_and_middling
 from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve

@@ -10,6 +10,7 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.tolerances import finest
 from pyharness.compare.candidates import called, solved, unstopped
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
@@ -232,7 +233,7 @@ def _closed_form(name: Name) -> Iterator[Check]:
 def _scipy(name: Name) -> Iterator[Check]:
     scene = MOTIONS[name.circumstance]
     time = 1e2 * 2.0 * math.pi / orbit_of(name.circumstance).largest
-    found = solved(name.subject, promises.finest(name.subject, scene, time)).end(scene, time)
+    found = solved(name.subject, finest(name.subject, scene, time)).end(scene, time)
     yield from _described(name, scene, time, found.omega)
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from pyharness.checks.check import REFUSED, Attempt, Check, Name
 from pyharness.checks.hold import (
     ALL,
-    MIDDLING,
     describe_programs,
     hold,
     in_steps,
@@ -20,6 +19,7 @@ from pyharness.checks.hold import (
 )
 from pyharness.checks.judge import Truth
 from pyharness.checks.stress import Trial, named
+from pyharness.checks.tolerances import MIDDLING
 from pyharness.compare.candidates import End, not_finite
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError

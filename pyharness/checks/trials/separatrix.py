@@ -6,8 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.hold import ALL, MIDDLING, describe_programs, hold, in_steps, run_method
+from pyharness.checks.hold import ALL, describe_programs, hold, in_steps, run_method
 from pyharness.checks.stress import Trial, named
+from pyharness.checks.tolerances import MIDDLING
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene
 

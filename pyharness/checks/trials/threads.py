@@ -15,6 +15,7 @@ import numpy as np
 
 from pyharness.checks.check import Check, may_hold
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.tolerances import finest
 from pyharness.compare.candidates import listed, solved
 from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import METHODS
@@ -25,7 +26,6 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.original.programs import IMPLEMENTATIONS
-from pyharness.theory import promises
 
 THREADS = 8
 _REPEATS = 30
@@ -109,7 +109,7 @@ def jobs() -> list[Job]:
 
 
 def _rows(scene: Scene, name: str) -> bytes:
-    tolerance = max(_TOLERANCE, promises.finest(name, scene, _TIMES[-1]))
+    tolerance = max(_TOLERANCE, finest(name, scene, _TIMES[-1]))
     found = solved(name, tolerance).rows(scene, _TIMES)
     return found.omega.tobytes() + f"{found.steps} {found.evaluations} {found.ended}".encode()
 

@@ -11,7 +11,6 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import (
     apart,
     describe_programs,
-    finest_and_middling,
     hold,
     refusable,
     scene_of,
@@ -19,6 +18,7 @@ from pyharness.checks.hold import (
 )
 from pyharness.checks.judge import AMPLIFIED, Truth, by_end, judge
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.tolerances import finest_and_middling
 from pyharness.compare.candidates import Candidate, called, solved, unstopped
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene, TorqueLaw, Triple
@@ -169,8 +169,8 @@ def _attempts() -> Iterator[Attempt]:
             yield from describe_programs(name)
 
 
-def _tolerances(name: str, scene: Scene, truth: Truth) -> list[float]:
-    return finest_and_middling(_PREPARED.get(name, name), scene, truth.end)
+def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
+    return finest_and_middling(_PREPARED.get(name, name), scene, time)
 
 
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:

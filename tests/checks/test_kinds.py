@@ -3,7 +3,6 @@
 import datetime
 import json
 import math
-import random
 import re
 import shlex
 from collections.abc import Callable
@@ -41,7 +40,7 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled
 from pyharness.original.cells import all_cells, cell_name
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
-from pyharness.scenes.random_scenes import _far_scale, draw, weekly_seed
+from pyharness.scenes.random_scenes import draw, weekly_seed
 
 BY_NAME = {plant.name: plant for plant in PLANTS}
 
@@ -422,9 +421,3 @@ def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:
     slowing = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
     drawn: Any = SimpleNamespace(scene=slowing, time=1.0)
     assert truth_of(drawn).flow.largest == pytest.approx(1.0)
-
-
-def test_far_scales_are_far() -> None:
-    for number in range(20):
-        scene = _far_scale(random.Random(number))
-        assert not 1e-4 < max(map(abs, scene.omega)) < 1e4

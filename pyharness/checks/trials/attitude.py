@@ -36,6 +36,7 @@ from pyharness.model.attitude import (
 )
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, turned_to_space
+from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rotated import turned
 from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
 from pyharness.truth.elliptic import torque_free
@@ -129,7 +130,7 @@ def _attempts() -> Iterator[Attempt]:
             name = named("attitude", "closed-form", where, motion, scene=scene)
             yield Attempt(name, partial(_judged, known, METHODS["closed-form"].finest))
     for number in range(_BODIES):
-        scene = _random_scene(number)
+        scene = random_scene("pointing", f"attitude {number}", f"random-{number}")
         name = named("attitude", "closed-form", "montgomery", f"random-{number}", scene=scene)
         yield Attempt(name, _montgomery)
         for method in ("closed-form", "taylor"):
@@ -162,16 +163,6 @@ def circumstances() -> Iterator[tuple[str, Scene, float]]:
     ):
         scene = Scene(name, omega, moments=moments, attitude=_START)
         yield name, in_steps(scene, 20.0), 20.0
-
-
-def _random_scene(number: int) -> Scene:
-    """Return a body, a start and an attitude that no one chose."""
-    source = random.Random(f"attitude {number}")
-    low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
-    moments = (source.uniform(abs(low - middle), low + middle), low, middle)
-    x, y, z = (source.uniform(-3.0, 3.0) for _ in range(3))
-    attitude = (source.gauss(0, 1), source.gauss(0, 1), source.gauss(0, 1), source.gauss(0, 1))
-    return Scene(f"random-{number}", (x, y, z), moments=moments, attitude=attitude)
 
 
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:

@@ -23,6 +23,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
+from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rescaled import scaled
 from pyharness.scenes.rotated import shifted, turned
 from pyharness.theory.conditioning import Conditioning, conditioning
@@ -38,26 +39,12 @@ _DRIVEN = TorqueLaw(
 )
 
 
-def _random_scene(seed: int) -> Scene:
-    """Return a body, a start and a torque that no one chose."""
-    source = random.Random(seed)
-
-    def vector(size: float) -> Triple:
-        first, second, third = (source.uniform(-size, size) for _ in range(3))
-        return first, second, third
-
-    low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
-    moments = (source.uniform(abs(low - middle), low + middle), low, middle)
-    law = TorqueLaw(vector(20.0), vector(5.0), ((vector(20.0), source.uniform(0.1, 20.0)),))
-    return Scene(f"random-{seed}", vector(3.0), moments=moments, torque=law)
-
-
 _FREE = Scene("free", _START, moments=_BODY, step_size=0.01, steps=300)
 SCENES = {
     "free": (_FREE, 3.0),
     "pushed": (replace(_FREE, name="pushed", torque=_PUSHED, steps=200), 2.0),
     "driven": (replace(_FREE, name="driven", torque=_DRIVEN, steps=200), 2.0),
-    **{f"random-{seed}": (_random_scene(seed), 1.0) for seed in range(8)},
+    **{(name := f"random-{seed}"): (random_scene("driven", seed, name), 1.0) for seed in range(8)},
 }
 
 

@@ -28,6 +28,7 @@ from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
+from pyharness.scenes.extreme import EXTREMES, Circumstance, speed
 from pyharness.theory import promises
 from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.elliptic import torque_free
@@ -63,12 +64,17 @@ def _is_free(scene: Scene) -> bool:
 Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
-def hold_all(suite: str, circumstances: Iterable[tuple[str, Scene, float]]) -> Iterator[Attempt]:
-    """Judge all methods by the truth in each circumstance, and describe the programs."""
-    for circumstance, scene, time in circumstances:
-        name = named(suite, "", circumstance, scene=scene)
-        yield from hold(name, time)
-        yield from describe_programs(name)
+def hold_all(
+    suite: str,
+    held: Callable[[Name, float], Iterable[Attempt]] | None = None,
+    has_programs: Callable[[Circumstance], bool] = lambda each: True,
+) -> Iterator[Attempt]:
+    """Judge all methods by the truth in a suite's extreme scenes, and describe the programs."""
+    for each in EXTREMES[suite]():
+        name = named(suite, "", each.name, scene=each.scene)
+        yield from (held or hold)(name, each.time)
+        if has_programs(each):
+            yield from describe_programs(name)
 
 
 def hold(
@@ -183,7 +189,7 @@ def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
     None where it promises none.
     """
     if tried.method in FIXED_STEP and truth.exact:
-        radians = promises.speed(tried.scene, truth.flow.largest) * abs(truth.end)
+        radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
         steps = _steps(tried.scene, truth.end)
         return promises.fixed_step_sum(tried.method, radians / steps, steps)
     return tried.tolerance
@@ -241,10 +247,3 @@ def apart(found: Array, wanted: Array) -> float:
     """Return the largest difference of the rows that both have."""
     n = min(len(found), len(wanted))
     return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))
-
-
-def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with equal steps until `time` (s), each of .002 radians if not too many."""
-    rate = promises.speed(scene, max(map(abs, scene.omega)))
-    count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
-    return replace(scene, step_size=abs(time) / count, steps=count)

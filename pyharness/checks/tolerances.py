@@ -11,8 +11,8 @@ from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCI
 from pyharness.methods.scipy_ivp import steps_sum
 from pyharness.methods.solve import finest as finest_of
 from pyharness.model.scene import Scene
+from pyharness.scenes.extreme import speed
 from pyharness.theory.conditioning import Conditioning
-from pyharness.theory.promises import speed
 
 # In the cases; of solve_ivp no more is requested than it answers in a second.
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)

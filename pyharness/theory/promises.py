@@ -13,12 +13,6 @@ from functools import cache
 from numpy.polynomial import Polynomial
 
 from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
-from pyharness.model.scene import Scene
-
-
-def speed(scene: Scene, largest: float) -> float:
-    """Return the largest coefficient times the largest omega (1/s)."""
-    return max(map(abs, scene.euler_coefficients)) * largest
 
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:

@@ -4,7 +4,6 @@ import itertools
 import json
 import math
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as xml
@@ -14,7 +13,6 @@ import pytest
 
 from pyharness.checks import hold as truth
 from pyharness.checks.check import Check, Name
-from pyharness.checks.hold import in_steps
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
 from pyharness.compare.candidates import End
@@ -23,14 +21,14 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import read_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.scenes.extreme import EXTREMES, in_steps
 from tests.checks.stressed import checks_of, failed
 
 
 @pytest.mark.parametrize("name", ["separatrix", "near-symmetry", "shapes", "scales"])
 def test_bounds_hold(name: str) -> None:
     """In one of five circumstances; all of them are what `stress` is run for."""
-    room = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}")
-    some = [circumstance for circumstance, *_ in room.circumstances()][::5]
+    some = [each.name for each in EXTREMES[name]()][::5]
     subjects = {*truth.ALL, *PROGRAM_REGISTRY}
     checks = list(stress([f"{name}/{who}/{where}" for who in subjects for where in some]))
     assert [check.id for check in checks if not check.passed] == []

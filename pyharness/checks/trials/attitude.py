@@ -9,7 +9,7 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.hold import in_steps, refusable, scene_of
+from pyharness.checks.hold import refusable, scene_of
 from pyharness.checks.judge import (
     Answer,
     Policy,
@@ -23,7 +23,6 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.checks.trials import separatrix
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.attitude import (
@@ -32,10 +31,10 @@ from pyharness.model.attitude import (
     angle_between,
     angles,
     product,
-    unit_quaternion,
 )
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, turned_to_space
+from pyharness.scenes.extreme import EXTREMES, POINTED
 from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rotated import turned
 from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
@@ -49,11 +48,10 @@ _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
 _ANGLES = 64.0 * ROUNDING
 _BODIES = 8
 
-_START: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
 _MOTIONS = {
-    "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0), attitude=_START),
+    "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0), attitude=POINTED),
     "tumbling": Scene(
-        "tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0), attitude=_START
+        "tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0), attitude=POINTED
     ),
 }  # fmt: skip
 
@@ -71,7 +69,7 @@ def _about_body(turn: Quaternion, vectors: Callable[[Triple], Triple], moments: 
 
     def scene(given: Scene) -> Scene:
         other = turned(given, vectors, body=moments)
-        return replace(other, attitude=product(given.attitude or _START, turn))
+        return replace(other, attitude=product(given.attitude or POINTED, turn))
 
     return Turn(scene, lambda q: _product(q, (w, -x, -y, -z)))
 
@@ -82,8 +80,8 @@ TURNS = {
     "half-turn": _about_body((0.0, 1.0, 0.0, 0.0), lambda v: (v[0], -v[1], -v[2]), False),
     # The axes of space are anybody's choice.
     "space": Turn(
-        lambda scene: replace(scene, attitude=product(_START, scene.attitude or _START)),
-        lambda q: _from_left((_START[0], -_START[1], -_START[2], -_START[3]), q),
+        lambda scene: replace(scene, attitude=product(POINTED, scene.attitude or POINTED)),
+        lambda q: _from_left((POINTED[0], -POINTED[1], -POINTED[2], -POINTED[3]), q),
     ),
 }
 
@@ -114,7 +112,7 @@ def _truth(scene: Scene, time: float, flow: Callable[[], Conditioning]) -> Truth
 
 
 def _attempts() -> Iterator[Attempt]:
-    for circumstance, scene, time in circumstances():
+    for circumstance, scene, time in EXTREMES["attitude"]():
         name = named("attitude", "", circumstance, scene=scene)
         flow = cache(partial(conditioning, scene, time))
         for method in (*_FORMS, *_SERIES):
@@ -142,27 +140,6 @@ def _attempts() -> Iterator[Attempt]:
         for power in range(1, 18):
             name = named("attitude", "angles", sequence, f"{power if power < 17 else 'pole'}")
             yield Attempt(name, partial(_angles, 10.0**-power if power < 17 else 0.0))
-
-
-def circumstances() -> Iterator[tuple[str, Scene, float]]:
-    """Return name, scene and time of each input that methods are held to the truth in."""
-    for name, scene, time in separatrix.circumstances():
-        yield f"separatrix-{name}", replace(scene, attitude=_START), time
-    for k in range(1, 17, 3):
-        for sign in (1.0, -1.0):
-            moments = (3.0, 3.0 * (1.0 + sign * 10.0**-k), 2.0)
-            scene = Scene("", (0.3, 1.0, -0.6), moments=moments, attitude=_START)
-            yield f"symmetry-{sign * 10.0**-k:.0e}", in_steps(scene, 20.0), 20.0
-    for name, moments, omega in (
-        ("symmetric", (3.0, 3.0, 2.0), (0.3, 1.0, -0.6)),
-        ("sphere", (3.0, 3.0, 3.0), (0.3, 1.0, -0.6)),
-        ("steady", (3.0, 2.5, 2.0), (0.0, -1.0, 0.0)),
-        ("rest", (3.0, 2.5, 2.0), (0.0, 0.0, 0.0)),
-        ("needle", (1.0, 1.0 - 2.0**-41, 1e-12), (0.3, 1.0, -0.6)),
-        ("plate", (5.0, 3.0, 2.0), (0.3, 1.0, -0.6)),
-    ):
-        scene = Scene(name, omega, moments=moments, attitude=_START)
-        yield name, in_steps(scene, 20.0), 20.0
 
 
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
@@ -214,7 +191,7 @@ def _montgomery(name: Name) -> Check:
     wanted = 2.0 * energy * period / size - area
     q = solve(scene, [period], "closed-form", 1e-14, attitude=True).attitude
     assert q is not None
-    w, x, y, z = scene.attitude or _START
+    w, x, y, z = scene.attitude or POINTED
     turn = _product(q, (w, -x, -y, -z))[0]
     along = turned_to_space(np.array([scene.attitude]), momentum[None, :] / size)[0]
     found = 2.0 * math.atan2(float(turn[1:] @ along), float(turn[0]))

@@ -20,7 +20,8 @@ from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.theory import brouwer, promises
+from pyharness.scenes.extreme import speed
+from pyharness.theory import brouwer
 from pyharness.theory.brouwer import LAWS, Noise, Orbit
 from pyharness.truth.elliptic import torque_free
 
@@ -94,7 +95,7 @@ def _gauss(stages: int) -> Runner:
 
 def _rate(scene: Scene) -> float:
     """Return the largest rate of the linearised equations (1/s), within a third."""
-    return promises.speed(scene, max(map(abs, scene.omega)))
+    return speed(scene, max(map(abs, scene.omega)))
 
 
 MARCHERS = {

@@ -8,15 +8,7 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import REFUSED, Attempt, Check, Name
-from pyharness.checks.hold import (
-    ALL,
-    describe_programs,
-    hold,
-    in_steps,
-    run_method,
-    scene_of,
-    truth_of,
-)
+from pyharness.checks.hold import ALL, hold, hold_all, run_method, scene_of, truth_of
 from pyharness.checks.judge import Truth
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
@@ -24,27 +16,15 @@ from pyharness.compare.candidates import End, not_finite
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_steps
 from pyharness.scenes.rescaled import scaled
 from pyharness.theory.conditioning import Conditioning, conditioning
 
-_TIME = 15.0  # s
-_FREE = Scene("scales", (0.5, 1.0, -0.7), moments=(40.0, 30.0, 20.0))
 _DRIVEN = replace(
-    _FREE, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
+    ORDINARY, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
 )
-_TENS = (-300, -250, -200, -160, -150, -100, -50, 0, 50, 100, 150, 200, 300)
-_TWOS = (-996, -500, -100, 100, 498, 996)
 # Squares and cubes of the scale have to be numbers too.
 _DRIVEN_TWOS = (-320, -100, 100, 320)
-
-
-def circumstances() -> Iterator[tuple[str, Scene, float]]:
-    """Return name, scene and time of each input."""
-    scene = in_steps(_FREE, _TIME)
-    named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
-    named += [(f"2^{power}", math.ldexp(1.0, power)) for power in _TWOS]
-    for name, factor in named:
-        yield name, replace(scaled(scene, factor), name=name), _TIME / factor
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
@@ -84,24 +64,21 @@ def _tried(name: str, scene: Scene, time: float) -> End:
 
 @cache
 def _flow() -> Conditioning:
-    return conditioning(_FREE, _TIME)
+    return conditioning(ORDINARY, ORDINARY_TIME)
 
 
 def _truth(scene: Scene, time: float) -> Truth:
     """Return the truth: the flow does to a scaled motion what it does to the motion."""
-    size = max(map(abs, scene.omega)) / max(map(abs, _FREE.omega))
+    size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
 
 
 def _attempts() -> Iterator[Attempt]:
-    for circumstance, scene, time in circumstances():
-        name = named("scales", "", circumstance, scene=scene)
-        yield from hold(name, time, truth=_truth)
-        yield from describe_programs(name)
-    free, driven = in_steps(_FREE, _TIME), in_steps(_DRIVEN, 3.0)
+    yield from hold_all("scales", partial(hold, truth=_truth))
+    free, driven = in_steps(ORDINARY, ORDINARY_TIME), in_steps(_DRIVEN, 3.0)
     for method in ALL:
         if method not in SCIPY_METHODS:
-            yield from _bit_for_bit(method, "same", free, _TWOS)
+            yield from _bit_for_bit(method, "same", free, TWOS)
     for method in ALL:
         if method not in (*SCIPY_METHODS, "closed-form"):
             yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)

@@ -11,7 +11,6 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.judge import (
     MOST,
-    Answer,
     Policy,
     Tried,
     Truth,
@@ -131,7 +130,7 @@ def refusable(tried: Tried, truth: Truth, why: str) -> bool:
     return method == "quick" or (method in _SERIES and radians > _TOO_MANY_RADIANS)
 
 
-def _derived(truth: Truth, tried: Tried, answer: Answer) -> float | None:
+def _derived(truth: Truth, tried: Tried) -> float | None:
     """Return the limit that follows from what a method promises."""
     made = made_on_the_way(tried, truth)
     if truth.exact and tried.method in _FORMS:
@@ -144,7 +143,8 @@ def _derived(truth: Truth, tried: Tried, answer: Answer) -> float | None:
     return linear(allowed(truth, made, growth, steps=steps))
 
 
-DERIVED = Policy("the errors that a method promises to make, amplified", _derived, refusable)
+DERIVED = Policy(_derived, refusable)
+"""The errors that a method promises to make, amplified."""
 
 
 def _roundings(tried: Tried, truth: Truth) -> float:
@@ -171,7 +171,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
             lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
         # An error of omega changes what is conserved by no more than itself.
-        limit = DERIVED.limit(truth, tried, answer)
+        limit = DERIVED.limit(truth, tried)
         most = min(math.inf if limit is None else limit, total + total * total)
         found = conserved(scene, answer.omega[-1], truth.flow.largest)
         yield name.of("drift").bounded(found, most)

@@ -155,11 +155,6 @@ def reference_truth(
     return Truth(known.time, known.omega, known.error, flow, known.attitude, known.angle_error)
 
 
-def never(tried: Tried, truth: Truth, why: str) -> bool:
-    """Let no refusal pass."""
-    return False
-
-
 @dataclass(frozen=True)
 class Policy:
     """A limit policy: which error of an answer passes, and which refusal.
@@ -174,25 +169,19 @@ class Policy:
         Whether a refusal for a reason passes.
     """
 
-    name: str
-    limit: Callable[[Truth, Tried, Answer], float | None]
-    may_refuse: Callable[[Tried, Truth, str], bool] = never
+    limit: Callable[[Truth, Tried], float | None]
+    may_refuse: Callable[[Tried, Truth, str], bool] = lambda *_: False
 
 
-def allowed(
-    truth: Truth, made: float, growth: float, rounding: float | None = None, steps: float = 0.0
-) -> float:
-    """Return the error that a policy allows.
+def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
+    """Return the error that a policy allows, with the rounding of the flow and of the truth.
 
     `made` are the errors that a method makes on the way, `growth` the factor granted to them,
-    `rounding` that of the flow unless it is given, `steps` after how many omega is rounded.
+    `steps` after how many omega is rounded.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
-    flow = replace(truth.flow, amplification=growth)
-    if rounding is not None:
-        return made * growth + rounding
-    return flow.limit(made, steps) + truth.relative_error
+    return replace(truth.flow, amplification=growth).limit(made, steps) + truth.relative_error
 
 
 def lively(growth: float) -> float:
@@ -219,21 +208,19 @@ def has_no_form(tried: Tried, truth: Truth, why: str) -> bool:
     return tried.method == "closed-form" and closed_form(tried.scene) is None
 
 
-AS_STATED = Policy(
-    "the tolerance as it stands, and rounding amplified by the flow",
-    lambda truth, tried, answer: allowed(truth, tolerance_of(tried), 1.0),
-    has_no_form,
-)
-AS_STATED_IF_CALM = Policy(
-    "the tolerance, amplified where perturbations grow a thousandfold, and rounding",
-    lambda truth, tried, answer: allowed(
-        truth, tolerance_of(tried), lively(truth.flow.amplification)
-    ),
-)
-AMPLIFIED = Policy(
-    "the tolerance and rounding, both amplified by the flow",
-    lambda truth, tried, answer: allowed(truth, tolerance_of(tried), truth.flow.amplification),
-)
+def _granting(factor: Callable[[float], float]) -> Callable[[Truth, Tried], float]:
+    """Return the limit that grants a tolerance a factor, from the amplification of the flow."""
+    return lambda truth, tried: allowed(
+        truth, tolerance_of(tried), factor(truth.flow.amplification)
+    )
+
+
+AS_STATED = Policy(_granting(lambda growth: 1.0), has_no_form)
+"""The tolerance as it stands, and rounding amplified by the flow."""
+IF_CALM = Policy(_granting(lively))
+"""The tolerance, amplified where perturbations grow a thousandfold, and rounding."""
+AMPLIFIED = Policy(_granting(lambda growth: growth))
+"""The tolerance and rounding, both amplified by the flow."""
 
 
 def judge(name: Name, tried: Tried, truth: Truth, policy: Policy) -> Check:
@@ -247,7 +234,7 @@ def judge(name: Name, tried: Tried, truth: Truth, policy: Policy) -> Check:
         return name.judged(may, f"{REFUSED}{answer.refusal}")
     if tried.method == "closed-form" and closed_form(tried.scene) is None:
         return name.judged(False, "solved what has no closed form")
-    limit = policy.limit(truth, tried, answer)
+    limit = policy.limit(truth, tried)
     error = truth.error_of(answer) if answer.is_whole else math.inf
     note = "" if answer.is_whole else answer.ended
     bound = None if limit is None or math.isinf(limit) else limit

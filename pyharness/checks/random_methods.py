@@ -12,7 +12,7 @@ import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name, Sample
 from pyharness.checks.judge import (
-    AS_STATED_IF_CALM,
+    IF_CALM,
     Answer,
     Policy,
     Tried,
@@ -85,12 +85,13 @@ def may_refuse(tried: Tried, truth: Truth, why: str) -> bool:
     return finest(method, tried.scene, truth.end) > tolerance
 
 
-def _limit(truth: Truth, tried: Tried, answer: Answer) -> float:
+def _limit(truth: Truth, tried: Tried) -> float:
     growth = truth.flow.amplification
-    return allowed(truth, tolerance_of(tried), lively(growth), ROUNDING * growth)
+    return tolerance_of(tried) * lively(growth) + ROUNDING * growth
 
 
-POLICY = Policy(f"{AS_STATED_IF_CALM.name} of 2e-15 for each factor of growth", _limit, may_refuse)
+POLICY = Policy(_limit, may_refuse)
+"""As `IF_CALM`, with so much rounding for each factor of growth."""
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
@@ -136,7 +137,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
             # Too fast or too long a motion for any truth, or one that runs away.
             continue
         if truth and allowed(truth, 0.0, 1.0) < 1.0:
-            yield from _sampled(chosen, number, asked, truth, AS_STATED_IF_CALM)
+            yield from _sampled(chosen, number, asked, truth, IF_CALM)
 
 
 def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrances:
@@ -149,15 +150,14 @@ def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:
         names += [*SCIPY_METHODS, "reference"]
-    again = ["auto", "taylor", "quick", *forms]
-    return {f"solve-{name}": partial(_solved, name, drawn) for name in names} | {
-        f"prepare-{name}": partial(_prepared, name, drawn) for name in again
-    }
-
-
-def _solved(name: str, drawn: Draw) -> Tried:
     times = (_EARLIER * drawn.time, drawn.time)
-    return by_rows(name, drawn.tolerance(REGISTRY[name].finest), drawn.scene, times)
+    found: dict[str, Callable[[], Tried]] = {}
+    for name in names:
+        tolerance = drawn.tolerance(REGISTRY[name].finest)
+        found[f"solve-{name}"] = partial(by_rows, name, tolerance, drawn.scene, times)
+    for name in ("auto", "taylor", "quick", *forms):
+        found[f"prepare-{name}"] = partial(_prepared, name, drawn)
+    return found
 
 
 def _prepared(name: str, drawn: Draw) -> Tried:
@@ -166,9 +166,7 @@ def _prepared(name: str, drawn: Draw) -> Tried:
     def ask() -> Answer:
         end = called(name, tolerance, primed=True).end(drawn.scene, drawn.time)
         # Every end before the last time is as good as a refusal.
-        if end.has_result:
-            return of_end(name, end)
-        return Answer(refusal=f"{name}: {end.ended}")
+        return of_end(name, end) if end.has_result else Answer(refusal=f"{name}: {end.ended}")
 
     return Tried(name, tolerance, drawn.scene, ask)
 

@@ -90,7 +90,7 @@ TURNS = {
 _UNKNOWN = Conditioning(1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def _limit(truth: Truth, tried: Tried, answer: Answer) -> float:
+def _limit(truth: Truth, tried: Tried) -> float:
     return linear(_allowed(tried.method, tolerance_of(tried), truth.flow, truth.end))
 
 
@@ -101,9 +101,8 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
     return flow.angle_limit(tolerance * lively(flow.amplification), time)
 
 
-POLICY = Policy(
-    "the rounding of a closed form; else the tolerance, and rounding", _limit, refusable
-)
+POLICY = Policy(_limit, refusable)
+"""The rounding of a closed form; else the tolerance, and rounding, amplified."""
 
 
 def _truth(scene: Scene, time: float, flow: Callable[[], Conditioning]) -> Truth:

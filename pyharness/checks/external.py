@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,9 +23,10 @@ from pyharness.methods.solve import finest
 from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, corrected
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.scenes.perturbed import perturbed
 
 __all__ = ["external_checks", "problems"]
 
@@ -131,7 +132,7 @@ def _turns(scene: Scene, times: Sequence[float]) -> Array:
     run = solved("auto", METHODS["auto"].finest).rows
     try:
         here = run(scene, times)
-        others = [run(other, times).attitude for other in _moved(scene)]
+        others = [run(other, times).attitude for other in perturbed(scene, _STEP_ASIDE)]
     except InputError:
         return turned
     for there in others:
@@ -302,7 +303,7 @@ def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     moved = np.zeros((len(times), 3))
     run = solved(method, METHODS[method].finest).rows
     here = run(scene, times).omega
-    for other in _moved(scene):
+    for other in perturbed(scene, _STEP_ASIDE):
         there = run(other, times).omega
         rows = min(len(here), len(there))
         moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
@@ -310,33 +311,3 @@ def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     for row, (time, omega) in enumerate(zip(times, here, strict=False)):
         moved[row] += np.abs(slope(time, omega.tolist())) * abs(time) * _ROUNDING
     return moved
-
-
-def _moved(scene: Scene) -> Iterator[Scene]:
-    """Yield the scene with one of its numbers after the other moved by a small part of itself."""
-    for name in ("moments", "coefficients", "omega"):
-        for triple in _triples(getattr(scene, name)):
-            yield _with(scene, name, triple)
-    law = scene.torque
-    for name in ("constant", "rate"):
-        for triple in _triples(getattr(law, name)):
-            yield replace(scene, torque=_with(law, name, triple))
-    for name in ("sines", "cosines"):
-        waves = getattr(law, name)
-        for place, (amplitude, frequency) in enumerate(waves):
-            faster = (amplitude, frequency * (1.0 + _STEP_ASIDE))
-            for wave in (*((triple, frequency) for triple in _triples(amplitude)), faster):
-                changed = (*waves[:place], wave, *waves[place + 1 :])
-                yield replace(scene, torque=_with(law, name, changed))
-
-
-def _with(whole: Scene | TorqueLaw, name: str, part: object) -> Any:
-    changes: dict[str, Any] = {name: part}
-    return replace(whole, **changes)
-
-
-def _triples(triple: Triple | None) -> Iterator[Triple]:
-    for axis, x in enumerate(triple or ()):
-        if x:
-            first, second, third = np.array(triple) * (1.0 + _STEP_ASIDE * (np.arange(3) == axis))
-            yield float(first), float(second), float(third)

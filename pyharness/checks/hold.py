@@ -39,7 +39,7 @@ ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_
 _SERIES = ("taylor", "auto", "prepared-auto")
 _TOO_MANY_RADIANS = 1e8  # of a wave, for a series
 _ROWS = 10  # of a program's run that are compared with the truth
-_FORMS = ("closed-form", "auto")
+FORMS = ("closed-form", "auto")
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
@@ -133,7 +133,7 @@ def refusable(tried: Tried, truth: Truth, why: str) -> bool:
 def _derived(truth: Truth, tried: Tried) -> float | None:
     """Return the limit that follows from what a method promises."""
     made = made_on_the_way(tried, truth)
-    if truth.exact and tried.method in _FORMS:
+    if truth.exact and tried.method in FORMS:
         # It makes no errors on the way: beside its own there is the rounding of A, B and C.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:

@@ -140,6 +140,11 @@ class Truth:
         return float(angle_between(answer.attitude, wanted).max())
 
 
+def unknown_flow(largest: float) -> Conditioning:
+    """Return a flow that grants nothing of use, for closed forms: they need none."""
+    return Conditioning(math.inf, MOST, MOST, MOST, largest)
+
+
 def reference_truth(
     scene: Scene,
     times: Sequence[float],

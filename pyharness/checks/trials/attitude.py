@@ -9,7 +9,7 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.hold import refusable, scene_of
+from pyharness.checks.hold import FORMS, refusable, scene_of
 from pyharness.checks.judge import (
     Answer,
     Policy,
@@ -20,6 +20,7 @@ from pyharness.checks.judge import (
     linear,
     lively,
     tolerance_of,
+    unknown_flow,
 )
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
@@ -41,7 +42,8 @@ from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, cond
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
-_FORMS = ("closed-form", "auto")
+# A closed form does not need the flow of a million revolutions.
+_unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
 # An angle in degrees is rounded when it is formed, converted and read again, and three add up.
@@ -86,17 +88,13 @@ TURNS = {
 }
 
 
-# What a closed form does not need: the flow of a million revolutions.
-_UNKNOWN = Conditioning(1.0, 0.0, 0.0, 0.0, 1.0)
-
-
 def _limit(truth: Truth, tried: Tried) -> float:
     return linear(_allowed(tried.method, tolerance_of(tried), truth.flow, truth.end))
 
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
     """Return the largest error of an angle that a method may have (rad)."""
-    if method in _FORMS:
+    if method in FORMS:
         return ATTITUDE
     return flow.angle_limit(tolerance * lively(flow.amplification), time)
 
@@ -114,15 +112,15 @@ def _attempts() -> Iterator[Attempt]:
     for circumstance, scene, time in EXTREMES["attitude"]():
         name = named("attitude", "", circumstance, scene=scene)
         flow = cache(partial(conditioning, scene, time))
-        for method in (*_FORMS, *_SERIES):
-            known = partial(_truth, scene, time, (lambda: _UNKNOWN) if method in _FORMS else flow)
+        for method in (*FORMS, *_SERIES):
+            known = partial(_truth, scene, time, _unknown if method in FORMS else flow)
             for tolerance in _TOLERANCES.get(method, (METHODS["closed-form"].finest,)):
                 own = replace(name, subject=method, setting=f"{tolerance:.0e}")
                 yield Attempt(own, partial(_judged, known, tolerance))
     for motion, scene in _MOTIONS.items():
         turn = 2.0 * math.pi / max(map(abs, scene.omega))
         for k in range(2, 13):
-            known = partial(_truth, scene, 10.0 ** (0.5 * k) * turn, lambda: _UNKNOWN)
+            known = partial(_truth, scene, 10.0 ** (0.5 * k) * turn, _unknown)
             where = f"revolutions-{10.0 ** (0.5 * k):.0f}"
             name = named("attitude", "closed-form", where, motion, scene=scene)
             yield Attempt(name, partial(_judged, known, METHODS["closed-form"].finest))
@@ -152,7 +150,7 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
         return
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
     yield name.of("length").bounded(off, 8.0 * ROUNDING)
-    if name.subject in _FORMS:
+    if name.subject in FORMS:
         # An angle turns the angular momentum by no more than itself; moments multiply, and the
         # turning takes two products.
         limit = ATTITUDE + _omega_limit(scene)

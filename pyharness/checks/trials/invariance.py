@@ -13,10 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from pyharness.checks.check import REFUSED, Attempt, Check, Name
-from pyharness.checks.hold import OURS, apart, scene_of
+from pyharness.checks.hold import OURS, apart, run_method, scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest_and_middling
-from pyharness.compare.candidates import called, solved, unstopped
+from pyharness.compare.candidates import unstopped
 from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import InputError
@@ -135,7 +135,7 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
     """Return omega at `time`; NaN where a prepared kernel did not get there."""
-    return (called if name in _PREPARED else solved)(name, tolerance).end(scene, time).omega
+    return run_method(name, scene, time, tolerance).omega
 
 
 def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:

@@ -1,23 +1,21 @@
 """Bodies that are all but symmetric, symmetric, all but spheres, and spheres."""
 
-import math
 from collections.abc import Iterator
 from functools import partial
 
 from pyharness.checks.check import Attempt, Name
-from pyharness.checks.hold import hold, hold_all, truth_of
+from pyharness.checks.hold import FORMS, hold, hold_all, truth_of
+from pyharness.checks.judge import unknown_flow
 from pyharness.checks.stress import Trial
 from pyharness.scenes.extreme import LONG, SYMMETRIC_START
-from pyharness.theory.conditioning import Conditioning
 
-_CLOSED = ("closed-form", "auto")
 # The closed form alone needs no bound on the amplification of errors.
-_UNKNOWN = Conditioning(math.inf, 2.0, 2.0, 2.0, max(map(abs, SYMMETRIC_START)))
+_UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 
 
 def _held(name: Name, time: float) -> Iterator[Attempt]:
     if time == LONG:
-        return hold(name, time, _CLOSED, partial(truth_of, flow=_UNKNOWN))
+        return hold(name, time, FORMS, partial(truth_of, flow=_UNKNOWN))
     return hold(name, time)
 
 

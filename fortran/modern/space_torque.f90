@@ -1,8 +1,9 @@
 module space_torque
   !! Torque about the axes of space: a joint Taylor series of omega and the attitude q,
-  !! omega' = (A w2 w3, ...) + (R(q)**T N(t))/I, q' = q (0, omega)/2. Two marches, the second to a
-  !! finer local tolerance: what they differ by is the error of the first, and the second's rows
-  !! are handed over.
+  !! omega' = (A w2 w3, ...) + (R(q)**T N(t))/I, q' = q (0, omega)/2. Two integrations, the second
+  !! with a finer local tolerance: their difference is the error of the first, and the rows of the
+  !! second are the result. The omega of the first is perturbed by a rounding in each step, so that
+  !! their difference has the amplification of rounding errors as well.
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -10,7 +11,7 @@ module space_torque
   use space_torque_plan, only: LEAST_SHARE, order_for, plan
   use space_torque_series, only: expand, fitting, inside, LONGER, series_t, torque_terms
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
-  use torque_noise, only: torque_noise_of
+  use torque_noise, only: torque_noise_of, wave_rounding_of
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -18,6 +19,12 @@ module space_torque
   integer, parameter :: MOST_TRIES = 60
   real(dp), parameter :: FINER = 1e-2_dp        ! the local tolerance of the next march
   real(dp), parameter :: SAFETY = 0.1_dp        ! where one had to be still finer
+  ! In tolerances: two integrations with errors above the tolerance may agree to so much by chance,
+  ! one in some thousand does; three do not.
+  real(dp), parameter :: TRUSTED = 0.1_dp
+  real(dp), parameter :: MARGIN = 1.5_dp        ! of a difference that is the error itself
+  ! Of the largest omega, in turn about every axis: the perturbation of every other integration.
+  real(dp), parameter :: PERTURBATION(3) = 2.0_dp**(-52)*[1.0_dp, -0.8_dp, 0.6_dp]
   real(dp), parameter :: SHORTER = 0.5_dp
   real(dp), parameter :: MOST_STEPS = 8e6_dp    ! without waves; some ten seconds
   real(dp), parameter :: A_WAVE = 0.2_dp        ! of a step
@@ -69,6 +76,7 @@ contains
     real(dp) :: error
     real(dp) :: blurred       ! by rounding of torques that cancel, relative
     integer :: marches, failed
+    logical :: is_perturbed   ! this integration
 
     n_rows = 0
     steps = 0
@@ -93,9 +101,11 @@ contains
     error = NO_DIGIT
     marches = 0
     do
-      ! Marches to the same local tolerance differ by their order.
-      call march(problem, ratios, omega, share, order_for(share) + 2*mod(marches, 2), h, &
-                 most - spent, 1 + int(BETWEEN_LOOKS/cost, int64), times, rows, attitudes, now)
+      is_perturbed = mod(marches, 2) == 0
+      ! Integrations with the same local tolerance differ by their order.
+      call march(problem, ratios, omega, is_perturbed, share, &
+                 order_for(share) + 2*mod(marches, 2), h, most - spent, &
+                 1 + int(BETWEEN_LOOKS/cost, int64), times, rows, attitudes, now)
       marches = marches + 1
       spent = spent + real(now%steps, dp)
       if (now%status == GAVE_UP .or. now%status == INTERRUPTED) exit
@@ -105,7 +115,8 @@ contains
           error = difference(rows(:, :now%n_rows), before(:, :now%n_rows), now%scale, &
                              attitudes(:, 1:now%n_rows), before_q(:, :now%n_rows))
         end if
-        if (error <= tolerance .and. last%status == now%status) exit
+        if (error <= merge(1.0_dp, TRUSTED, marches > 2)*tolerance &
+            .and. last%status == now%status) exit
         if (share_before <= LEAST_SHARE) exit
       end if
       next = FINER*share
@@ -116,6 +127,14 @@ contains
       share_before = share
       share = max(LEAST_SHARE, next)
     end do
+    if (is_perturbed .and. marches > 1 .and. now%status /= GAVE_UP &
+        .and. now%status /= INTERRUPTED) then
+      ! The other one has the error that was found: all of it, not a hundredth.
+      error = MARGIN*error
+      now = last
+      rows(:, :) = before
+      attitudes(:, 1:) = before_q
+    end if
     n_rows = now%n_rows
     status = now%status
     steps = now%steps
@@ -124,10 +143,19 @@ contains
       ! Any axis of the body may come to lie along the torque.
       blurred = ROUNDING*torque_noise_of(problem, times(n_times), real(steps, dp), &
                                          now%scale/maxval(ratios))
+      ! A torque that is wrong all the time changes omega in proportion to the time, and the
+      ! attitude by the integral of that.
+      blurred = blurred*max(1.0_dp, 0.5_dp*now%scale*abs(times(n_times)))
     end if
     found(1) = error + (ROUNDING + blurred)
+    found(1) = found(1) + ROUNDING*wave_rounding_of(problem, times(n_times), real(steps, dp), &
+                                                    now%scale/maxval(ratios))
     found(3) = spent
-    if (status == COMPLETE .and. .not. error + blurred <= tolerance) status = SENSITIVE
+    if (status == COMPLETE .and. .not. error + blurred <= tolerance) then
+      status = SENSITIVE
+      ! Rounding of the torque is amplified as that of omega is.
+      found(1) = max(found(1), min(1.0_dp, blurred*(error/ROUNDING)))
+    end if
     if (status == GAVE_UP) then
       if (marches == 1) now%ahead = MARCHES*now%ahead
       needed = (spent - real(now%steps, dp) + now%ahead)*cost/MOST_STEPS
@@ -135,11 +163,12 @@ contains
     end if
   end subroutine space_torque_solve
 
-  subroutine march(problem, ratios, omega, share, order, guess, most_steps, stride, times, rows, &
-                   attitudes, found)
+  subroutine march(problem, ratios, omega, is_perturbed, share, order, guess, most_steps, stride, &
+                   times, rows, attitudes, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: ratios(3), omega(3)
+    logical, intent(in) :: is_perturbed
     real(dp), intent(in) :: share           !! part of the scale that the last terms may have
     integer, intent(in) :: order
     real(dp), intent(in) :: guess           !! of the first step, s
@@ -151,6 +180,7 @@ contains
     type(outcome_t), intent(out) :: found
     type(series_t) :: s
     real(dp) :: y(7), y_low(7)  ! omega and q, and what their rounding left out
+    real(dp) :: change(7)       ! of y in a step
     real(dp) :: t, t_low, h, rest, factor, power
     logical :: at_end
     integer :: k, tries
@@ -159,6 +189,7 @@ contains
 
     y = [omega, attitudes(:, 0)]
     y_low = 0.0_dp
+    if (is_perturbed) y_low(:3) = maxval(abs(omega))*PERTURBATION
     t = 0.0_dp
     t_low = 0.0_dp
     rest = times(size(times))
@@ -204,8 +235,13 @@ contains
       end do
       call add_rows(s, order, t, t_low, h, at_end, y_low, times, rows, attitudes, found)
       if (found%status /= COMPLETE) return
-      call add_change(inside(s, order, 1.0_dp), y, y_low)
+      change = inside(s, order, 1.0_dp)
       found%steps = found%steps + 1
+      if (is_perturbed) then
+        k = 1 + int(mod(found%steps, 3_int64))
+        change(k) = change(k) + (1 - 2*mod(found%steps, 2_int64))*(found%scale*PERTURBATION(k))
+      end if
+      call add_change(change, y, y_low)
       if (.not. maxval(abs(y)) <= huge(h)) then
         found%status = OVERFLOW
         return

@@ -8,7 +8,7 @@ module taylor
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
   use taylor_march, only: march, room_t
   use taylor_rows, only: outcome_t
-  use torque_noise, only: torque_noise_of
+  use torque_noise, only: torque_noise_of, wave_rounding_of
   use torque_terms, only: wave_t, waves_of
   implicit none(type, external)
   private
@@ -21,7 +21,7 @@ module taylor
   real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
   ! One march does for errors so large, in tolerances, and for differences that grow so much: else
   ! errors may cancel in the one that is carried. Another one may err less by a factor.
-  real(dp), parameter :: TRUSTED = 0.7_dp
+  real(dp), parameter :: TRUSTED = 0.25_dp
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
   real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: CHOOSING = 1e15_dp ! growth with which rounding is no small difference
@@ -103,6 +103,7 @@ contains
     real(dp) :: most    ! steps left
     real(dp) :: spent   ! steps of the marches before
     real(dp) :: growth
+    real(dp) :: error    ! of this march, as far as it can be known, relative
     real(dp) :: blurred  ! by rounding at the end, relative
     logical :: precise  ! this march, for a growth known too coarsely
 
@@ -121,18 +122,20 @@ contains
                  outcome)
       spent = spent + real(outcome%steps, dp)
       ! Rounding chose the way where a difference grew so much; at its end is another motion.
+      ! Rows before the last may be where differences are largest.
       growth = outcome%growth
-      if (outcome%largest > CHOOSING) growth = outcome%largest
+      if (outcome%largest > CHOOSING .or. n_times > 1) growth = outcome%largest
       if (outcome%status /= COMPLETE) exit
       if (outcome%finest .and. (precise .or. growth <= planned)) exit
       precise = growth > planned
+      error = max(outcome%error, outcome%least)
       ! Or the way is too long to measure it again.
       if (precise .and. outcome%precise_steps > most - spent) exit
       if (precise .and. ROUNDING*growth > UNSURE*tolerance) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
         asked = 0.0_dp
-      else if (precise .or. outcome%error > TRUSTED*tolerance) then
-        asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*max(outcome%error, ROUNDING**2)), &
+      else if (precise .or. error > TRUSTED*tolerance) then
+        asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*max(error, ROUNDING**2)), &
                           PLANNED_GROWTH/growth)
         planned = max(planned, 2.0_dp*growth)
       else
@@ -148,8 +151,13 @@ contains
     if (problem%n_sines + problem%n_cosines > 0) then
       blurred = blurred + blurred*torque_noise_of(problem, times(n_times), real(steps, dp), &
                                                   outcome%scale)
+      error = ROUNDING*growth*wave_rounding_of(problem, times(n_times), real(steps, dp), &
+                                               outcome%scale)
+    else
+      error = 0.0_dp
     end if
-    found = [max(outcome%error, min(outcome%least, UNSURE*tolerance)) + blurred, growth, spent]
+    error = error + (max(outcome%error, min(outcome%least, UNSURE*tolerance)) + blurred)
+    found = [error, growth, spent]
     if (status == COMPLETE .and. blurred > UNSURE*tolerance) status = SENSITIVE
     if (status == GAVE_UP) then
       ! An error that is too large already will ask for another march, in shorter steps.

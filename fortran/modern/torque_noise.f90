@@ -12,7 +12,7 @@ module torque_noise
   real(dp), parameter :: QUIET = 2.0_dp      ! terms that give so little of omega don't matter
   real(dp), parameter :: SMALL = 1e-4_dp     ! rad; an angle whose square hardly counts
 
-  public :: torque_noise_of
+  public :: torque_noise_of, wave_rounding_of
 
 contains
 
@@ -61,6 +61,27 @@ contains
                          alone > LOOSE*together))
     noise = min(huge(part)**0.25_dp, noise/max(part, tiny(part)))
   end function torque_noise_of
+
+  pure real(dp) function wave_rounding_of(problem, t, steps, scale) result(noise)
+    !! What the rounding of the waves in every step adds up to until `t`, as a random walk, over the
+    !! largest angular velocity: times the rounding of a number it is an error, relative.
+    type(problem_t), intent(in) :: problem
+    real(dp), intent(in) :: t      !! s
+    real(dp), intent(in) :: steps
+    real(dp), intent(in) :: scale  !! largest |omega|, rad/s
+    real(dp) :: walked(3)          ! rad/s
+    integer :: n
+
+    walked = 0.0_dp
+    do n = 1, problem%n_sines
+      walked = walked + abs(problem%sines(1:3, n)*t)*min(1.0_dp, abs(problem%sines(4, n)*t))
+    end do
+    do n = 1, problem%n_cosines
+      walked = walked + abs(problem%cosines(1:3, n)*t)
+    end do
+    noise = max(walked(1), walked(2), walked(3))/sqrt(max(1.0_dp, steps))
+    noise = min(huge(noise)**0.25_dp, noise/max(scale, tiny(scale)))
+  end function wave_rounding_of
 
   pure real(dp) function share_of_sine(angle)
     !! Largest integral of a sine until an angle, over the angle.

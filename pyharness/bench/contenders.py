@@ -1,8 +1,9 @@
 """Who takes part in `bench`: the interface of a contender, our methods and the programs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib.util import find_spec
 
 from pyharness.compare.candidates import Candidate, Ready, called, listed, turning
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
@@ -13,42 +14,51 @@ from pyharness.original.programs import PROGRAM_REGISTRY
 
 # Finer than decades: a method whose error stays well below its tolerance must not be judged by it.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
-
 # From the horizon (s) and the setting to a call.
 Maker = Callable[[float, float], Ready]
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A way to omega(T), and to the attitude, with a setting that trades time for accuracy."""
+    """A solver in a benchmark, ours or a peer, with a setting that trades time for accuracy."""
 
     name: str
     setting: str  # what is varied: tolerance, steps, none
+    package: str = field(default="", kw_only=True)  # that it needs; empty for our own
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether its package is there."""
+        return not self.package or find_spec(self.package) is not None
+
+
+@dataclass(frozen=True)
+class SceneContender(Contender):
+    """A contender that finds omega(T) of one scene, and its attitude."""
+
     # From the scene to a `Maker`; all that can be done beforehand, compiling included.
     prepare: Callable[[Scene], Maker]
     settings: tuple[float, ...] = ()  # of a fixed step none: the numbers follow from the scene
     order: int = 0  # of a method of a fixed step
-    package: str = ""  # that it needs; empty for our own
     attitude: bool = False  # whether it carries that of a scene that has one
     velocity: bool = True  # whether it takes a scene that has none
 
 
-def own() -> list[Contender]:
+def own() -> list[SceneContender]:
     """Return our methods and the three programs, original and corrected."""
+    both = partial(SceneContender, attitude=True)
     found = [
-        Contender(name, "tolerance", partial(_prepared, name), TOLERANCES, attitude=True)
-        for name in ("auto", "taylor")
+        both("auto", "tolerance", partial(_prepared, "auto"), TOLERANCES),
+        both("taylor", "tolerance", partial(_prepared, "taylor"), TOLERANCES),
+        both("closed-form", "none", partial(_prepared, "closed-form"), (0.0,)),
     ]
-    found.append(
-        Contender("closed-form", "none", partial(_prepared, "closed-form"), (0.0,), attitude=True)
-    )
     in_steps = {name: (called(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)}
     for name, program in PROGRAM_REGISTRY.items():
         for listing in (original(name), corrected(name)):
             candidate = listed(listing, velocity=False)
             in_steps[candidate.name] = candidate, program.order
     return found + [
-        Contender(name, "steps", partial(_in_steps, candidate), order=order)
+        SceneContender(name, "steps", partial(_in_steps, candidate), order=order)
         for name, (candidate, order) in in_steps.items()
     ]
 

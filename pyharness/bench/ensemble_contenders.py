@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pyharness.bench.contenders import Contender
 from pyharness.methods.many import solve_many
 from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene, TorqueLaw, Triple
@@ -69,13 +70,10 @@ EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
 @dataclass(frozen=True)
-class EnsembleContender:
-    """A way to the ends of many bodies, with a setting that trades time for accuracy."""
+class EnsembleContender(Contender):
+    """A contender that finds the ends of many bodies."""
 
-    name: str
-    setting: str  # what is varied: tolerance, steps, none
     prepare: EnsembleMaker  # compiling may be left to the first call
-    package: str = ""  # that it needs; empty for our own
     # On how many threads it runs; 0 for all that its package takes.
     threads: tuple[int, ...] = (1, 2)
     torque_free: bool = False  # whether it takes no torque

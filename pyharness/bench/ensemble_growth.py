@@ -14,14 +14,12 @@ from pyharness.bench.ensemble_contenders import (
     draw,
     own_ensembles,
 )
-from pyharness.bench.ensemble_measure import STEPS, shortest
-from pyharness.methods.many import Ensemble, solve_many
+from pyharness.bench.ensemble_measure import SLOW, STEPS, clock_of
+from pyharness.compare.timing import seconds
 from pyharness.methods.prepared import prepare
-from pyharness.model.trajectory import Array
 
 SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
 _BATCH, _ROUNDS = 0.02, 5
-_MANY = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -52,14 +50,14 @@ def sizes(seed: str, most: int, say: Callable[[str], None] = lambda _: None) -> 
     free, pushed = draw(seed, most)
     found, n = [], 1
     while n <= most:
-        say(f"{n} bodies")
-        runs = {"prepared": _prepared(free.part(slice(0, n)))}
+        runs: dict[str, Callable[[], object]] = {"prepared": _prepared(free.part(slice(0, n)))}
         for method in own_ensembles():
             load = (free if method.torque_free else pushed).part(slice(0, n))
             runs[method.name] = method.prepare(load, SETTINGS[method.name], 1)
-        rounds = _ROUNDS if n <= _MANY else 2
-        seconds = {name: _best(run, rounds) / n for name, run in runs.items()}
-        found.append(Size(n, seconds))
+        say(f"{n} bodies")
+        clocks = [clock_of(1)] * len(runs)
+        times = seconds([*runs.values()], _BATCH, _ROUNDS, statistic=min, clocks=clocks, slow=SLOW)
+        found.append(Size(n, {name: time / n for name, time in zip(runs, times, strict=True)}))
         n *= 10
     return found
 
@@ -68,11 +66,6 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
     """Return a call of a solver made beforehand, which has the closed form alone."""
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
-
-
-def _best(run: Callable[[], object], rounds: int) -> float:
-    run()
-    return min(shortest(run, _BATCH) for _ in range(rounds))
 
 
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
@@ -93,23 +86,18 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 def needed(method: str, bodies: int) -> None:
     """Print the bytes of arrays in and out, and the growth of this process up to its peak."""
-    _, load = draw("memory", 512)
-
-    def run(omega0: Array, torque: Array | None) -> Ensemble:
-        return solve_many(
-            load.scene, HORIZON, omega0=omega0, torque_constant=torque, method=method,
-            tolerance=1e-12, step=HORIZON / STEPS,
-        )  # fmt: skip
-
-    free = method == "closed-form"
-    run(load.omega0, None if free else load.torque)
+    own = next(each for each in own_ensembles() if each.name == method)
+    load = draw("memory", 512)[0 if own.torque_free else 1]
+    own.prepare(load, SETTINGS[method], 1)()
     before = _resident("VmRSS")
     source = np.random.default_rng(1)
-    given = [np.empty((bodies, 3)) for _ in range(1 if free else 2)]
+    given = [np.empty((bodies, 3)) for _ in range(1 if own.torque_free else 2)]
     for array in given:
         source.random(out=array)
-    found = run(given[0], None if free else given[1])
-    arrays = sum(each.nbytes for each in given) + found.omega.nbytes + found.status.nbytes
+    many = EnsembleLoad("memory", given[0], None if own.torque_free else given[1])
+    omega = own.prepare(many, SETTINGS[method], 1)()
+    statuses = bodies  # a byte each
+    arrays = sum(each.nbytes for each in given) + omega.nbytes + statuses
     print(arrays, _resident("VmHWM") - before)
 
 

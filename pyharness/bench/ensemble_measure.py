@@ -1,14 +1,13 @@
 """Rates of ensembles: bodies a second at an error, and steps of RK4 a second.
 
-Each contender gets the coarsest setting whose error keeps the one asked for, on a sample, and then
+Each contender gets the coarsest setting whose error is at most the target, on a sample, and then
 as many bodies as it can do in a part of a second. All are called in turn, in rounds, and the
-shortest call counts: what else the machine does can but lengthen it. On one core what counts is the
-time that the core was ours.
+shortest time of a call counts, as what else the machine does can only lengthen it: on one core in
+the processor's time.
 """
 
-import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter, process_time
 
 import numpy as np
@@ -19,6 +18,7 @@ from pyharness.bench.ensemble_contenders import (
     EnsembleLoad,
     EnsembleMaker,
 )
+from pyharness.compare.timing import Clock, batch_seconds, seconds, silenced
 from pyharness.methods.plan import FINEST
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
@@ -28,7 +28,7 @@ STEPS = 300  # of RK4, where steps a second are asked for
 ROUNDS = 9
 # s; who takes less gets more bodies, and so does who is much faster with more, up to the second.
 _CALL, _LONG_CALL = 0.03, 0.5
-_SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
+SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; of calls in a round
 _MOST_STEPS = 1 << 14
 Say = Callable[[str], None]
@@ -44,7 +44,7 @@ class Rate:
     threads: int  # 0: as many as its package takes
     setting: float | None
     bodies: int  # of a call
-    seconds: float  # the shortest call
+    seconds: float  # the shortest time of a call
     error: float  # largest of the sample
 
     @property
@@ -69,28 +69,47 @@ class Rates:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
-    """A load with the ends of its first bodies, which are as random as any."""
+class _Task:
+    """Bodies to be solved to a target error, or in `STEPS` steps of RK4 where there is no target.
+
+    The error is that of a sample: the first bodies, which are as random as any.
+    """
 
     load: EnsembleLoad
-    ends: dict[int, Array]
+    target: float | None
+    sample: EnsembleLoad
+    ends: Array  # of the sample, (n, 3)
 
     @property
-    def few(self) -> EnsembleLoad:
-        """The bodies whose ends are known."""
-        return self.load.part(slice(0, SAMPLE))
+    def place(self) -> str:
+        """The task in words."""
+        return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
+
+    def takes(self, each: EnsembleContender) -> bool:
+        """Whether the task is one for a contender."""
+        torque = self.load.torque is not None and each.torque_free
+        return not torque and (self.target is not None or each.setting == "steps")
 
     def error(self, omega: Array) -> float:
         """Return the largest error, each over the body's largest omega at start and end."""
-        worst = 0.0
-        for i in range(min(SAMPLE, len(omega))):
-            if i not in self.ends:
-                self.ends[i] = self.load.part([i]).ends()[0]
-            end = self.ends[i]
-            size = max(np.abs(end).max(), np.abs(self.load.omega0[i]).max())
-            found = float(np.abs(omega[i] - end).max() / size)
-            worst = max(worst, found if np.isfinite(found) else np.inf)
-        return worst
+        n = min(len(omega), len(self.ends))
+        ends, starts = self.ends[:n], self.sample.omega0[:n]
+        sizes = np.maximum(np.abs(ends).max(axis=1), np.abs(starts).max(axis=1))
+        errors = np.abs(omega[:n] - ends).max(axis=1) / sizes
+        return float(np.where(np.isfinite(errors), errors, np.inf).max())
+
+    def setting(self, each: EnsembleContender) -> float | None:
+        """Return the coarsest setting with at most the target error; None where there is none."""
+        if self.target is None:
+            return float(STEPS)
+        for setting in _ladder(each, self.target):
+            try:
+                omega = each.prepare(self.sample, setting, each.threads[0])()
+            except (InputError, RuntimeError, ValueError):
+                continue
+            if self.error(omega) <= self.target:
+                return setting
+        return None
 
 
 def measure_ensembles(
@@ -102,62 +121,37 @@ def measure_ensembles(
     """Measure all on all loads, to all errors; RK4 on the last load, in `STEPS` steps too."""
     found = Rates(seed, loads[0].n)
     for load in loads:
-        sample = _Sample(load, {})
-        tasks: list[float | None] = [*TARGETS, *([None] if load is loads[-1] else [])]
-        for target in tasks:
-            place = load.name + (f", {target:g}" if target else f", {STEPS} steps of RK4")
-            found.rows.extend(_rates(sample, target, contenders, found, place, say))
+        sample = load.part(slice(0, SAMPLE))
+        ends = sample.ends()
+        for target in (*TARGETS, None) if load is loads[-1] else TARGETS:
+            task = _Task(load, target, sample, ends)
+            found.rows.extend(_rates(task, contenders, found, say))
     return found
 
 
 def _rates(
-    sample: _Sample,
-    target: float | None,
-    contenders: Sequence[EnsembleContender],
-    found: Rates,
-    place: str,
-    say: Say,
+    task: _Task, contenders: Sequence[EnsembleContender], found: Rates, say: Say
 ) -> Iterator[Rate]:
-    ready: list[tuple[EnsembleContender, float, int, int, float, Callable[[], Array]]] = []
-    for each in contenders:
-        if (each.torque_free and sample.load.torque is not None) or (
-            target is None and each.setting != "steps"
-        ):
-            continue
-        say(f"{place}: {each.name}")
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            setting = _setting(each, sample, target)
+    ready: list[tuple[Rate, Callable[[], Array]]] = []
+    for each in filter(task.takes, contenders):
+        say(f"{task.place}: {each.name}")
+        with silenced():
+            setting = task.setting(each)
             if setting is None:
-                found.refused.append((place, each.name, "no setting reaches it"))
+                found.refused.append((task.place, each.name, "no setting reaches it"))
                 continue
+            shown = None if each.setting == "none" else setting
             for threads in each.threads:
-                load, run = _enough(each.prepare, sample.load, setting, threads)
-                ready.append((each, setting, threads, load.n, sample.error(run()), run))
-    seconds = [np.inf] * len(ready)
-    for number in range(1, ROUNDS + 1):
-        say(f"{place}: round {number} of {ROUNDS}")
-        for k, (_, _, threads, _, _, run) in enumerate(ready):
-            if number <= 3 or seconds[k] < _SLOW:
-                seconds[k] = min(seconds[k], shortest(run, _BATCH, threads))
-    for best, (each, setting, threads, n, error, _) in zip(seconds, ready, strict=True):
-        shown = None if each.setting == "none" else setting
-        yield Rate(sample.load.name, target, each.name, threads, shown, n, best, error)
-
-
-def _setting(each: EnsembleContender, sample: _Sample, target: float | None) -> float | None:
-    """Return the coarsest setting that keeps to an error on the sample; None where none does."""
-    if target is None:
-        return float(STEPS)
-    few = sample.few
-    for setting in _ladder(each, target):
-        try:
-            omega = each.prepare(few, setting, each.threads[0])()
-        except (InputError, RuntimeError, ValueError):
-            continue
-        if sample.error(omega) <= target:
-            return setting
-    return None
+                load, run = _enough(each.prepare, task.load, setting, threads)
+                rate = Rate(load.name, task.target, each.name, threads, shown, load.n, 0.0,
+                            task.error(run()))  # fmt: skip
+                ready.append((rate, run))
+    times = seconds(
+        [run for _, run in ready], _BATCH, ROUNDS, lambda text: say(f"{task.place}: {text}"), min,
+        [clock_of(rate.threads) for rate, _ in ready], SLOW,
+    )  # fmt: skip
+    for (rate, _), best in zip(ready, times, strict=True):
+        yield replace(rate, seconds=best)
 
 
 def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
@@ -184,22 +178,12 @@ def _enough(
         part = load.part(slice(0, n))
         run = prepare(part, setting, threads)
         run()  # what is compiled
-        taken = shortest(run, 0.0, threads)
+        taken = batch_seconds(run, clock=clock_of(threads))
         if n == load.n or taken > (_LONG_CALL if n / taken > 1.5 * before else _CALL):
             return part, run
         n, before = min(load.n, 8 * n), n / taken
 
 
-def shortest(run: Callable[[], object], length: float, threads: int = 1) -> float:
-    """Return the time of the shortest call (s), among as many as fit in so many seconds, or one.
-
-    Of a call on one core the time of the processor, else that of the clock on the wall.
-    """
-    clock = process_time if threads == 1 else perf_counter
-    best, spent = np.inf, 0.0
-    while spent <= length:
-        begin = clock()
-        run()
-        one = clock() - begin
-        best, spent = min(best, one), spent + one
-    return best
+def clock_of(threads: int) -> Clock:
+    """Return what a call is timed by: the processor's time on one core, else that on the wall."""
+    return process_time if threads == 1 else perf_counter

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import cache, partial
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -22,22 +21,18 @@ _BLOCK = 4096  # bodies whose arrays stay near the processor
 
 def ensemble_peers() -> list[EnsembleContender]:
     """Return all peers, installed or not."""
+    one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     return [
-        EnsembleContender("heyoka-batch", "tolerance", _heyoka_batch, "heyoka", (1,)),
-        EnsembleContender("heyoka-ensemble", "tolerance", _heyoka_ensemble, "heyoka"),
-        EnsembleContender("numba-blocks-rk4", "steps", blocks, "numba"),
-        EnsembleContender("numba-bodies-rk4", "steps", alone, "numba"),
-        EnsembleContender("jax-rk4", "steps", compiled.jax_rk4, "jax", (0,)),
-        EnsembleContender("diffrax-dopri8", "tolerance", compiled.diffrax_vmap, "diffrax", (0,)),
-        EnsembleContender("numpy-rk4", "steps", _numpy_rk4, "numpy"),
-        EnsembleContender("scipy-dop853-loop", "tolerance", _scipy_loop, "scipy", (1,)),
+        one("heyoka-batch", "tolerance", _heyoka_batch, (1,), package="heyoka"),
+        one("heyoka-ensemble", "tolerance", _heyoka_ensemble, package="heyoka"),
+        one("numba-blocks-rk4", "steps", blocks, package="numba"),
+        one("numba-bodies-rk4", "steps", alone, package="numba"),
+        one("jax-rk4", "steps", compiled.jax_rk4, (0,), package="jax"),
+        one("diffrax-dopri8", "tolerance", compiled.diffrax_vmap, (0,), package="diffrax"),
+        one("numpy-rk4", "steps", _numpy_rk4, package="numpy"),
+        one("scipy-dop853-loop", "tolerance", _scipy_loop, (1,), package="scipy"),
     ]
-
-
-def is_installed(contender: EnsembleContender) -> bool:
-    """Whether the package of a contender is there."""
-    return not contender.package or find_spec(contender.package) is not None
 
 
 def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:

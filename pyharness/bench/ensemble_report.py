@@ -6,14 +6,11 @@ from typing import Any
 
 from pyharness.bench.ensemble_growth import Memory, Size
 from pyharness.bench.ensemble_measure import STEPS, Rate, Rates
-from pyharness.bench.page import made_page
-from pyharness.model.build import build, machine
+from pyharness.bench.page import grouped, measured_report
 from pyharness.model.report import (
     Column,
-    Line,
     Picture,
     Report,
-    Section,
     Table,
     digits,
     numbers,
@@ -21,7 +18,7 @@ from pyharness.model.report import (
 )
 
 _DRIFT = (
-    "One process and one run: the shortest calls of interleaved rounds, on one core in the "
+    "One process and one run: the shortest times of interleaved rounds, on one core in the "
     "processor's time, on more in that on the wall. Times drift with the machine and with what "
     "else it does: compare the ratios, not the rates."
 )
@@ -39,19 +36,16 @@ class Ensembles:
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
     """Report a table for each load and error, then growth and memory."""
-    parts, notes = _parts(found), _notes(found)
-    here, built = machine(packages), build()
-    versions = [*here.items(), ("Fortran compiler", built.compiler), ("NumPy", built.numpy)]
-    shown: list[Section] = [[Line(title), table] for title, table in parts]
-    tables: list[Section] = [[Line(f"### {title}"), table] for title, table in parts]
-    page = made_page("## Ensembles", command, _DRIFT, versions, tables, notes)
-    return Report(
-        "bench",
-        text=[*shown, notes],
-        record=lambda: _record(found) | {"machine": here, "build": asdict(built)},
-        data=_data(found.rates),
-        page=page,
-        pictures={"growth": lambda: size_picture(found.sizes)},
+    return measured_report(
+        "## Ensembles",
+        _DRIFT,
+        _parts(found),
+        _notes(found),
+        lambda: _record(found),
+        _data(found.rates),
+        {"growth": lambda: size_picture(found.sizes)},
+        packages,
+        command,
     )
 
 
@@ -128,13 +122,7 @@ def _notes(found: Ensembles) -> list[str]:
         "in the times. JAX and diffrax take the cores they like. heyoka-ensemble copies its "
         "integrator for each batch; heyoka-batch has one, in a loop of Python's.",
     ]
-    reasons: dict[str, list[str]] = {}
-    for place, name, why in found.rates.refused:
-        reasons.setdefault(f"{name}: {why}", []).append(place)
-    return lines + [
-        text + (f" ({'; '.join(filter(None, places))})" if any(places) else "")
-        for text, places in reasons.items()
-    ]
+    return lines + grouped((name, why, place) for place, name, why in found.rates.refused)
 
 
 def _data(rates: Rates) -> Table:

@@ -14,9 +14,9 @@ from time import perf_counter
 
 import numpy as np
 
-from pyharness.bench.contenders import Contender, Maker
+from pyharness.bench.contenders import Maker, SceneContender
 from pyharness.compare.candidates import End, Ready, not_finite
-from pyharness.compare.timing import seconds
+from pyharness.compare.timing import seconds, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
@@ -129,7 +129,7 @@ def workloads(
 
 def measure(
     loads: Sequence[Workload],
-    contenders: Sequence[Contender],
+    contenders: Sequence[SceneContender],
     say: Callable[[str], None] = lambda _: None,
 ) -> Finding:
     """Run the benchmark; `say` is told how far it is."""
@@ -203,7 +203,7 @@ def relative_error(omega: Array, truth: Reference) -> float | None:
     return error if math.isfinite(error) else None
 
 
-def ladder(contender: Contender, scene: Scene, horizon: float) -> Iterator[float]:
+def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
     """Yield settings from coarse to fine; numbers of steps by factors of 3/2 and 4/3."""
     if contender.settings:
         yield from contender.settings
@@ -221,7 +221,7 @@ def ladder(contender: Contender, scene: Scene, horizon: float) -> Iterator[float
 
 
 def _first_calls(
-    load: Workload, contender: Contender, make: Maker, truth: Reference, refused: list[Refusal]
+    load: Workload, contender: SceneContender, make: Maker, truth: Reference, refused: list[Refusal]
 ) -> tuple[list[tuple[Ready, Row]], float]:
     """Return what will be timed, and the seconds that making and first calls took beyond it."""
     entries: list[tuple[Ready, Row]] = []
@@ -242,8 +242,7 @@ def _first_calls(
             break
         try:
             begin = perf_counter()
-            with np.errstate(all="ignore"), warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with silenced():
                 warnings.simplefilter("error", UserWarning)
                 ready = make(load.horizon, setting)
                 ready.run()

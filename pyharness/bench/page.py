@@ -1,25 +1,74 @@
-"""The page of a measurement: what made it and where, its tables, its notes."""
+"""The report of a measurement: its tables and notes, its page with what made it and where."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
 
-from pyharness.model.report import Column, Line, Section, Table
+from pyharness.model.build import build, machine
+from pyharness.model.report import Column, Line, Picture, Report, Section, Table
 
 
-def made_page(
+def measured_report(
     title: str,
+    worth: str,
+    parts: Sequence[tuple[str, Table]],
+    notes: Sequence[str],
+    record: Callable[[], dict[str, Any]],
+    data: Table,
+    pictures: Mapping[str, Callable[[], Picture]],
+    packages: Iterable[str],
     command: str,
-    drift: str,
-    versions: Sequence[tuple[str, str | None]],
-    tables: Iterable[Section],
-    notes: Iterable[str],
-) -> list[Section]:
-    """Return its sections; `drift` says what the numbers are worth, `title` has its marks."""
-    return [
+) -> Report:
+    """Report tables, each with its title, and notes.
+
+    `title` is that of the page, with its marks, and `worth` says how far its numbers can be
+    compared. `packages` are those whose versions count; `command` makes the page again.
+    """
+    here, built = machine(packages), build()
+    versions = [
+        *here.items(),
+        ("pyharness", built.version),
+        ("Fortran compiler", f"{built.compiler}, {built.flags}"),
+        ("Python", built.python),
+        ("NumPy", built.numpy),
+        ("SciPy", built.scipy),
+        ("platform", built.platform),
+    ]
+    mark = "#" + title.split()[0]
+    tables: list[Section] = [[Line(f"{mark} {head}"), table] for head, table in parts]
+    page: list[Section] = [
         [Line(title)],
         [Line(f"Made by `{command}`; run that again to have it for another machine.")],
-        [Line(drift)],
+        [Line(worth)],
         [Table((Column(""), Column("version")), versions)],
         *tables,
-        [Line("#" + title.split()[0] + " Notes")],
+        [Line(f"{mark} Notes")],
         [Line(f"- {line}") for line in notes],
+    ]
+    return Report(
+        "bench",
+        text=[*parts, notes],
+        record=lambda: record() | {"machine": here, "build": asdict(built)},
+        data=data,
+        page=page,
+        pictures=pictures,
+    )
+
+
+def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
+    """Return what came to nothing, given as (who, why, where): a line for each reason and places.
+
+    Of the places of one contender the first `most` are named; contenders that fail alike share a
+    line.
+    """
+    places: dict[tuple[str, str], list[str]] = {}
+    for who, why, where in reasons:
+        places.setdefault((who, why), []).append(where)
+    alike: dict[tuple[str, str], list[str]] = {}
+    for (who, why), found in places.items():
+        more = f" and {len(found) - most} more" if most and len(found) > most else ""
+        alike.setdefault((why, ", ".join(filter(None, found[:most])) + more), []).append(who)
+    return [
+        f"{', '.join(names)}: {why}" + (f" ({where})" if where else "")
+        for (why, where), names in alike.items()
     ]

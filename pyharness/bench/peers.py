@@ -3,13 +3,12 @@
 import warnings
 from collections.abc import Callable
 from functools import partial
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from pyharness.bench import compiled_peers as compiled
-from pyharness.bench.contenders import TOLERANCES, Contender, Maker, refuse_rounding
+from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, refuse_rounding
 from pyharness.bench.orekit_peer import orekit
 from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.methods.scipy_ivp import RightHandSide, state_of, turning
@@ -19,20 +18,22 @@ from pyharness.truth.reference import exact_coefficients
 _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
 
-def peers() -> list[Contender]:
+def peers() -> list[SceneContender]:
     """Return all peers, installed or not."""
     # 2**-52 is heyoka's default.
     finest = (*TOLERANCES, 2.0**-52)
 
-    def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> Contender:
+    def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> SceneContender:
         settings = finest if name == "heyoka" else TOLERANCES
         # That one writes to the standard output where it calls a motion stiff.
         attitude = name != "numbalsoda-dop853"
-        return Contender(name, "tolerance", prepare, settings, package=package, attitude=attitude)
+        return SceneContender(
+            name, "tolerance", prepare, settings, package=package, attitude=attitude
+        )
 
-    def fixed(name: str, order: int) -> Contender:
+    def fixed(name: str, order: int) -> SceneContender:
         prepare = partial(compiled.numba_fixed, name)
-        return Contender(f"numba-{name}", "steps", prepare, order=order, package="numba")
+        return SceneContender(f"numba-{name}", "steps", prepare, order=order, package="numba")
 
     return [
         adaptive("heyoka", "heyoka", _heyoka),
@@ -45,15 +46,10 @@ def peers() -> list[Contender]:
             adaptive(f"solve_ivp-{name.lower()}", "scipy", partial(_solve_ivp, name))
             for name in _SOLVE_IVP
         ),
-        Contender(
+        SceneContender(
             "orekit", "none", orekit, (0.0,), package="orekit_jpype", attitude=True, velocity=False
         ),
     ]
-
-
-def installed(contender: Contender) -> bool:
-    """Whether the package of a contender is there."""
-    return not contender.package or find_spec(contender.package) is not None
 
 
 def _heyoka(scene: Scene) -> Maker:

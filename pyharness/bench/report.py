@@ -7,17 +7,14 @@ from typing import Any
 
 from pyharness.bench.growth import Growth
 from pyharness.bench.measure import TARGETS, Finding, Refusal, Row
-from pyharness.bench.page import made_page
+from pyharness.bench.page import grouped, measured_report
 from pyharness.bench.pictures import bench_picture, growth_picture
 from pyharness.bench.random_loads import KINDS
 from pyharness.bench.savings import Saving
 from pyharness.bench.scores import groups, means, scores, spreads, yardstick
-from pyharness.model.build import build, machine
 from pyharness.model.report import (
     Column,
-    Line,
     Report,
-    Section,
     Table,
     digits,
     numbers,
@@ -40,28 +37,17 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
 
     `packages` are those whose versions count, `command` what makes the page again.
     """
-    drawn, notes = _random(finding), _notes(finding)
-    parts, data = (_spread_parts if drawn else _parts)(finding), _data(finding)
-    here, built = machine(packages), build()
-    versions = [
-        *here.items(),
-        ("pyharness", built.version),
-        ("Fortran compiler", f"{built.compiler}, {built.flags}"),
-        ("Python", built.python),
-        ("NumPy", built.numpy),
-        ("SciPy", built.scipy),
-        ("platform", built.platform),
-    ]
-    tables: list[Section] = [[Line(f"## {title}"), table] for title, table in parts]
-    title = "# Run time against error" + (" of omega and attitude" if finding.attitude else "")
-    page = made_page(title, command, _DRIFT, versions, tables, notes)
-    return Report(
-        "bench",
-        text=[*parts, notes],
-        record=lambda: _record(finding) | {"machine": here, "build": asdict(built)},
-        data=_spread_data(finding) if drawn else data,
-        page=page,
-        pictures={"precision": lambda: bench_picture(finding, data)},
+    drawn, data = _random(finding), _data(finding)
+    return measured_report(
+        "# Run time against error" + (" of omega and attitude" if finding.attitude else ""),
+        _DRIFT,
+        (_spread_parts if drawn else _parts)(finding),
+        _notes(finding),
+        lambda: _record(finding),
+        _spread_data(finding) if drawn else data,
+        {"precision": lambda: bench_picture(finding, data)},
+        packages,
+        command,
     )
 
 
@@ -261,15 +247,9 @@ def not_measured(finding: Finding) -> list[str]:
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]
     came += [(row, row.note.split(" at step")[0]) for row in finding.rows if row.error is None]
-    reasons: dict[tuple[str, str], list[str]] = {}
-    for each, reason in came:
-        place = each.workload.place
-        place += "" if each.setting is None else f" at {each.setting:g}"
-        reasons.setdefault((each.method, reason), []).append(place)
-    # Of those that fail alike, one line.
-    alike: dict[tuple[str, str], list[str]] = {}
-    for (method, reason), places in reasons.items():
-        shown = ", ".join(places[:_MOST_SHOWN])
-        more = f" and {len(places) - _MOST_SHOWN} more" if len(places) > _MOST_SHOWN else ""
-        alike.setdefault((reason, shown + more), []).append(method)
-    return [f"{', '.join(methods)}: {why} ({where})" for (why, where), methods in alike.items()]
+    places = [
+        each.workload.place + ("" if each.setting is None else f" at {each.setting:g}")
+        for each, _ in came
+    ]
+    told = [(each.method, why, where) for (each, why), where in zip(came, places, strict=True)]
+    return grouped(told, _MOST_SHOWN)

@@ -1,48 +1,68 @@
 """Timing: calls in interleaved batches, so that what else the machine does hits all alike."""
 
+import contextlib
 import gc
 import statistics
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import repeat
 from time import perf_counter
 
 import numpy as np
 
-_SLOW = 20e-3  # s; calls slower than this are timed in fewer rounds
+SLOW = 20e-3  # s; calls slower than this are timed in fewer rounds
+Run = Callable[[], object]
+Clock = Callable[[], float]
 
 
 def seconds(
-    runs: Sequence[Callable[[], object]],
+    runs: Sequence[Run],
     length: float,
     rounds: int,
     say: Callable[[str], None] = lambda _: None,
+    statistic: Callable[[Sequence[float]], float] = statistics.median,
+    clocks: Sequence[Clock] | None = None,
+    slow: float = SLOW,
 ) -> list[float]:
-    """Return the median seconds of a call of each, in rounds of batches of `length` seconds."""
+    """Return the seconds of a call of each run, in rounds of batches of `length` seconds.
+
+    They are the median over the rounds, or another `statistic`. `clocks` has the clock of each run,
+    by default that on the wall.
+    """
+    clocks = [perf_counter] * len(runs) if clocks is None else clocks
+    timed = list(zip(runs, clocks, strict=True))
     enabled = gc.isenabled()
     gc.disable()
     try:
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            seen = [[_batch(run, 1)] for run in runs]
-            due = [rounds if first < _SLOW else 3 if first < 5 * _SLOW else 1 for (first,) in seen]
+        with silenced():
+            seen = [[batch_seconds(run, 1, clock)] for run, clock in timed]
+            due = [rounds if first < slow else 3 if first < 5 * slow else 1 for (first,) in seen]
             for number in range(1, rounds + 1):
                 say(f"round {number} of {rounds}")
-                for run, times, most in zip(runs, seen, due, strict=True):
+                for (run, clock), times, most in zip(timed, seen, due, strict=True):
                     if number <= most:
                         # The last time, for a first call may have been a slow one.
-                        times.append(_batch(run, max(1, round(length / max(times[-1], 1e-9)))))
+                        calls = max(1, round(length / max(times[-1], 1e-9)))
+                        times.append(batch_seconds(run, calls, clock))
     finally:
         if enabled:
             gc.enable()
-    return [statistics.median(times[1:]) for times in seen]
+    return [statistic(times[1:]) for times in seen]
 
 
-def _batch(run: Callable[[], object], calls: int) -> float:
+def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> float:
     """Return the seconds of a call, averaged over some in a row."""
     if calls > 1:
         run()
-    begin = perf_counter()
+    begin = clock()
     for _ in repeat(None, calls):
         run()
-    return (perf_counter() - begin) / calls
+    return (clock() - begin) / calls
+
+
+@contextlib.contextmanager
+def silenced() -> Iterator[None]:
+    """Ignore warnings, and numbers that leave the range of floats, as those who are timed do."""
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield

@@ -1,8 +1,7 @@
 """Scenes of a sweep solved: a chunk of its grid, or any of its scenes."""
 
-from pyharness.ensembles.loads import loads
+from pyharness.ensembles.batches import batches
 from pyharness.ensembles.reductions import empty, reduced
-from pyharness.ensembles.solved import Solved
 from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points
 
 
@@ -18,8 +17,7 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
     """Return the arrays of scenes, given by an array of indices for each dimension."""
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
-    for members, load in loads(sweep, where):
-        solved = Solved(load)
+    for members, batch in batches(sweep, where):
         for asked in sweep.reductions:
-            found[asked.name][members] = reduced(asked, solved)
+            found[asked.name][members] = reduced(asked, batch)
     return found

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.ensembles.batches import looped_fields
 from pyharness.ensembles.chunk import solve_chunk, solve_points
 from pyharness.ensembles.executors import Engine
-from pyharness.ensembles.loads import looped_fields
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import scratch
 from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread
@@ -17,10 +17,10 @@ from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread
 _SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # s
 # A larger sample is taken beyond that where it is a small part of the sweep, and takes at most so
-# long: what a load takes whatever its size would else count as its scenes'.
+# long: what a batch takes whatever its size would else count as its scenes'.
 _PART = 0.01
 _LONGEST = 60.0  # s
-_PLACES = 5  # of the sample, along what scenes of one load share
+_PLACES = 5  # of the sample, along what scenes of one batch share
 _PACE = 3e8  # bytes that are compressed and written in a second
 _FILES = 20  # chunks that are written and read for a sample, at the most
 
@@ -121,7 +121,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def _together(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Move a sample to a few of the places that scenes of one load share, as a chunk has many."""
+    """Move a sample to a few of the places that scenes of one batch share, as a chunk has many."""
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found = []
     for (name, count), places in zip(sweep.dimensions.items(), where, strict=True):

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.ensembles.one_by_one import STATUSES
-from pyharness.ensembles.solved import Solved
 from pyharness.ensembles.sweep import Asked
+from pyharness.methods.batch import Batch
 from pyharness.model.codes import Statuses
+from pyharness.model.extension import ENDS
 from pyharness.model.trajectory import STOP_VARIABLES, Array
 from pyharness.theory.flips import flip_times
 
@@ -31,7 +31,7 @@ class Reduction:
     title, units : str
         In words; the unit of its numbers.
     compute : callable
-        From what was solved, and the parameters by name, to n values.
+        From a batch, and the parameters by name, to n values.
     dtype : str
         Of the array; NaN, or -1 in whole numbers, stands where nothing is computed yet.
     labels : tuple of str
@@ -48,7 +48,7 @@ class Reduction:
 
     title: str
     units: str
-    compute: Callable[[Solved, Mapping[str, Any]], Found]
+    compute: Callable[[Batch, Mapping[str, Any]], Found]
     dtype: str = "f8"
     labels: tuple[str, ...] = ()
     dimension: str = ""
@@ -63,48 +63,48 @@ class Reduction:
         return np.nan if self.dtype == "f8" else _NOT_YET
 
 
-def _end(solved: Solved, _: Mapping[str, Any]) -> Found:
-    return solved.omega
+def _end(batch: Batch, _: Mapping[str, Any]) -> Found:
+    return batch.omega
 
 
-def _status(solved: Solved, _: Mapping[str, Any]) -> Found:
-    return solved.status
+def _status(batch: Batch, _: Mapping[str, Any]) -> Found:
+    return batch.status
 
 
-def _error(solved: Solved, given: Mapping[str, Any]) -> Found:
+def _error(batch: Batch, given: Mapping[str, Any]) -> Found:
     samples = given["samples"]
-    rows = solved.rows(samples)
-    steps = solved.load.scene.steps
-    largest = np.abs(solved.omega0).max(axis=1)
+    rows = batch.rows(samples)
+    steps = batch.scene.steps
+    largest = np.abs(batch.omega0).max(axis=1)
     worst = np.zeros(len(rows))
     for i in range(samples):
         # A program's rows lie at whole steps.
-        part = solved.sample_steps(samples)[i] / steps if solved.is_program else (i + 1) / samples
-        truth = solved.by_method(given["against"], given["tolerance"], part)
+        part = batch.sample_steps(samples)[i] / steps if batch.is_program else (i + 1) / samples
+        truth = batch.by_method(given["against"], given["tolerance"], part)
         largest = np.fmax(largest, np.abs(truth).max(axis=1))
         worst = np.maximum(worst, np.abs(rows[:, i] - truth).max(axis=1))
     found: Found = worst / largest
     return found
 
 
-def _stop_step(solved: Solved, _: Mapping[str, Any]) -> Found:
-    return np.where(solved.status == Statuses.STOPPED, solved.n_rows, 0)
+def _stop_step(batch: Batch, _: Mapping[str, Any]) -> Found:
+    return np.where(batch.status == Statuses.STOPPED, batch.n_rows, 0)
 
 
-def _stop_variable(solved: Solved, _: Mapping[str, Any]) -> Found:
-    return solved.stop_variable
+def _stop_variable(batch: Batch, _: Mapping[str, Any]) -> Found:
+    return batch.stop_variable
 
 
-def _overflow_time(solved: Solved, _: Mapping[str, Any]) -> Found:
+def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
     # Of the first step that gave no finite row.
-    time = (solved.n_rows + 1) * solved.load.step_sizes
-    return np.where(solved.status == Statuses.OVERFLOW, time, np.nan)
+    time = (batch.n_rows + 1) * batch.step_sizes
+    return np.where(batch.status == Statuses.OVERFLOW, time, np.nan)
 
 
-def _drift(solved: Solved, given: Mapping[str, Any]) -> Found:
-    bodies = solved.load.bodies[:, None, :]
-    start = solved.omega0[:, None, :]
-    rows = solved.rows(given["samples"])
+def _drift(batch: Batch, given: Mapping[str, Any]) -> Found:
+    bodies = batch.bodies[:, None, :]
+    start = batch.omega0[:, None, :]
+    rows = batch.rows(given["samples"])
     found = []
     for weight in (bodies, bodies**2):
         then, before = (weight * rows**2).sum(axis=2), (weight * start**2).sum(axis=2)
@@ -112,14 +112,14 @@ def _drift(solved: Solved, given: Mapping[str, Any]) -> Found:
     return np.stack(found, axis=1)
 
 
-def _claim(solved: Solved, given: Mapping[str, Any]) -> Found:
+def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
     room, _, name = given["function"].partition(":")
     judge = getattr(importlib.import_module(room), name)
-    return np.asarray(judge(solved))
+    return np.asarray(judge(batch))
 
 
-def _largest_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
-    start, rows = _unit(solved.omega0)[:, None, :], _unit(solved.rows(given["samples"]))
+def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
+    start, rows = _unit(batch.omega0)[:, None, :], _unit(batch.rows(given["samples"]))
     # Of two unit vectors; the arc cosine would lose half of the digits of a small angle.
     angles: Found = 2.0 * np.arctan2(
         np.linalg.norm(rows - start, axis=2), np.linalg.norm(rows + start, axis=2)
@@ -128,9 +128,9 @@ def _largest_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
     return largest
 
 
-def _axis_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
-    squares = solved.attitudes(given["samples"]) ** 2
-    axis = np.argsort(solved.load.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
+def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
+    squares = batch.attitudes(given["samples"]) ** 2
+    axis = np.argsort(batch.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
     column = np.broadcast_to(axis, (len(squares),))
     is_own = np.arange(3) == column[:, None, None]
     # The squares of the half angle's cosine and sine.
@@ -140,10 +140,10 @@ def _axis_tilt(solved: Solved, given: Mapping[str, Any]) -> Found:
     return largest
 
 
-def _flips(solved: Solved, given: Mapping[str, Any]) -> Found:
-    middle = np.argsort(solved.load.bodies, axis=1, kind="stable")[:, 1]
-    column = np.broadcast_to(middle, (len(solved.omega0),))
-    rows = np.concatenate([solved.omega0[:, None, :], solved.rows(given["samples"])], axis=1)
+def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
+    middle = np.argsort(batch.bodies, axis=1, kind="stable")[:, 1]
+    column = np.broadcast_to(middle, (len(batch.omega0),))
+    rows = np.concatenate([batch.omega0[:, None, :], batch.rows(given["samples"])], axis=1)
     component = np.take_along_axis(rows, column[:, None, None], axis=2)[:, :, 0]
     below = component < 0.0
     changes = (below[:, 1:] != below[:, :-1]) & np.isfinite(component[:, 1:])
@@ -151,18 +151,18 @@ def _flips(solved: Solved, given: Mapping[str, Any]) -> Found:
     return count
 
 
-def _flip_time(solved: Solved, _: Mapping[str, Any]) -> Found:
-    return flip_times(solved.load.bodies, solved.omega0)
+def _flip_time(batch: Batch, _: Mapping[str, Any]) -> Found:
+    return flip_times(batch.bodies, batch.omega0)
 
 
-def _growth(solved: Solved, given: Mapping[str, Any]) -> Found:
-    start = solved.omega0
+def _growth(batch: Batch, given: Mapping[str, Any]) -> Found:
+    start = batch.omega0
     size = np.linalg.norm(start, axis=1, keepdims=True)
     offset = given["offset"] * np.where(size > 0.0, size, 1.0)
     moved = start + offset / np.sqrt(3.0)
     before = np.linalg.norm(moved - start, axis=1)
-    after = np.linalg.norm(solved.from_start(moved).omega - solved.omega, axis=1)
-    rate: Found = np.log(after / before) / np.abs(solved.load.t_end)
+    after = np.linalg.norm(batch.from_start(moved).omega - batch.omega, axis=1)
+    rate: Found = np.log(after / before) / np.abs(batch.t_end)
     return rate
 
 
@@ -172,13 +172,12 @@ def _unit(vectors: Array) -> Array:
 
 
 _SAMPLES = {"samples": 100}
+_STATUSES = {code: name for code, name in enumerate(ENDS) if name != "interrupted"}
 REDUCTIONS = {
     "end": Reduction(
         "angular velocity at the end", "rad/s", _end, labels=("1", "2", "3"), dimension="component"
     ),
-    "status": Reduction(
-        "how it ended", "1", _status, "i1", flags={code: name for name, code in STATUSES.items()}
-    ),
+    "status": Reduction("how it ended", "1", _status, "i1", flags=_STATUSES),
     "error": Reduction(
         "largest error of a component against a method, over the largest component",
         "1",
@@ -264,9 +263,9 @@ def empty(asked: Asked, n: int) -> Found:
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
-def reduced(asked: Asked, solved: Solved) -> Found:
-    """Return what is kept of a load."""
+def reduced(asked: Asked, batch: Batch) -> Found:
+    """Return what is kept of a batch."""
     given = {**dict(asked.parameters), "function": asked.function}
     # What left the range of numbers stays what it is.
     with np.errstate(all="ignore"):
-        return REDUCTIONS[asked.reduction].compute(solved, given)
+        return REDUCTIONS[asked.reduction].compute(batch, given)

@@ -9,27 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.ensembles.axes import Axis
+from pyharness.methods.batch import Solver
 from pyharness.model.scene import Scene
 
 Arrays = dict[str, NDArray[Any]]
 Indices = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Solver:
-    """What solves, where no axis says so.
-
-    Exactly one of `method` and `program` is given. `t_end` is None where the scene's steps say it.
-    """
-
-    method: str | None = "auto"
-    program: str | None = None
-    tolerance: float | None = None  # by default the method's own
-    t_end: float | None = None
-    listing: str = "original"
-    reading: str = "adopted"
-    lipschitz: float = 500.0
-    may_stop: bool = True
 
 
 @dataclass(frozen=True)
@@ -65,8 +49,6 @@ class Sweep:
         The most scenes in a chunk.
     text, fingerprint : str
         The file's text, and the SHA-256 of that and of what it refers to.
-    picture : str
-        The page of the atlas that draws it; empty for none.
     """
 
     name: str
@@ -77,7 +59,6 @@ class Sweep:
     chunk: int
     text: str
     fingerprint: str
-    picture: str = ""
 
     @property
     def dimensions(self) -> dict[str, int]:

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.ensembles.asked import asked_of
-from pyharness.ensembles.atlas import check_page
 from pyharness.ensembles.axes import Axis, axis_of
+from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
-from pyharness.ensembles.loads import listing_of
 from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.sweep import Solver, Sweep
+from pyharness.ensembles.sweep import Sweep
+from pyharness.methods.batch import Solver
 from pyharness.methods.registry import REGISTRY, requested_tolerance
 from pyharness.methods.solver import PREPARED
 from pyharness.model.errors import InputError, kind_of, unknown
@@ -31,7 +31,7 @@ from pyharness.model.scene_file import (
 )
 from pyharness.model.values import finite, number, truth, whole
 
-_KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk", "picture")
+_KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
 _SOLVE = (
     *("method", "tolerance", "t_end"),
     *("program", "listing", "reading", "lipschitz", "may_stop"),
@@ -51,9 +51,9 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
     path : path
         Of the file. A scene file named in it is looked for beside it.
     claims : mapping, optional
-        Where the function of each claim stands, as in ``package.module:name``. It takes what was
-        `Solved` of n scenes, and returns 1 for each that the claim holds of, 0 where it fails, 2
-        where it says nothing.
+        Where the function of each claim stands, as in ``package.module:name``. It takes a
+        `Batch` of n scenes, and returns 1 for each that the claim holds of, 0 where it
+        fails, 2 where it says nothing.
 
     Raises
     ------
@@ -93,13 +93,9 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
     if not 1 <= chunk <= _MOST_IN_CHUNK:
         raise InputError(f"chunk is {chunk}; allowed: 1 to {_MOST_IN_CHUNK} scenes")
     digest = hashlib.sha256(text.encode() + more).hexdigest()
-    picture = data.get("picture", "")
-    if not isinstance(picture, str):
-        raise InputError(f"picture is {kind_of(picture)}; it must be text")
-    sweep = Sweep(name, scene, axes, solver, reductions, chunk, text, digest, picture)
+    sweep = Sweep(name, scene, axes, solver, reductions, chunk, text, digest)
     _check_reductions(sweep)
     _check_solvers(sweep)
-    check_page(sweep)
     return sweep
 
 

@@ -3,47 +3,29 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pyharness.methods.many_starts import buffer_of
+from pyharness.model.arrays import buffer_of
+from pyharness.model.batch_result import BatchResult
 from pyharness.model.errors import InputError
-from pyharness.model.extension import ENDS
-from pyharness.model.shown import short_repr
-from pyharness.model.trajectory import WITH_ALL_ROWS, Array
-
-_RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
+from pyharness.model.trajectory import Array
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble(BatchResult):
     """The ends of many scenes.
 
     Attributes
     ----------
     omega : ndarray, shape (n, 3)
-        Angular velocity about the body axes, rad/s; NaN where there is no result.
+        Angular velocities about the body axes, rad/s; NaN where there is no result.
     status : ndarray of int8, shape (n,)
-        How each ended: 0 complete, 2 overflow, 3 refused, 4 gave up, 6 sensitive, which is a result
-        too.
+        How each body ended: 0 complete, 2 overflow, 3 refused, 4 gave up, 6 sensitive. A sensitive
+        result is a result too.
     attitude : ndarray, shape (n, 4), or None
-        Quaternions from body to space, scalar first; None where they were not asked for.
+        Quaternions from body to space, scalar first; None if they were not requested.
     """
 
-    omega: Array
-    status: NDArray[np.int8]
     attitude: Array | None = None
-
-    @property
-    def ended(self) -> NDArray[np.str_]:
-        """How each ended, in words: complete, sensitive, overflow, refused, gave up."""
-        return np.array(ENDS)[self.status]
-
-    __repr__ = short_repr
-
-    @property
-    def has_result(self) -> NDArray[np.bool_]:
-        """Where there is one."""
-        return np.isin(self.status, _RESULTS)
 
 
 def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> Ensemble:

@@ -1,7 +1,7 @@
-"""Many bodies in one call: side by side in the kernel, and on several cores where asked.
+"""Many bodies in one call: side by side in the kernel, and on several cores if requested.
 
-The result of a body depends on that body alone: no other body, no order and no number of threads
-changes a bit of it.
+The result of a body depends on that body alone: it is bit for bit the same whatever the other
+bodies, their order and the number of threads.
 """
 
 from collections.abc import Sequence
@@ -21,27 +21,30 @@ from pyharness.methods.many_scenes import (
     from_scene,
     from_scenes,
     units_of,
-    waves_of,
 )
 from pyharness.methods.many_space import (
     NO_ATTITUDE,
     acts_in_space,
     inertia_scenes,
-    space_bodies,
-)
-from pyharness.methods.many_starts import (
-    for_each_piece,
-    rows_of,
-    threads_of,
-    times_of,
+    solve_in_space,
 )
 from pyharness.methods.plan import FINEST
 from pyharness.methods.registry import REGISTRY, check_attitude, requested_tolerance
 from pyharness.methods.solver import CODES, PREPARED
+from pyharness.model.arrays import (
+    check_rows,
+    count_bodies,
+    only_one,
+    rows_of,
+    spread,
+    threads_of,
+    waves_of,
+)
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import extension
+from pyharness.model.pieces import for_each_piece
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, finite
@@ -73,46 +76,48 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        What is not given as an array is taken from it; or all scenes, and no arrays.
+        The scene that supplies what no array supplies; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
-        Time of the results, s, on either side of 0.
+        Times of the results, s, on either side of 0.
     omega0, moments, coefficients, torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Starts (rad/s), moments (kg m2) or A, B, C, torque (N m; 1/s2 for bodies of coefficients)
-        and its rate, of each body or of all.
+        Initial angular velocities (rad/s), moments (kg m2) or A, B, C, torques (N m; 1/s2 for
+        bodies given by coefficients) and their rates. An array of one row is shared by all bodies.
     inertia : array, shape (n, 3, 3) or (3, 3)
         Full inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the
         axes of the matrix. Finding the principal axes takes some tenths of a millisecond a body.
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        Waves of torque: an amplitude of three, and the frequency (rad/s).
+        Waves of torque: three components of the amplitude, and the frequency (rad/s).
     attitude0 : array, shape (n, 4) or (4,)
-        Quaternions at time 0, body to space, scalar first; with them the attitudes are found.
+        Quaternions at time 0, from body to space, scalar first. If they are given, attitudes are
+        returned.
     method : str
         A name in `PREPARED`; `auto` is the closed form for each body without torque and for each
         sphere, and the series for any other.
     tolerance : float
-        As in `prepare`: largest error at the end, relative to the largest omega on the way; by
-        default the method's own.
+        The largest error at the end, relative to the largest omega from 0 to the end, as in
+        `prepare`; by default the method's own.
     step : float, optional
-        Of the methods with a fixed step, s; by default the scene's.
+        Step size of the methods with a fixed step, s; by default the scene's.
     effort : float
-        Factor on the work for a body, beyond which its status is `gave up`.
+        Factor on the work limit of a body, beyond which its status is `gave up`.
     threads : int
-        Cores at work: the kernel holds no lock.
+        The number of threads: the kernel releases the interpreter's lock.
     out : Ensemble, or array of shape (n, 3), optional
-        What to write into: the result of a call before with as many bodies, or an array for omega.
+        Where to write: the result of an earlier call with as many bodies, or an array for omega.
 
     Returns
     -------
     Ensemble
-        A body that can't be solved has NaN and its status, and spoils no other: so has one with a
-        number that is not finite, or a moment that is not above 0.
+        The ends. A body that can't be solved, such as one with a number that is not finite or a
+        moment that is not above 0, has NaN and a status that says so; it affects no other body.
 
     Raises
     ------
     InputError
-        For arrays that do not fit together, an unknown method, one that can't take what is asked.
+        If the arrays differ in their numbers of rows, or the method is unknown or can't solve such
+        bodies.
     NotBuiltError
-        Where the extension is not built.
+        If the extension is not built.
 
     Examples
     --------
@@ -123,32 +128,30 @@ def solve_many(
     array([[-0.958924,  0.283662, 10.      ],
            [ 1.196944, -1.602287,  5.      ]])
     """
-    arrays = {
-        "omega0": omega0, "constant": torque_constant, "rate": torque_rate,
-        "sines": sines, "cosines": cosines, "attitude": attitude0,
-    }  # fmt: skip
-    own = {name: value for name, value in arrays.items() if value is not None}
     kinds = {"moments": moments, "coefficients": coefficients, "inertia": inertia}
-    kinds_given = [name for name, value in kinds.items() if value is not None]
-    if len(kinds_given) > 1:
-        raise InputError(f"{' and '.join(kinds_given)} are both given; allowed: one of them")
     torques = {
         "torque_constant": torque_constant, "torque_rate": torque_rate, "sines": sines,
         "cosines": cosines,
     }  # fmt: skip
+    starts = {"omega0": omega0, "attitude0": attitude0}
+    own = {name: value for name, value in {**starts, **torques}.items() if value is not None}
+    kind = only_one(kinds)
     settings: dict[str, Any] = {
         "method": method, "tolerance": tolerance, "effort": effort, "threads": threads,
     }  # fmt: skip
     if isinstance(scene, Scene):
         if acts_in_space(scene, torques.values()):
-            every = {**torques, **kinds, "omega0": omega0, "attitude0": attitude0}
-            return _solve_in_space(scene, t_end, every, out, **settings)
-        if inertia is not None or (scene.inertia is not None and not kinds_given):
+            _, asked = _chosen(method, tolerance)
+            checked_scene(scene, any_axes=True, any_torque=True)
+            return solve_in_space(
+                scene, t_end, {**torques, **kinds, **starts}, out, method=method, tolerance=asked,
+                effort=checked_effort(effort), threads=threads_of(threads),
+            )  # fmt: skip
+        if kind == "inertia" or (scene.inertia is not None and not kind):
             given = from_rows(inertia_scenes(scene, {**torques, **kinds}))
-            given["step"] = scene.step_size
-            turning = {name: value for name, value in own.items() if name in ("omega0", "attitude")}
-            given.update(turning)
-            given["axes"].about_principal(given, turning)
+            own = {name: value for name, value in own.items() if name in starts}
+            given |= {"step": scene.step_size, **own}
+            given["axes"].about_principal(given, own)
             own = {}
         else:
             if scene.inertia is not None:  # other bodies are given
@@ -156,11 +159,11 @@ def solve_many(
             given = from_scene(scene)
     else:
         scene = list(scene)
-        for name, value in {"omega0": omega0, **kinds, "attitude0": attitude0}.items():
-            if value is not None and name != "coefficients":
+        for name in ("omega0", "moments", "inertia", "attitude0"):
+            if name in own or name == kind:
                 raise InputError(f"{name} is given beside many scenes; allowed: one scene, or none")
         if any(_is_special(each) for each in scene):
-            if own or kinds_given:
+            if own or kind:
                 raise InputError(
                     "arrays are given beside scenes with a full inertia matrix, or a torque about "
                     "the axes of space; allowed: one scene and arrays, or scenes alone"
@@ -169,17 +172,17 @@ def solve_many(
                 each.torque.in_space for each in scene
             ):
                 return _solve_groups(scene, t_end, step, out, **settings)
-            given = _from_full_scenes(scene)
+            check_alike(scene)
+            given = {**from_rows(scene), "step": scene[0].step_size}
         else:
             given = from_scenes(scene)
-    if kinds_given and inertia is None:
-        given["by_moments"] = moments is not None
-        given["body"] = kinds[kinds_given[0]]
+    if kind and kind != "inertia":
+        given |= {"by_moments": kind == "moments", "body": kinds[kind]}
     given.update(own)
     given["step"] = finite("step", given["step"] if step is None else step)
     code, asked = _chosen(method, tolerance)
     bodies = _Bodies(given, t_end, code, asked, checked_effort(effort))
-    if bodies.with_attitude:
+    if bodies.attitude is not None:
         check_attitude(method)
     found = bodies.solve(threads_of(threads), out)
     axes: Axes | None = given["axes"]
@@ -193,41 +196,17 @@ def _is_special(scene: Scene) -> bool:
     return scene.inertia is not None or scene.torque.in_space
 
 
-def _from_full_scenes(scenes: list[Scene]) -> dict[str, Any]:
-    check_alike(scenes)
-    return {**from_rows(scenes), "step": scenes[0].step_size}
-
-
-def _solve_in_space(
-    scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
-    method: str, tolerance: Number | None, effort: float, threads: int,
-) -> Ensemble:  # fmt: skip
-    """Solve bodies of a torque about the axes of space."""
-    _, asked = _chosen(method, tolerance)
-    bodies = space_bodies(
-        checked_scene(scene, any_axes=True, any_torque=True), t_end, method, arrays
-    )
-    found = place_for(out, bodies.n, with_attitude=True)
-    assert found.attitude is not None
-    ends = bodies.solve(method, asked, checked_effort(effort), threads_of(threads))
-    found.omega[:], found.status[:], found.attitude[:] = ends
-    return found
-
-
 def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Solve scenes of several kinds, each as if alone: about which axes the body and torque are."""
+    """Solve scenes that differ in the axes of body and torque, each kind in a call of its own."""
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):
         raise InputError(NO_ATTITUDE)
-    times, n = times_of(t_end), len(scenes)
-    if len(times) not in (1, n):
-        raise InputError(
-            f"t_end: {len(times)} rows; allowed: 1, or as many as there are bodies, {n}"
-        )
-    times = np.broadcast_to(times, n)
+    times, n = rows_of("t_end", t_end), len(scenes)
+    check_rows("t_end", times, n)
+    times = spread(times, n)
     found = place_for(out, n, scenes[0].attitude is not None)
     groups: dict[int, list[int]] = {}
     for row, each in enumerate(scenes):
@@ -244,42 +223,27 @@ def _solve_groups(
 
 
 class _Bodies:
-    """What the kernel is given, checked: arrays of one row are shared by all bodies."""
+    """The checked arguments of the kernel; an array of one row is shared by all bodies."""
 
     def __init__(
         self, given: dict[str, Any], t_end: Any, code: int, tolerance: float, effort: float
     ) -> None:
         self.by_moments = bool(given["by_moments"])
         body = "moments" if self.by_moments else "coefficients"
-        self.body = rows_of(body, given["body"], 3)
-        self.constant = rows_of("torque_constant", given["constant"], 3)
-        self.rate = rows_of("torque_rate", given["rate"], 3)
-        self.sines = waves_of("sines", given["sines"])
-        self.cosines = waves_of("cosines", given["cosines"])
-        self.omega0 = rows_of("omega0", given["omega0"], 3)
-        attitude = given["attitude"]
-        self.with_attitude = attitude is not None
-        self.attitude = np.empty((0, 4)) if attitude is None else units_of(attitude)
-        self.times = times_of(t_end)
-        named = {
-            "omega0": self.omega0, body: self.body, "torque_constant": self.constant,
-            "torque_rate": self.rate, "sines": self.sines, "cosines": self.cosines,
-            "attitude0": self.attitude, "t_end": self.times,
-        }  # fmt: skip
-        counts = {name: len(array) for name, array in named.items() if array.size}
-        self.n = 0 if not self.omega0.size else max(counts.values(), default=0)
-        if not self.times.size:
-            self.n = 0
-        for name, count in counts.items():
-            if count not in (1, self.n):
-                raise InputError(
-                    f"{name}: {count} rows; allowed: 1, or as many as there are bodies, {self.n}"
-                )
+        shared = {"omega0": given["omega0"], body: given["body"]}
+        shared |= {name: given[name] for name in ("torque_constant", "torque_rate")}
+        rows = {name: rows_of(name, each, 3) for name, each in shared.items()}
+        rows |= {name: waves_of(name, given[name]) for name in ("sines", "cosines")}
+        rows["t_end"] = rows_of("t_end", t_end)
+        if given["attitude0"] is not None:
+            rows["attitude0"] = units_of(given["attitude0"])
+        self.n = count_bodies(rows)
+        self.body, self.rate, self.times = rows[body], rows["torque_rate"], rows["t_end"]
+        self.attitude = rows.get("attitude0")
         self.constant, self.sines, self.cosines = with_merged_rows(
-            self.constant, self.sines, self.cosines
+            rows["torque_constant"], rows["sines"], rows["cosines"]
         )
-        if len(self.omega0) != self.n:
-            self.omega0 = np.ascontiguousarray(np.broadcast_to(self.omega0, (self.n, 3)))
+        self.omega0 = spread(rows["omega0"], self.n)
         self.step = given["step"]
         if not self.step > 0.0:
             raise InputError(f"step is {self.step:g}; allowed: above 0")
@@ -287,7 +251,7 @@ class _Bodies:
         torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
         if code == Methods.CLOSED_FORM and any(each.any() for each in torques):
             raise InputError("closed-form can't take a torque here; allowed: auto, taylor")
-        if code == Methods.CLOSED_FORM and self.with_attitude and not self.by_moments:
+        if code == Methods.CLOSED_FORM and self.attitude is not None and not self.by_moments:
             raise InputError(
                 "closed-form can't take an attitude of bodies given by coefficients; allowed: "
                 "moments, or methods auto and taylor"
@@ -295,7 +259,7 @@ class _Bodies:
 
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
         """Return the ends."""
-        found = place_for(out, self.n, self.with_attitude)
+        found = place_for(out, self.n, self.attitude is not None)
         for_each_piece(partial(self._enter, found), self.n, threads)
         return found
 
@@ -305,11 +269,12 @@ class _Bodies:
             return cut.T
 
         nothing = np.empty((4, 0), order="F")
+        attitude = nothing if self.attitude is None else part(self.attitude)
         extension().solve_ensemble(
             self.code, self.tolerance, self.step, self.effort, self.by_moments,
             part(self.body), part(self.constant), part(self.rate), part(self.sines),
-            part(self.cosines), self.omega0[piece].T, part(self.times), part(self.attitude),
-            given_up, found.omega[piece].T,
+            part(self.cosines), self.omega0[piece].T, part(self.times), attitude, given_up,
+            found.omega[piece].T,
             nothing if found.attitude is None else found.attitude[piece].T, found.status[piece],
         )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Scenes as the arrays of `solve_many`; a full inertia matrix as principal moments and axes."""
+"""Scenes as the arrays of `solve_many`; full inertia matrices as principal moments and axes."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.methods.many_starts import numbers_of, rows_of
 from pyharness.methods.prepared_inertia import axes_and_turn, rotated, turned_back
+from pyharness.model.arrays import check_rows, rows_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.principal import principal
@@ -16,7 +16,7 @@ from pyharness.model.trajectory import Array
 
 
 class Axes:
-    """Principal axes of bodies with a full inertia matrix; one row is that of all bodies."""
+    """The principal axes of bodies with full inertia matrices; one row is shared by all bodies."""
 
     def __init__(self, axes: Array, turns: Array) -> None:
         """Take axes, columns of (n, 3, 3), and the same rotations as quaternions, (n, 4)."""
@@ -26,13 +26,13 @@ class Axes:
         """Replace starts and attitudes about the bodies' axes by those about principal axes."""
         if "omega0" in names:
             rows = rows_of("omega0", given["omega0"], 3)
-            self._check("omega0", len(rows))
+            self._check("omega0", rows)
             given["omega0"] = rotated(rows, self.axes.transpose(0, 2, 1))
-        if "attitude" in names:
-            attitudes = units_of(given["attitude"])
-            self._check("attitude0", len(attitudes))
+        if "attitude0" in names:
+            attitudes = units_of(given["attitude0"])
+            self._check("attitude0", attitudes)
             conjugate = self.turns * np.array([1.0, -1.0, -1.0, -1.0])
-            given["attitude"] = turned_back(attitudes, conjugate)
+            given["attitude0"] = turned_back(attitudes, conjugate)
 
     def give_back(self, omega: Array, attitude: Array | None) -> None:
         """Replace results about principal axes by those about the bodies' axes, in place."""
@@ -40,12 +40,9 @@ class Axes:
         if attitude is not None:
             attitude[:] = turned_back(attitude, self.turns)
 
-    def _check(self, name: str, count: int) -> None:
-        if 1 not in (count, len(self.axes)) and count != len(self.axes):
-            raise InputError(
-                f"{name}: {count} rows; allowed: 1, or as many as there are bodies, "
-                f"{len(self.axes)}"
-            )
+    def _check(self, name: str, rows: Array) -> None:
+        if len(self.axes) != 1:
+            check_rows(name, rows, len(self.axes))
 
 
 def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
@@ -54,24 +51,15 @@ def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
     Where there is no scene, the row is one that is refused. Bodies are given by coefficients, which
     `principal` knows to more digits than those of rounded moments.
     """
-    found: dict[str, Any] = {"by_moments": False, "step": 1.0}
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
-    for name in ("body", "omega0", "constant", "rate"):
-        found[name] = np.array([row[name] for row in each])
-    for name in ("sines", "cosines"):
-        found[name] = _filled([row[name] for row in each])
-    found["axes"] = Axes(
-        np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each])
-    )
-    with_attitude = any(scene is not None and scene.attitude is not None for scene in rows)
-    found["attitude"] = np.array([row["attitude"] for row in each]) if with_attitude else None
-    return found
+    axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
+    return {**_stacked(each), "by_moments": False, "axes": axes}
 
 
 _NONE = (math.nan, math.nan, math.nan)
 _REFUSED: dict[str, Any] = {
-    "body": _NONE, "omega0": _NONE, "constant": _NONE, "rate": _NONE, "sines": [], "cosines": [],
-    "axes": np.eye(3), "turn": IDENTITY, "attitude": IDENTITY,
+    "body": _NONE, "omega0": _NONE, "torque_constant": _NONE, "torque_rate": _NONE, "sines": [],
+    "cosines": [], "axes": np.eye(3), "turn": IDENTITY, "attitude0": None,
 }  # fmt: skip
 
 
@@ -81,13 +69,13 @@ def _full_row(scene: Scene) -> dict[str, Any]:
     return {
         "body": turned.euler_coefficients,
         "omega0": turned.omega,
-        "constant": np.array(law.constant) / moments,
-        "rate": np.array(law.rate) / moments,
+        "torque_constant": np.array(law.constant) / moments,
+        "torque_rate": np.array(law.rate) / moments,
         "sines": [[*(np.array(wave) / moments), frequency] for wave, frequency in law.sines],
         "cosines": [[*(np.array(wave) / moments), frequency] for wave, frequency in law.cosines],
         "axes": axes,
         "turn": axes_and_turn(scene)[1],
-        "attitude": turned.attitude,
+        "attitude0": turned.attitude,
     }
 
 
@@ -105,11 +93,11 @@ def from_scene(scene: Scene) -> dict[str, Any]:
         "body": scene.moments or scene.coefficients,
         "axes": None,
         "omega0": scene.omega,
-        "constant": law.constant,
-        "rate": law.rate,
+        "torque_constant": law.constant,
+        "torque_rate": law.rate,
         "sines": [[*amplitude, frequency] for amplitude, frequency in law.sines],
         "cosines": [[*amplitude, frequency] for amplitude, frequency in law.cosines],
-        "attitude": scene.attitude,
+        "attitude0": scene.attitude,
         "step": scene.step_size,
     }
 
@@ -122,23 +110,26 @@ def check_alike(scenes: Sequence[Scene]) -> None:
         raise InputError("some scenes have an attitude and some have none; allowed: all or none")
 
 
-def from_scenes(scenes: Iterable[Scene]) -> dict[str, Any]:
+def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     """Return scenes as arrays of a row each; InputError where they can't be side by side."""
-    rows = [from_scene(each) for each in scenes]
-    if not rows:
+    if not scenes:
         raise InputError("there is no scene; allowed: a scene, or some")
-    for name, what in (("by_moments", "kind of body"), ("step", "step size")):
-        if len({row[name] for row in rows}) > 1:
-            raise InputError(f"the scenes have more than one {what}; allowed: one for all")
-    if len({row["attitude"] is None for row in rows}) > 1:
-        raise InputError("some scenes have an attitude and some have none; allowed: all or none")
+    check_alike(scenes)
+    rows = [from_scene(each) for each in scenes]
+    if len({row["by_moments"] for row in rows}) > 1:
+        raise InputError("the scenes have more than one kind of body; allowed: one for all")
+    return _stacked(rows)
+
+
+def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return arrays with a row of each body, and what all have in common as it is in the first."""
     found = {**rows[0]}
-    for name in ("body", "omega0", "constant", "rate"):
+    for name in ("body", "omega0", "torque_constant", "torque_rate"):
         found[name] = np.array([row[name] for row in rows])
-    if found["attitude"] is not None:
-        found["attitude"] = np.array([row["attitude"] for row in rows])
     for name in ("sines", "cosines"):
         found[name] = _filled([row[name] for row in rows])
+    if any(row["attitude0"] is not None for row in rows):
+        found["attitude0"] = np.array([row["attitude0"] or IDENTITY for row in rows])
     return found
 
 
@@ -149,13 +140,3 @@ def units_of(values: Any) -> Array:
         found = found / np.abs(found).max(axis=1, keepdims=True)
         units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))
     return units
-
-
-def waves_of(where: str, values: Any) -> Array:
-    """Return waves, shape (n, k, 4); InputError for another shape."""
-    found = numbers_of(where, values)
-    if not found.size:
-        return np.empty((1, 0, 4))
-    if found.ndim not in (2, 3) or found.shape[-1] != 4:
-        raise InputError(f"{where}: shape {found.shape}; allowed: (k, 4) or (n, k, 4)")
-    return np.ascontiguousarray(found.reshape(-1, *found.shape[-2:]))

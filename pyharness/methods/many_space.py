@@ -1,63 +1,32 @@
-"""Many bodies as a scene for each: torques about the axes of space, and full inertia matrices.
+"""Many bodies as single scenes: torques about the axes of space, and full inertia matrices.
 
 Torques about the axes of space are solved one body after the other, by prepared solvers.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.methods.many_scenes import waves_of
-from pyharness.methods.many_starts import for_each_piece, numbers_of, rows_of, times_of
+from pyharness.methods.ensemble import Ensemble, place_for
 from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import check_torque
+from pyharness.model.arrays import count_bodies, row_of, rows_of, waves_of
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
-from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.pieces import for_each_piece
+from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array
 
 _REST: Triple = (0.0, 0.0, 0.0)
+_BODIES = ("moments", "inertia", "coefficients")
 NO_ATTITUDE = (
     "the torque is about the axes of space, and no attitude is given; allowed: attitude0, scenes "
     "with an attitude, or a torque about the axes of the body"
 )
-
-
-@dataclass(frozen=True, eq=False)
-class SpaceBodies:
-    """Bodies for a call each: arrays of one row are shared by all."""
-
-    n: int
-    scene_of: Callable[[int], Scene]  # an InputError of a body refuses that body alone
-    omega0: Array
-    attitude0: Array
-    times: Array
-
-    def solve(
-        self, method: str, tolerance: float, effort: float, threads: int
-    ) -> tuple[Array, NDArray[np.int8], Array]:
-        """Return angular velocities, statuses and attitudes."""
-        omega, attitude = np.full((self.n, 3), np.nan), np.full((self.n, 4), np.nan)
-        status = np.full(self.n, Statuses.REFUSED, np.int8)
-
-        def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
-            for i in range(piece.start, piece.stop):
-                if given_up[0]:
-                    return
-                try:
-                    solver = prepare(self.scene_of(i), method, tolerance, effort, attitude=True)
-                    start, turn = _row(self.omega0, i), _row(self.attitude0, i)
-                    omega[i], attitude[i] = solver(start, float(_row(self.times, i)), turn)
-                except InputError:
-                    continue
-                status[i] = ENDS.index(solver.status)
-
-        for_each_piece(enter, self.n, threads)
-        return omega, status, attitude
 
 
 def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
@@ -66,8 +35,14 @@ def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
     return scene.torque.in_space or (scene.torque.frame == "space" and named)
 
 
-def space_bodies(scene: Scene, t_end: Any, method: str, arrays: dict[str, Any]) -> SpaceBodies:
-    """Return the bodies of a scene and of arrays, None where `solve_many` was given no array."""
+def solve_in_space(
+    scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
+    method: str, tolerance: float, effort: float, threads: int,
+) -> Ensemble:  # fmt: skip
+    """Solve the bodies of a scene and of arrays, None where `solve_many` was given no array.
+
+    An InputError of a body refuses that body alone.
+    """
     check_torque(scene, method, attitude=True)
     if arrays["coefficients"] is not None or scene.coefficients is not None:
         raise InputError(
@@ -79,82 +54,71 @@ def space_bodies(scene: Scene, t_end: Any, method: str, arrays: dict[str, Any]) 
         raise InputError(NO_ATTITUDE)
     omega0 = scene.omega if arrays["omega0"] is None else arrays["omega0"]
     rows = _rows(arrays)
-    rows["omega0"], rows["attitude0"] = (
-        rows_of("omega0", omega0, 3),
-        rows_of("attitude0", attitude0, 4),
-    )
-    rows["t_end"] = times_of(t_end)
-    n = _count(rows)
+    starts, attitudes = rows_of("omega0", omega0, 3), rows_of("attitude0", attitude0, 4)
+    times = rows_of("t_end", t_end)
+    n = count_bodies({**rows, "omega0": starts, "attitude0": attitudes, "t_end": times})
+    at_rest = replace(scene, omega=_REST, attitude=None)
+    found = place_for(out, n, with_attitude=True)
+    assert found.attitude is not None
+    # The starts may lie where the results go.
+    omega, attitude = np.full((n, 3), np.nan), np.full((n, 4), np.nan)
+    found.status[:] = Statuses.REFUSED
 
-    def scene_of(i: int) -> Scene:
-        return replace(_scene_of(scene, rows, i, "space"), omega=_REST, attitude=None)
+    def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
+        for i in range(piece.start, piece.stop):
+            if given_up[0]:
+                return
+            try:
+                body = scene_of_row(at_rest, rows, i)
+                solver = prepare(body, method, tolerance, effort, attitude=True)
+                start, turn = row_of(starts, i), row_of(attitudes, i)
+                omega[i], attitude[i] = solver(start, float(row_of(times, i)), turn)
+            except InputError:
+                continue
+            found.status[i] = ENDS.index(solver.status)
 
-    return SpaceBodies(n, scene_of, rows["omega0"], rows["attitude0"], rows["t_end"])
+    for_each_piece(enter, n, threads)
+    found.omega[:], found.attitude[:] = omega, attitude
+    return found
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
     """Return a scene for each full inertia matrix or torque; None for a body that is none."""
     rows = _rows(arrays)
     found: list[Scene | None] = []
-    for i in range(_count(rows) if rows else 1):
+    for i in range(count_bodies(rows)):
         try:
-            found.append(_scene_of(scene, rows, i, "body"))
+            found.append(scene_of_row(scene, rows, i))
         except InputError:
             found.append(None)
     return found
 
 
 def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the arrays of bodies and torques, those of one row shared by all."""
-    rows = {
-        name: rows_of(name, arrays[name], 3)
-        for name in ("moments", "torque_constant", "torque_rate")
-        if arrays[name] is not None
-    }
-    for name in ("sines", "cosines"):
-        if arrays[name] is not None:
-            rows[name] = waves_of(name, arrays[name])
-    if arrays["inertia"] is not None:
-        found = numbers_of("inertia", arrays["inertia"])
-        if found.ndim not in (2, 3) or found.shape[-2:] != (3, 3):
-            raise InputError(f"inertia: shape {found.shape}; allowed: (3, 3) or (n, 3, 3)")
-        rows["inertia"] = found.reshape(-1, 3, 3)
+    """Return the arrays of bodies and torques that are given."""
+    shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
+    rows = {}
+    for name, values in arrays.items():
+        if values is not None and name in shapes:
+            rows[name] = rows_of(name, values, *shapes[name])
+        elif values is not None and name in ("sines", "cosines"):
+            rows[name] = waves_of(name, values)
     return rows
 
 
-def _count(rows: dict[str, Array]) -> int:
-    """Return how many bodies there are; InputError for arrays that do not fit together."""
-    counts = {len(each) for each in rows.values()}
-    n = 0 if 0 in counts else max(counts)
-    for name, each in rows.items():
-        if len(each) not in (1, n):
-            raise InputError(
-                f"{name}: {len(each)} rows; allowed: 1, or as many as there are bodies, {n}"
-            )
-    return n
-
-
-def _scene_of(scene: Scene, rows: dict[str, Array], i: int, frame: str) -> Scene:
-    own = {name: _row(each, i) for name, each in rows.items()}
-    law = scene.torque
-    torque = TorqueLaw(
-        own.get("torque_constant", law.constant),
-        own.get("torque_rate", law.rate),
-        _waves(own["sines"]) if "sines" in own else law.sines,
-        _waves(own["cosines"]) if "cosines" in own else law.cosines,
-        frame,
-    )
-    body: dict[str, Any] = {}
-    if "moments" in own or "inertia" in own:
-        body = {
-            "moments": own.get("moments"), "inertia": own.get("inertia"), "coefficients": None,
-        }  # fmt: skip
-    return replace(scene, torque=torque, **body)
-
-
-def _waves(rows: Array) -> list[tuple[Array, float]]:
-    return [(row[:3], float(row[3])) for row in rows]
-
-
-def _row(array: Array, i: int) -> Any:
-    return array[0 if len(array) == 1 else i]
+def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
+    """Return a scene with the numbers of body `i` in place of its own; InputError for none."""
+    own = {name: row_of(each, i) for name, each in rows.items()}
+    torque: dict[str, Any] = {
+        name.removeprefix("torque_"): own.pop(name)
+        for name in ("torque_constant", "torque_rate", "sines", "cosines")
+        if name in own
+    }
+    for name in ("sines", "cosines"):
+        if name in torque:
+            torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
+    if own.keys() & _BODIES:
+        own = {**dict.fromkeys(_BODIES), **own}
+    if "omega0" in own:
+        own["omega"] = own.pop("omega0")
+    return replace(scene, torque=replace(scene.torque, **torque), **own)

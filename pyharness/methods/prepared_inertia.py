@@ -10,16 +10,18 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.methods.many_starts import buffer_of, many_starts, rows_of
+from pyharness.methods.many_starts import many_starts
 from pyharness.methods.plan import Plan
 from pyharness.methods.prepared_attitude import AttitudeSolver
 from pyharness.methods.solver import Solver, no_buffer
+from pyharness.model.arrays import buffer_of, rows_of
 from pyharness.model.attitude import IDENTITY, Quaternion, product, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.model.values import Number, Numbers, three, three_floats
+from pyharness.model.waves import with_merged_waves
 
 
 class InertiaSolver(Solver):
@@ -149,7 +151,7 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
     """Return a solver of a scene with a full inertia matrix."""
     from pyharness.methods.plan import plan
 
-    about_principal, _ = principal(replace(scene, attitude=None))
+    about_principal = with_merged_waves(principal(replace(scene, attitude=None))[0])
     return InertiaSolver(plan(about_principal, method, tolerance), tolerance, method, effort, scene)
 
 
@@ -160,5 +162,5 @@ def prepared_inertia_attitude(
     from pyharness.methods.prepared_attitude import attitude_plan
 
     about_principal, _ = principal(replace(scene, attitude=scene.attitude or IDENTITY))
-    chosen = attitude_plan(about_principal, method, tolerance)
+    chosen = attitude_plan(with_merged_waves(about_principal), method, tolerance)
     return InertiaAttitudeSolver(chosen, tolerance, method, effort, scene)

@@ -1,10 +1,16 @@
 """Work on many bodies, in pieces that threads take."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
+
+# Bodies of a piece: some milliseconds, after which Python checks for a signal.
+_PIECE = 1 << 18
+# Bodies that are too few for a thread.
+_SMALL = 256
 
 
 def share(
@@ -32,3 +38,18 @@ def share(
             given_up[0] = 1
             pool.shutdown(cancel_futures=True)
             raise
+
+
+def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
+    """Call `work` for pieces of n bodies, in a number of threads.
+
+    `work` takes a piece and an array of one number, which is not 0 once the user has interrupted.
+    All pieces have nearly the same size, as a body alone in a piece would be solved in another way.
+    """
+    if not n:
+        return
+    given_up = np.zeros(1, dtype=np.int32)
+    count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
+    ends = [n * piece // count for piece in range(count + 1)]
+    pieces = [slice(*each) for each in itertools.pairwise(ends)]
+    share(lambda piece: work(piece, given_up), pieces, threads, given_up)

@@ -1,4 +1,4 @@
-"""The programs of the appendix on many bodies in one call, with the bits of the single runs."""
+"""The programs of the appendix for many bodies in one call, bit for bit as in single runs."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -7,6 +7,17 @@ from typing import SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyharness.model.arrays import (
+    ABOVE_ZERO,
+    FINITE,
+    FROM_ZERO,
+    count_bodies,
+    only_one,
+    rows_of,
+    spread,
+    threads_of,
+)
+from pyharness.model.batch_result import BatchResult
 from pyharness.model.codes import Blocks
 from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
@@ -14,56 +25,52 @@ from pyharness.model.extension import columns, extension
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
 from pyharness.model.pieces import share
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
-from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, several, truth, whole
 from pyharness.original.compiled import stop_reads_velocity
 from pyharness.original.equations import card_torque
-from pyharness.original.many_input import above_zero, from_zero, is_finite, one_count, rows, spread
 
 _LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
 _PIECES = 8  # for each thread, as bodies may end early
 _NOT_REACHED = -1
 
 
-@dataclass(frozen=True, eq=False)
-class ProgramEnsemble:
-    """What a program made of n bodies; NaN, and -1 of `ier`, where a row was not reached.
+@dataclass(frozen=True, eq=False, repr=False)
+class ProgramEnsemble(BatchResult):
+    """The rows that a program gave for n bodies; NaN, and -1 of `ier`, for rows not reached.
 
     Attributes
     ----------
-    at : ndarray of int, shape (m,)
-        The steps whose rows these are, from 1.
     omega : ndarray, shape (n, m, 3)
         Angular velocity about the body axes, rad/s.
+    status : ndarray of int8, shape (n,)
+        COMPLETE, STOPPED or OVERFLOW of pyharness/model/codes.py.
+    at : ndarray of int, shape (m,)
+        The steps of these rows, from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Velocity along the body axes, m/s.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
-        The TIME that TAPE5 got, s; in one row for all NaN where no body has the row.
+        The TIME that was written to TAPE5, s. A single row for all bodies has NaN at a step that
+        no body reached.
     n_rows : ndarray of int32, shape (n,)
-        Steps that hold a result.
-    status : ndarray of int8, shape (n,)
-        COMPLETE, STOPPED or OVERFLOW of pyharness/model/codes.py.
+        The number of steps with a result.
     stop_variable : ndarray of int8, shape (n,)
-        What ended a run: 1-3 U1-U3, 4-6 V1-V3, 7 the norm of U, 8 that of U and V; 0 for nothing.
+        The variable that ended a run: 1-3 U1-U3, 4-6 V1-V3, 7 the norm of U, 8 the norm of U and
+        V; 0 if the stop test did not end it.
     stop_quotient : ndarray, shape (n,)
-        Change of K over change of U (1/s) there; infinite where U did not change, NaN where nothing
-        ended the run.
+        The change of K over the change of U (1/s) where the stop test ended a run: infinite if U
+        did not change, NaN if the test did not end the run.
     ier : ndarray of int32, shape (n, m), or None
-        IER as the collocation programs print it.
+        IER as the collocation programs print it; None for the Runge-Kutta program.
     """
 
     at: NDArray[np.int32]
-    omega: Array
     velocity: Array | None
     recorded_time: Array
     n_rows: NDArray[np.int32]
-    status: NDArray[np.int8]
     stop_variable: NDArray[np.int8]
     stop_quotient: Array
     ier: NDArray[np.int32] | None
-
-    __repr__ = short_repr
 
 
 # As text: else its signature shows what NumPy makes of ArrayLike, 300 characters for each.
@@ -83,72 +90,69 @@ def run_many(
     threads: SupportsIndex = 1,
     effort: Number = 1.0,
 ) -> ProgramEnsemble:
-    """Run the compiled program of a listing on n bodies: for each the bits of its `run_program`.
+    """Run a listing's compiled program for n bodies, each bit for bit as `run_program` does.
 
     Parameters
     ----------
     scene : Scene
-        What all have in common.
+        The scene that supplies what no array supplies.
     listing : Listing
         The program, its active defects and readings.
     omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
-        In place of the scene's; one of `moments` and `coefficients` at the most.
+        Values in place of the scene's: angular velocities (rad/s), moments (kg m2) or A, B, C, and
+        torques (N m). At most one of `moments` and `coefficients` may be given.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
-        The scene's step size, and 500/s.
+        Step sizes (s; by default the scene's) and constants of the stop test (1/s).
     may_stop : bool
         Whether the stop test, which only the Runge-Kutta program has, may end runs.
     velocity : bool
-        Whether the velocity is wanted.
+        Whether to return the velocities.
     at : sequence of int, optional
-        The steps whose rows are wanted, from 1, in any order; the last step by default.
+        The steps whose rows to return, from 1, in any order; by default the last step.
     threads : int
-        Threads that share the bodies; no bit depends on this.
+        The number of threads that share the bodies; no bit depends on it.
     effort : float
-        Factor on the steps of all bodies, times waves, that are run without being asked for.
+        Factor on the work limit: steps times waves of all bodies.
 
     Returns
     -------
     ProgramEnsemble
-        A row for each body; one for all where nothing was given as an array.
+        The results of n bodies. An array of one row is shared by all bodies; without any longer
+        array n is 1.
 
     Raises
     ------
     InputError
-        For what `run_program` refuses of any body, naming its row, and for arrays that don't fit
-        together or in memory.
+        If `run_program` would refuse a body (the message names its row), or if the arrays differ
+        in their numbers of rows, or do not fit in memory.
     NotBuiltError
-        Where the extension is not built.
+        If the extension is not built.
     """
-    given = moments is not None or coefficients is not None
-    checked_scene(scene, any_axes=given)
+    kind = only_one({"moments": moments, "coefficients": coefficients})
+    checked_scene(scene, any_axes=bool(kind))
     checked_listing(listing)
-    if moments is not None and coefficients is not None:
-        raise InputError("moments and coefficients are both given; allowed: one of them")
     may_stop, velocity = truth("may_stop", may_stop), truth("velocity", velocity)
-    threads = whole("threads", threads)
-    if threads < 1:
-        raise InputError(f"threads is {threads}; allowed: a whole number from 1")
-    by_moments = moments is not None or (coefficients is None and scene.moments is not None)
-    if moments is None and coefficients is None:
-        moments, coefficients = scene.moments, scene.coefficients
+    threads = threads_of(threads)
     law = scene.torque
+    if not kind:
+        moments, coefficients = scene.moments, scene.coefficients
+        kind = "coefficients" if moments is None else "moments"
+    by_moments = kind == "moments"
+    bodies, rule = (moments, ABOVE_ZERO) if by_moments else (coefficients, FINITE)
+    omega0 = scene.omega if omega0 is None else omega0
+    torque_constant = law.constant if torque_constant is None else torque_constant
+    step_size = scene.step_size if step_size is None else step_size
     inputs = {
-        "body": rows("moments", moments, 3, above_zero)
-        if by_moments
-        else rows("coefficients", coefficients, 3, is_finite),
-        "omega": rows("omega0", scene.omega if omega0 is None else omega0, 3, is_finite),
-        "constant": rows(
-            "torque_constant", law.constant if torque_constant is None else torque_constant, 3,
-            is_finite,
-        ),
-        "step_size": rows(
-            "step_size", scene.step_size if step_size is None else step_size, 1, above_zero
-        ),
-        "lipschitz": rows("lipschitz", lipschitz, 1, from_zero),
-    }  # fmt: skip
-    if law.frame == "space" and inputs["constant"].any():
+        kind: rows_of(kind, bodies, 3, rule=rule),
+        "omega0": rows_of("omega0", omega0, 3, rule=FINITE),
+        "torque_constant": rows_of("torque_constant", torque_constant, 3, rule=FINITE),
+        "step_size": rows_of("step_size", step_size, rule=ABOVE_ZERO),
+        "lipschitz": rows_of("lipschitz", lipschitz, rule=FROM_ZERO),
+    }
+    n = count_bodies(inputs)
+    inputs["body"] = inputs.pop(kind)
+    if law.frame == "space" and inputs["torque_constant"].any():
         raise InputError(SPACE_TORQUE)
-    n = one_count(inputs)
     _check_ends(inputs["step_size"], scene.steps)
     check_bodies(scene, listing.program, n, effort)
     wanted = _steps(at, scene.steps)
@@ -157,7 +161,7 @@ def run_many(
             f"at: {len(wanted)} rows of {n} bodies; allowed: {most_steps()} in all, what fits in "
             "this machine's memory"
         )
-    first = np.zeros(3)
+    first = np.zeros((1, 3))
     if listing.has("initial-torque"):
         cards = card_torque(scene) if by_moments else None
         if cards is None:
@@ -165,37 +169,21 @@ def run_many(
         else:
             with np.errstate(over="ignore"):
                 first = np.array(cards) / inputs["body"]
-    return _run(
-        scene,
-        listing,
-        by_moments,
-        {**inputs, "first": first},
-        n,
-        wanted,
-        may_stop,
-        velocity,
-        threads,
-    )
+    inputs["first"] = first
+    return _run(scene, listing, by_moments, inputs, n, wanted, may_stop, velocity, threads)
 
 
 def _run(
-    scene: Scene,
-    listing: Listing,
-    by_moments: bool,
-    inputs: dict[str, Array],
-    n: int,
-    wanted: NDArray[np.int32],
-    may_stop: bool,
-    velocity: bool,
-    threads: int,
-) -> ProgramEnsemble:
+    scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
+    wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
+) -> ProgramEnsemble:  # fmt: skip
     """Run what was checked."""
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
-    body, omega, constant, first = (
-        spread(inputs[name], n, 3) for name in ("body", "omega", "constant", "first")
+    body, omega, constant, first, step_size, lipschitz = (
+        spread(inputs[name], n)
+        for name in ("body", "omega0", "torque_constant", "first", "step_size", "lipschitz")
     )
-    step_size, lipschitz = (spread(inputs[name], n, 1) for name in ("step_size", "lipschitz"))
     computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
     prints_ier = listing.program != "runge-kutta"
     # The kernel takes one row at least.

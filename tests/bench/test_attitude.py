@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pyharness.bench import compiled_peers, measure, orekit_peer, peers
-from pyharness.bench.contenders import Contender, own
+from pyharness.bench.contenders import SceneContender, own
 from pyharness.bench.measure import Finding, error_of, workloads
 from pyharness.bench.random_loads import random_load
 from pyharness.bench.scores import groups
@@ -41,7 +41,7 @@ def truths() -> dict[str, Reference]:
     return {scene.name: reference(scene, [2.0], precise=True) for scene in (SCENE, FREE)}
 
 
-def _error(contender: Contender, scene: Scene, truth: Reference) -> float:
+def _error(contender: SceneContender, scene: Scene, truth: Reference) -> float:
     ready = contender.prepare(scene)(2.0, 1e-12)
     ready.run()
     # The second call starts where the first one did.
@@ -53,8 +53,8 @@ def _error(contender: Contender, scene: Scene, truth: Reference) -> float:
 @pytest.mark.external
 @pytest.mark.parametrize("contender", ABLE, ids=lambda each: each.name)
 @pytest.mark.filterwarnings("ignore")
-def test_everyone_reaches_both(contender: Contender, truths: dict[str, Reference]) -> None:
-    if not peers.installed(contender):
+def test_everyone_reaches_both(contender: SceneContender, truths: dict[str, Reference]) -> None:
+    if not contender.is_installed:
         pytest.skip(f"{contender.package} is not installed")
     for scene in (FREE,) if contender.setting == "none" else (SCENE, FREE):
         assert _error(contender, scene, truths[scene.name]) < 1e-9
@@ -84,7 +84,7 @@ def _wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.filterwarnings("ignore")
 def test_a_wrong_sign_is_seen(name: str, truths: dict[str, Reference]) -> None:
     peer = next(each for each in ABLE if each.name == name)
-    if not peers.installed(peer):
+    if not peer.is_installed:
         pytest.skip(f"{peer.package} is not installed")
     # Omega alone is right.
     assert _error(peer, FREE, truths[FREE.name]) > 0.1
@@ -94,7 +94,7 @@ def test_a_wrong_sign_is_seen(name: str, truths: dict[str, Reference]) -> None:
 def test_orekit_turns_as_the_closed_form(
     truths: dict[str, Reference], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not peers.installed(OREKIT):
+    if not OREKIT.is_installed:
         pytest.skip(f"{OREKIT.package} is not installed")
     # Each prepares anew, in the machine that the first one started.
     for _ in range(2):

@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,11 @@ import numpy as np
 import pytest
 
 from pyharness.bench import ensemble_measure as measuring
+from pyharness.bench.contenders import Contender
 from pyharness.bench.ensemble_contenders import EnsembleContender, draw, own_ensembles
 from pyharness.bench.ensemble_growth import memory
 from pyharness.bench.ensemble_measure import Rate
-from pyharness.bench.ensemble_peers import ensemble_peers, is_installed
+from pyharness.bench.ensemble_peers import ensemble_peers
 from pyharness.bench.ensemble_report import ours_over
 from pyharness.cli.main import main
 from tests.issue_limit import IDLE, independent
@@ -40,7 +40,7 @@ FAST = [each for each in (*own_ensembles(), *ensemble_peers()) if each.package !
 @pytest.mark.parametrize("contender", FAST, ids=lambda each: each.name)
 @pytest.mark.filterwarnings("ignore")
 def test_contender_comes_to_the_truth(contender: EnsembleContender) -> None:
-    if not is_installed(contender):
+    if not contender.is_installed:
         pytest.skip(f"{contender.package} is not installed")
     for load in draw("truth", BODIES):
         if contender.torque_free and load.torque is not None:
@@ -120,10 +120,12 @@ def test_memory_is_at_most_twice_the_arrays() -> None:
 
 @pytest.mark.usefixtures("hurried")
 def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    there: Callable[[EnsembleContender], bool] = lambda each: each.package == ""  # noqa: E731
-    monkeypatch.setattr("pyharness.bench.ensemble_peers.is_installed", there)
-    assert main([*COMMAND[:-1], "heyoka", "--methods", "closed-form"]) == 0
-    assert "heyoka-batch: not installed" in capsys.readouterr().out
+    there = property(lambda each: each.package in ("", "numpy"))
+    monkeypatch.setattr(Contender, "is_installed", there)
+    assert main([*COMMAND[:-1], "heyoka", "--methods", "closed-form"]) == 2
+    assert "heyoka-batch needs heyoka, which is not installed" in capsys.readouterr().err
+    assert main([*COMMAND[:-2], "--methods", "closed-form"]) == 0
+    assert "heyoka-batch, heyoka-ensemble, " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

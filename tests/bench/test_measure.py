@@ -14,7 +14,7 @@ import pytest
 
 from pyharness.bench import measure as bench
 from pyharness.bench.compiled_peers import RK4, _compiled, _steps_source
-from pyharness.bench.contenders import Contender, Maker, own
+from pyharness.bench.contenders import Maker, SceneContender, own
 from pyharness.bench.measure import (
     Finding,
     Refusal,
@@ -25,7 +25,7 @@ from pyharness.bench.measure import (
     relative_error,
     workloads,
 )
-from pyharness.bench.peers import installed, peers
+from pyharness.bench.peers import peers
 from pyharness.bench.pictures import _slopes
 from pyharness.bench.report import bench_report, ratio
 from pyharness.bench.scores import Score, groups, means, scores, yardstick
@@ -216,8 +216,8 @@ def test_measure_judges_refuses_and_goes_on(right: Array) -> None:
 
     told: list[str] = []
     contenders = [
-        Contender("exact", "tolerance", _fake(answer), (1e-3, 1e-6, 1e-12)),
-        Contender("picky", "none", _refuses, (0.0,)),
+        SceneContender("exact", "tolerance", _fake(answer), (1e-3, 1e-6, 1e-12)),
+        SceneContender("picky", "none", _refuses, (0.0,)),
     ]
     found = measure([SHORT], contenders, told.append)
     stopped, good = found.rows
@@ -258,7 +258,7 @@ def test_slow_contenders_are_left_out_and_it_is_said(
     clock = itertools.count(0.0)
     monkeypatch.setattr(bench, "perf_counter", lambda: next(clock))
     monkeypatch.setattr(bench, "_ROUNDS", 1)
-    slow = Contender("slow", "tolerance", _fake(lambda _: End(right)), (1e-3, 1e-4))
+    slow = SceneContender("slow", "tolerance", _fake(lambda _: End(right)), (1e-3, 1e-4))
     found = measure([SHORT], [slow])
     assert [row.setting for row in found.rows] == [1e-3]
     why = "and finer: left out, a call would take about 1 s"
@@ -291,7 +291,7 @@ def test_source_written_for_numba_is_runge_kutta_of_the_scene(scene: Scene) -> N
 @pytest.mark.filterwarnings("ignore")
 def test_peer_solves_every_law(name: str) -> None:
     peer = next(each for each in peers() if each.name == name)
-    if not installed(peer):
+    if not peer.is_installed:
         pytest.skip(f"{peer.package} is not installed")
     for scene in (LAWS[4], LAWS[-1]):
         ready = peer.prepare(scene)(2.0, 1000.0 if peer.setting == "steps" else 1e-12)
@@ -360,7 +360,8 @@ def test_mistake_is_one_line(arguments: str, words: str, capsys: Capture) -> Non
 def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     room = "pyharness.cli.verbs.bench"
     few = [each for each in peers() if each.name in ("heyoka", "odeint")]
-    monkeypatch.setattr(f"{room}.installed", lambda contender: contender.package != "heyoka")
+    there = property(lambda contender: contender.package != "heyoka")
+    monkeypatch.setattr(SceneContender, "is_installed", there)
     monkeypatch.setattr(f"{room}.peers", lambda: few)
     monkeypatch.setattr(bench, "_BUDGET", dict.fromkeys(("tolerance", "steps", "none"), 0.0))
     assert main(["bench", "--peers", "heyoka"]) == 2

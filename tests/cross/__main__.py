@@ -40,6 +40,8 @@ CALLING = (
     # Every digest has been computed by then, with traps where there are any.
     "--deselect=tests/original/test_programs.py::test_every_cell_agrees",
     "--deselect=tests/original/test_programs.py::test_nasty_scenes_agree",
+    # The same kernels on many more bodies, the slowest of all with checks.
+    "--deselect=tests/methods/test_many_alone.py::test_no_bit_depends_on_other_bodies",
 )
 # Recursion: the entries release the lock, so that two threads may well be in one of them.
 CHECKED = (

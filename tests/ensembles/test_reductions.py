@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, run_program, solve
+from pyharness.ensembles.batches import batches, listing_of
 from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.loads import listing_of, loads
-from pyharness.ensembles.one_by_one import run_each
 from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.solved import many_rows
 from pyharness.ensembles.sweep import Sweep, points
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
@@ -151,13 +149,20 @@ def test_programs_side_by_side_have_the_bits_of_single_runs(axis: str, tmp_path:
     sweep = read_sweep(written(tmp_path, PROGRAM + axis))
     kinds = set()
     for chunk in range(sweep.n_chunks):
-        for _, load in loads(sweep, points(sweep, sweep.box(chunk))):
-            at = [1, 7, load.scene.steps]
-            alone, found = run_each(load, load.omega0, at), many_rows(load, load.omega0, at)
-            for name in found._fields:
-                one, other = getattr(alone, name), getattr(found, name)
-                assert one.dtype == other.dtype
-                assert np.array_equal(one, other, equal_nan=one.dtype == float)
+        for _, batch in batches(sweep, points(sweep, sweep.box(chunk))):
+            at = [1, 7, batch.scene.steps]
+            found = batch.run(at)
+            assert batch.listing is not None
+            for i in range(len(batch.omega0)):
+                lipschitz = batch.arrays.get("lipschitz", np.full(i + 1, 500.0))[i]
+                alone = run_program(batch.scene_of(i), batch.listing, lipschitz=lipschitz)
+                reached = [step for step in at if step <= len(alone.time)]
+                rows = found.omega[i]
+                assert np.array_equal(rows[: len(reached)], alone.omega[[k - 1 for k in reached]])
+                assert np.isnan(rows[len(reached) :]).all()
+                stop = 1 + STOP_VARIABLES.index(alone.stop.variable) if alone.stop else 0
+                assert (found.n_rows[i], found.ended[i]) == (len(alone.time), alone.ended)
+                assert found.stop_variable[i] == stop
             kinds.update(found.status.tolist())
     assert len(kinds) > 1
 
@@ -228,6 +233,6 @@ def test_what_is_no_number_is_no_flip() -> None:
     rows = np.stack([middle * 0.0, middle, middle * 0.0], axis=1)[None, :, :]
     solved = SimpleNamespace(
         omega0=rows[:, 0], rows=lambda samples: rows[:, 1 : 1 + samples],
-        load=SimpleNamespace(bodies=np.array([[1.0, 2.0, 3.0]])),
+        bodies=np.array([[1.0, 2.0, 3.0]]),
     )  # fmt: skip
     assert REDUCTIONS["flips"].compute(solved, {"samples": 4}).tolist() == [2]  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness.ensembles.axes import axis_of
-from pyharness.ensembles.loads import loads
+from pyharness.ensembles.batches import batches
 from pyharness.ensembles.sweep import points, spread
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
@@ -75,7 +75,7 @@ def test_chunks_cover_the_grid_once_and_hold_one_listing(tmp_path: Path) -> None
     count = np.zeros(sweep.shape, dtype=int)
     for chunk in range(sweep.n_chunks):
         count[sweep.box(chunk)] += 1
-        (held,) = {load.listing for _, load in loads(sweep, points(sweep, sweep.box(chunk)))}
+        (held,) = {batch.listing for _, batch in batches(sweep, points(sweep, sweep.box(chunk)))}
         assert held is not None
     assert (count == 1).all()
 
@@ -99,7 +99,7 @@ def test_words_along_one_dimension_go_together(tmp_path: Path) -> None:
     """The four-term program has no DO variable: across each other, the two are refused."""
     sweep = read_sweep(written(tmp_path, READINGS))
     where = points(sweep, tuple(slice(0, n) for n in sweep.shape))
-    listings = [load.listing for _, load in loads(sweep, where)]
+    listings = [batch.listing for _, batch in batches(sweep, where)]
     assert [(each.program, set(each.readings)) for each in listings if each] == [
         ("four-term", set()),
         ("runge-kutta", {"do-variable"}),
@@ -115,9 +115,9 @@ def test_height_and_longitude_go_over_the_sphere(tmp_path: Path) -> None:
         '[[axis]]\nfield = "omega.magnitude"\nvalues = [10.0]',
     )
     sweep = read_sweep(written(tmp_path, text(*axes)))
-    ((_, load),) = loads(sweep, points(sweep, tuple(slice(0, n) for n in sweep.shape)))
+    ((_, batch),) = batches(sweep, points(sweep, tuple(slice(0, n) for n in sweep.shape)))
     wanted = [[0.0, 0.0, -10.0], [0.0, 0.0, -10.0], [8.0, 0.0, 6.0], [0.0, 8.0, 6.0]]
-    assert np.abs(load.omega0 - wanted).max() < 1e-14
+    assert np.abs(batch.omega0 - wanted).max() < 1e-14
 
 
 def test_sample_reaches_the_ends_of_any_grid(tmp_path: Path) -> None:
@@ -150,15 +150,14 @@ def test_every_body_of_the_square_is_real_and_as_asked(tmp_path: Path) -> None:
     other = SQUARE.replace("square.1", "square.2").replace("0.2", "0.0")
     sweep = read_sweep(written(tmp_path, text(SQUARE, other, TILT)))
     where = points(sweep, sweep.box(0))
-    ((_, load),) = loads(sweep, where)
-    assert load.moments is not None
-    low, middle, high = load.moments.T
+    ((_, batch),) = batches(sweep, where)
+    low, middle, high = batch.arrays["moments"].T
     assert (low <= middle).all()
     assert (middle <= high).all()
     assert (high <= low + middle + 1e-12).all()
     assert np.allclose(high, 3.0)
     tilts = sweep.axes[2].coordinates()[where[2]]
-    found = np.arccos(load.omega0[:, 1] / np.linalg.norm(load.omega0, axis=1))
+    found = np.arccos(batch.omega0[:, 1] / np.linalg.norm(batch.omega0, axis=1))
     assert np.allclose(found, tilts, atol=1e-7)
 
 
@@ -171,16 +170,17 @@ def test_fields_reach_the_scenes(tmp_path: Path) -> None:
         '[[axis]]\nfield = "tolerance"\nvalues = [1e-6, 1e-9]',
     ]
     sweep = read_sweep(written(tmp_path, text(*axes)))
-    found = list(loads(sweep, points(sweep, sweep.box(0))))
-    assert [load.solver.tolerance for _, load in found] == [1e-9, 1e-6]
-    load = found[0][1]
-    assert load.n_scenes == 8
-    assert load.moments is not None
-    assert load.torque_constant is not None
-    assert sorted({tuple(row) for row in load.moments.tolist()}) == [(0.75, 2, 3), (1.5, 2, 3)]
-    assert sorted(set(load.torque_constant[:, 1])) == [0.0, 3.0]
-    assert (load.omega0 == [0.0, 2.0, 0.0]).all()
-    assert sorted(set(load.t_end)) == [-2.0, 1.0]
+    found = list(batches(sweep, points(sweep, sweep.box(0))))
+    assert [batch.solver.tolerance for _, batch in found] == [1e-9, 1e-6]
+    batch = found[0][1]
+    assert len(batch.omega0) == 8
+    assert sorted({tuple(row) for row in batch.arrays["moments"].tolist()}) == [
+        (0.75, 2, 3),
+        (1.5, 2, 3),
+    ]
+    assert sorted(set(batch.arrays["torque_constant"][:, 1])) == [0.0, 3.0]
+    assert (batch.omega0 == [0.0, 2.0, 0.0]).all()
+    assert sorted(set(batch.t_end)) == [-2.0, 1.0]
 
 
 def test_scene_may_be_a_file_beside_and_is_part_of_the_fingerprint(tmp_path: Path) -> None:

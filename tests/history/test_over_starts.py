@@ -1,7 +1,6 @@
 """Claims over many starts have the verdicts of the ledger, start by start."""
 
-from dataclasses import dataclass, replace
-from types import SimpleNamespace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from pyharness.history.claims.ledger import claim, outcome
 from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, JUDGED, SILENT
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
-from pyharness.model.listing import corrected, original, subset
+from pyharness.methods.batch import Batch, Solver
+from pyharness.model.listing import Listing, corrected, original, subset
 from pyharness.model.scene import Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
@@ -31,20 +31,14 @@ def _random(n: int) -> list[Triple]:
 STARTS = [*starts(), *_random(20)]
 
 
-@dataclass(eq=False)
-class _Solved:
-    """What a sweep hands over."""
-
-    load: Any
-    omega0: Array
-
-
-def _solved(omega0: list[Triple] | Array, listing: Any, steps: int = 100, **more: Any) -> Any:
-    nothing = dict.fromkeys(["moments", "coefficients", "torque_constant", "torque_rate"])
-    solver = SimpleNamespace(lipschitz=500.0, may_stop=True)
+def _solved(
+    omega0: list[Triple] | Array, listing: Listing | None, steps: int = 100, **more: Any
+) -> Batch:
+    """Return what a sweep hands over."""
     scene = replace(case_scene(4), steps=steps)
-    load = {"scene": scene, "listing": listing, "solver": solver, **nothing, **more}
-    return _Solved(SimpleNamespace(**load), np.array(omega0))
+    starts = {"omega0": np.array(omega0)}
+    batch = Batch(scene, Solver(), listing, np.full(len(omega0), 1.0), starts)
+    return replace(batch, **more)
 
 
 def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[int]:
@@ -90,10 +84,11 @@ def test_verdicts_are_those_of_the_ledger_elsewhere(identity: str) -> None:
 
 def test_silent_of_what_the_thesis_does_not_speak_of() -> None:
     listing = original("runge-kutta")
+    starts = np.array(STARTS)
     others = [
-        _solved(STARTS, listing, moments=np.ones((len(STARTS), 3))),
+        _solved(STARTS, listing, arrays={"omega0": starts, "moments": np.ones((len(STARTS), 3))}),
         _solved(STARTS, listing, scene=replace(case_scene(4), step_size=0.02)),
-        _solved(STARTS, listing, solver=SimpleNamespace(lipschitz=600.0, may_stop=True)),
+        _solved(STARTS, listing, solver=Solver(lipschitz=600.0)),
         _solved(STARTS, subset("runge-kutta", fix=["stage-base"])),
         _solved(STARTS, None),
     ]

@@ -11,7 +11,7 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
 from pyharness.cli.main import main
-from pyharness.ensembles.sweep import Solver
+from pyharness.methods.batch import Solver
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
 from pyharness.methods.solver import PREPARED

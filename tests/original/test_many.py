@@ -131,6 +131,9 @@ def test_stops_of_the_thesis() -> None:
         torque_constant=[case.torque.constant for case in cases],
     )  # fmt: skip
     assert (found.n_rows[1], found.status[1], found.stop_variable[1]) == (25, 1, 5)
+    assert found.ended[1] == "stopped"
+    assert not found.has_result[1]
+    assert repr(found).startswith("ProgramEnsemble(omega=<float64 (3, 3, 3)>, status=")
     assert found.stop_quotient[1] > 500.0
     np.testing.assert_array_equal(np.isnan(found.omega[1, :, 0]), [False, True, True])
     for number, scene in enumerate(cases):

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from pyharness.bench import report as reports
-from pyharness.bench.contenders import Contender, own
-from pyharness.bench.ensemble_contenders import EnsembleContender
+from pyharness.bench.contenders import Contender, SceneContender, own
 from pyharness.bench.measure import Refusal, measure, workloads
-from pyharness.bench.peers import installed, peers
+from pyharness.bench.peers import peers
 from pyharness.bench.random_loads import random_load
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import SCENES, check_count
@@ -18,7 +17,7 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene_file import case_numbers
 from pyharness.scenes.random_scenes import weekly_seed
 
-_Named = TypeVar("_Named", Contender, EnsembleContender)
+_Named = TypeVar("_Named", bound=Contender)
 # Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
@@ -59,15 +58,7 @@ def run(options: argparse.Namespace) -> int:
             raise InputError(f"--horizon: {horizon:g}; allowed: above 0, up to {_LONGEST:g}")
     methods = chosen(own(), options.methods, "method", "--methods", options.attitude)
     others = chosen(peers(), options.peers, "peer", "--peers", options.attitude)
-    missing = [each for each in others if not installed(each)]
-    if missing and options.peers is not None:
-        raise InputError(
-            f"--peers: {missing[0].name} needs {missing[0].package}, which is not installed: "
-            + install_command("peers")
-        )
-    contenders = methods + [each for each in others if each not in missing]
-    if not contenders:
-        raise InputError("bench: no method and no peer is left; name one")
+    contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)
     if count:
         loads = []
@@ -82,14 +73,32 @@ def run(options: argparse.Namespace) -> int:
     if not found.rows:
         told = "; ".join(reports.not_measured(found))
         raise InputError(f"bench: nothing could be measured: {told}")
-    absent = f"not installed: {install_command('peers')}"
     found.refused.extend(
-        Refusal(load, each.name, None, absent) for each in missing for load in loads
+        Refusal(load, each.name, None, _absent()) for each in missing for load in loads
     )
     those = chosen(peers(), None, "peer", "--peers", options.attitude)
     packages = sorted({each.package for each in those} - {"", "scipy"})
     shared.show(reports.bench_report(found, packages, _again(options)), options)
     return 0
+
+
+def _present(
+    methods: Sequence[_Named], others: Sequence[_Named], named: bool
+) -> tuple[list[_Named], list[_Named]]:
+    """Return who takes part, and the peers that are missing; InputError for one that is named."""
+    missing = [each for each in others if not each.is_installed]
+    if missing and named:
+        raise InputError(
+            f"--peers: {missing[0].name} needs {missing[0].package}, which is {_absent()}"
+        )
+    contenders = [*methods, *(each for each in others if each.is_installed)]
+    if not contenders:
+        raise InputError("bench: no method and no peer is left; name one")
+    return contenders, missing
+
+
+def _absent() -> str:
+    return f"not installed: {install_command('peers')}"
 
 
 def _count(options: argparse.Namespace) -> int:
@@ -107,12 +116,12 @@ def _count(options: argparse.Namespace) -> int:
 
 
 def chosen(
-    contenders: Sequence[Contender],
+    contenders: Sequence[SceneContender],
     text: str | None,
     what: str,
     where: str,
     attitude: bool = False,
-) -> list[Contender]:
+) -> list[SceneContender]:
     """Return the contenders named, by their own name or their package; all where none are.
 
     Where the `attitude` is asked for, who is named must carry it; where it is not, omega alone.
@@ -130,8 +139,8 @@ def chosen(
 
 def _again(options: argparse.Namespace) -> str:
     """Return the command that makes the page again."""
-    command = "pyharness bench"
-    for name in ("case", "horizon", "random", "seed", "methods", "peers"):
+    command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
+    for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
         value = getattr(options, name)
         command += f" --{name} {shlex.quote(value)}" if value is not None else ""
     command += " --attitude" if options.attitude else ""
@@ -159,7 +168,7 @@ def _ensemble(options: argparse.Namespace) -> int:
     from pyharness.bench.ensemble_contenders import draw, own_ensembles
     from pyharness.bench.ensemble_growth import memory, sizes
     from pyharness.bench.ensemble_measure import measure_ensembles
-    from pyharness.bench.ensemble_peers import ensemble_peers, is_installed
+    from pyharness.bench.ensemble_peers import ensemble_peers
 
     shared.refuse(
         options, "--ensemble", ["case", "horizon", "random", "attitude", "plan", "growth"]
@@ -167,28 +176,21 @@ def _ensemble(options: argparse.Namespace) -> int:
     n = _BODIES if options.bodies is None else shared.whole(options.bodies, "--bodies")
     if not 1 <= n <= _MOST_BODIES:
         raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")
-    seed = shared.chosen_seed(options) or weekly_seed()
+    options.bodies, options.seed = str(n), shared.chosen_seed(options) or weekly_seed()
     those = ensemble_peers()
     methods = named(own_ensembles(), options.methods, "method", "--methods")
     others = named(those, options.peers, "peer", "--peers")
-    contenders = methods + [each for each in others if is_installed(each)]
-    if not contenders:
-        raise InputError("bench: no method and no peer is left; name one")
+    contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)
-    rates = measure_ensembles(draw(seed, n), contenders, seed, shared.progress)
-    missing = [each for each in others if not is_installed(each)]
-    rates.refused.extend(("", each.name, "not installed") for each in missing)
+    loads = draw(options.seed, n)
+    rates = measure_ensembles(loads, contenders, options.seed, shared.progress)
+    rates.refused.extend(("", each.name, _absent()) for each in missing)
     # A hundred times as many as above, and what memory ten times as many take.
-    growth = sizes(seed, min(100 * n, _MOST_GROWN), shared.progress)
+    growth = sizes(options.seed, min(100 * n, _MOST_GROWN), shared.progress)
     found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
     shared.progress("")
     packages = sorted({each.package for each in those} - {"", "numpy"})
-    command = f"pyharness bench --ensemble --bodies {n} --seed {shlex.quote(seed)}"
-    for name in ("methods", "peers"):
-        value = getattr(options, name)
-        command += f" --{name} {shlex.quote(value)}" if value is not None else ""
-    report = ensembles.ensemble_report(found, packages, command + " --format markdown")
-    shared.show(report, options)
+    shared.show(ensembles.ensemble_report(found, packages, _again(options)), options)
     return 0
 
 

@@ -23,7 +23,7 @@ OPTIONS = {
     "--executor E": f"{', '.join(EXECUTORS)} (default: here)",
     "--workers N": "processes, of processes and dask (default: as many as processors)",
     "--scheduler ADDRESS": "of a Dask cluster, as in tcp://host:8786 (default: one of our own)",
-    "--quantity NAME": "the reduction to draw (default: the file's picture, or the first)",
+    "--quantity NAME": "the reduction to draw (default: the first)",
     **{key: told for key, told in shared.outputs().items() if key != "--out FILE"},
 }
 
@@ -68,13 +68,9 @@ def run(options: argparse.Namespace) -> int:
         shared.progress("")
         report = sweep_report(store, outcome, options.out)
         if quantity is not None:
-            from pyharness.ensembles.atlas import atlas_picture
             from pyharness.ensembles.picture import sweep_picture
 
-            draw = partial(sweep_picture, store, quantity)
-            if sweep.picture and options.quantity is None:
-                draw = partial(atlas_picture, store)
-            report = report._replace(pictures={"sweep": draw})
+            report = report._replace(pictures={"sweep": partial(sweep_picture, store, quantity)})
         shared.show(report, shown)
     return 0
 

@@ -8,7 +8,7 @@ function that a sweep calls.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, lru_cache, partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,10 @@ from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, march_models
 from pyharness.history.claims.ledger import claim, claims
 from pyharness.history.claims.rules import Runs
+from pyharness.methods.batch import Batch
 from pyharness.methods.many import solve_many
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
@@ -28,6 +28,8 @@ from pyharness.original.many import run_many
 from pyharness.scenes.rotated import shifted
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
+# Arrays of a batch that say what the cases of Table 1 do.
+_OF_CASES = {"moments", "coefficients", "torque_constant", "torque_rate"}
 _EFFORT = 1e9  # of a sweep, whose time was told before
 
 
@@ -109,76 +111,32 @@ class Starts:
         return self._shaped(case, rows)
 
 
-class Chosen(Protocol):
-    """What solves the scenes of a sweep."""
-
-    @property
-    def lipschitz(self) -> float:
-        """Constant of the stop test, 1/s."""
-
-    @property
-    def may_stop(self) -> bool:
-        """Whether it may end runs."""
-
-
-class Load(Protocol):
-    """Scenes of a sweep; an array is None where the scene says it for all."""
-
-    @property
-    def scene(self) -> Scene:
-        """What they have in common."""
-
-    @property
-    def listing(self) -> Listing | None:
-        """Of a program; None for a method."""
-
-    @property
-    def solver(self) -> Chosen:
-        """How it runs."""
-
-    moments: Array | None
-    coefficients: Array | None
-    torque_constant: Array | None
-    torque_rate: Array | None
-
-
-class Solved(Protocol):
-    """What a sweep hands over: n scenes."""
-
-    load: Any
-    omega0: Array
-
-    def __hash__(self) -> int:
-        """Tell one from another."""
-
-
 JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))
 """The claims that have a rule over starts."""
 FUNCTIONS = {name: f"{__name__}:{name}" for name in JUDGED}
 """Where the function of each stands, for a sweep."""
 
 
-def __getattr__(name: str) -> Callable[[Solved], NDArray[np.int8]]:
+def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
     if name not in JUDGED:
         raise AttributeError(name)
     return partial(codes, name)
 
 
-def codes(identity: str, solved: Solved) -> NDArray[np.int8]:
+def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     """Return for each start of a sweep whether a claim holds of the programs.
 
     Silent where the sweep is of no case of Table 1, or varies more of it than starts, readings and
     steps. Of the case a claim is about nothing is asked: it is the claim's own.
     """
-    load: Load = solved.load
     entry = claim(identity)
-    chosen = Assumptions(readings=frozenset(load.listing.readings if load.listing else ()))
+    chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
     if "steps" in entry["assumptions"]:
-        chosen = replace(chosen, steps=load.scene.steps)
-    one = _laboratory(load, chosen)
+        chosen = replace(chosen, steps=batch.scene.steps)
+    one = _laboratory(batch, chosen)
     if one is None:
-        return np.full(len(solved.omega0), SILENT, np.int8)
-    return judged(entry, _bench(one, solved), len(solved.omega0))
+        return np.full(len(batch.omega0), SILENT, np.int8)
+    return judged(entry, _bench(one, batch), len(batch.omega0))
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
@@ -189,25 +147,24 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 
 
 @lru_cache(maxsize=2)
-def _bench(one: Laboratory, solved: Solved) -> Starts:
+def _bench(one: Laboratory, batch: Batch) -> Starts:
     # Two: of the steps asked for, and of those of claims that do not hang on them.
-    return Starts(one, solved.omega0)
+    return Starts(one, batch.omega0)
 
 
-def _laboratory(load: Load, assumptions: Assumptions) -> Laboratory | None:
+def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
     """Return where claims about a sweep are tested; None where they say nothing of it."""
-    varied = (load.moments, load.coefficients, load.torque_constant, load.torque_rate)
-    if load.listing is None or any(each is not None for each in varied):
+    if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None
     deck = facts("cases")["deck"]
-    if load.solver.lipschitz != deck["lipschitz"] or not load.solver.may_stop:
+    if batch.solver.lipschitz != deck["lipschitz"] or not batch.solver.may_stop:
         return None
     about = [_without_start(case_scene(case)) for case in range(1, 8)]
-    if _without_start(load.scene) not in about:
+    if _without_start(batch.scene) not in about:
         return None
     for is_original in (True, False):
         one = Laboratory(is_original, assumptions)
-        if one.listing(load.listing.program) == load.listing:
+        if one.listing(batch.listing.program) == batch.listing:
             return one
     return None
 

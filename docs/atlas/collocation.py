@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.ensembles.atlas_maps import region_panels, thinned, values_of
+from docs.atlas.maps import region_panels, thinned, values_of
 from pyharness.ensembles.store import Store
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers

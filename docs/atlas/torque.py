@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.ensembles.atlas_maps import COLORS, nearest, square_map, square_rows, values_of
+from docs.atlas.maps import COLORS, nearest, square_map, square_rows, values_of
 from pyharness.ensembles.store import Store
 from pyharness.model.report import Picture, numbers
 from pyharness.model.trajectory import Array

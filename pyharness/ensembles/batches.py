@@ -1,57 +1,19 @@
-"""Loads: scenes of a sweep that one call solves, as arrays."""
+"""The batches of a sweep: scenes that one call solves, as arrays."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pyharness.ensembles.fields import CHOICES, NUMBERS
-from pyharness.ensembles.sweep import Indices, Solver, Sweep, groups, value_columns
+from pyharness.ensembles.sweep import Indices, Sweep, groups, value_columns
+from pyharness.methods.batch import OF_PROGRAMS, Batch
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 Columns = dict[str, Array]
-# What programs take as arrays.
-_OF_PROGRAMS = ("step_size", "lipschitz")
-
-
-@dataclass(frozen=True, eq=False)
-class Load:
-    """Scenes that share what solves them; an array is None where the scene says it for all.
-
-    `scene` has their steps, `listing` is None for a method. Step sizes and Lipschitz constants are
-    arrays for programs alone.
-    """
-
-    scene: Scene
-    solver: Solver
-    listing: Listing | None
-    omega0: Array  # (n, 3)
-    t_end: Array  # (n,)
-    moments: Array | None = None
-    coefficients: Array | None = None
-    torque_constant: Array | None = None
-    torque_rate: Array | None = None
-    step_size: Array | None = None  # (n,)
-    lipschitz: Array | None = None  # (n,)
-
-    @property
-    def step_sizes(self) -> Array:
-        """Step sizes, (n,)."""
-        one = np.full(self.n_scenes, self.scene.step_size)
-        return one if self.step_size is None else self.step_size
-
-    @property
-    def bodies(self) -> Array:
-        """Moments, (n, 3), or (1, 3) where all have the same."""
-        return np.array([self.scene.moments]) if self.moments is None else self.moments
-
-    @property
-    def n_scenes(self) -> int:
-        """How many scenes."""
-        return len(self.omega0)
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
@@ -66,24 +28,24 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the fields of which a load has one value."""
+    """Return the fields of which all scenes of a batch have the same value."""
     fields = [axis.field for axis in sweep.axes]
     found = [name for name in fields if name in CHOICES or NUMBERS[name].looped]
-    of_arrays = () if sweep.solver.program is None else _OF_PROGRAMS
+    of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
     return [name for name in found if name not in of_arrays]
 
 
-def loads(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Load]]:
-    """Yield which of the scenes a load has, and the load."""
+def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
+    """Yield which of the scenes a batch has, and the batch."""
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
     for members, values in groups([columns[name] for name in looped], len(where[0])):
         own = {name: c[members] for name, c in columns.items() if name not in looped}
         shared: dict[str, Any] = dict(zip(looped, values, strict=True))
-        yield members, _load(sweep, shared, own, len(members))
+        yield members, _batch(sweep, shared, own, len(members))
 
 
-def _load(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Load:
+def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     scene = sweep.scene
     if "step_size" in shared or "steps" in shared:
         step_size = float(shared.pop("step_size", scene.step_size))
@@ -99,18 +61,15 @@ def _load(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Load:
         t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
     body, values = _body(scene, own, n)
     law = scene.torque
-    return Load(
-        scene,
-        solver,
-        listing,
-        omega0=_omega(scene, own, values if body == "moments" else None, n),
-        t_end=t_end,
-        torque_constant=_three("torque.constant", law.constant, own, n),
-        torque_rate=_three("torque.rate", law.rate, own, n),
-        step_size=own.get("step_size"),
-        lipschitz=own.get("lipschitz"),
-        **({body: values} if body else {}),
-    )
+    found = {
+        "omega0": _omega(scene, own, values if body == "moments" else None, n),
+        "torque_constant": _three("torque.constant", law.constant, own, n),
+        "torque_rate": _three("torque.rate", law.rate, own, n),
+        **{name: own.get(name) for name in OF_PROGRAMS},
+        body: values,
+    }
+    arrays = {name: array for name, array in found.items() if array is not None}
+    return Batch(scene, solver, listing, t_end, arrays)
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.ensembles.atlas_maps import region_panels, thinned, values_of
-from pyharness.ensembles.loads import loads
+from docs.atlas.maps import region_panels, thinned, values_of
+from pyharness.ensembles.batches import batches
 from pyharness.ensembles.store import Store
 from pyharness.ensembles.sweep import Sweep
 from pyharness.methods.linearised import jacobians
@@ -14,7 +14,7 @@ from pyharness.methods.solve import solve
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array
 from pyharness.theory.regions import regions
@@ -93,13 +93,9 @@ def case_scenes(sweep: Sweep) -> list[Scene]:
     cases = {(s.moments, s.omega, s.torque): f"Case {number}" for number in case_numbers()
              if (s := case_scene(number))}  # fmt: skip
     found = []
-    for _, load in loads(sweep, where):
-        for i in range(load.n_scenes):
-            first, second, third = map(float, load.bodies[i % len(load.bodies)])
-            constant = load.torque_constant
-            law = TorqueLaw() if constant is None else TorqueLaw(tuple(map(float, constant[i])))
-            scene = replace(load.scene, moments=(first, second, third), omega=tuple(load.omega0[i]),
-                            torque=law, step_size=float(load.step_sizes[i]))  # fmt: skip
+    for _, batch in batches(sweep, where):
+        for i in range(len(batch.omega0)):
+            scene = batch.scene_of(i)
             name = cases.get((scene.moments, scene.omega, scene.torque), f"body {i + 1}")
             found.append(replace(scene, name=name))
     return found

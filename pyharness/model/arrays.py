@@ -1,0 +1,138 @@
+"""Arrays of many bodies: checked and counted, with one set of messages for all that take them."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.errors import InputError, kind_of
+from pyharness.model.trajectory import Array
+from pyharness.model.values import number, whole
+
+_MOST_THREADS = 1024
+_REAL = "iuf"
+# A test of each number, and what it allows.
+Rule = tuple[Callable[[Array], NDArray[np.bool_]], str]
+
+ABOVE_ZERO: Rule = (
+    lambda x: np.isfinite(x) & (x > 0.0), "a finite number above 0",
+)  # fmt: skip
+FINITE: Rule = np.isfinite, "finite numbers"
+FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
+
+
+def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
+    """Return an array with a row of `shape` for each body, or one row that all bodies share.
+
+    A letter in `shape` stands for any length. InputError, which begins with `where`, for another
+    shape and for what is no real number; with a `rule` for the first number that breaks it.
+    """
+    found = numbers_of(where, values)
+    own = found.shape[-len(shape) :] if shape else ()
+    spare = found.ndim - len(shape)
+    if spare not in (0, 1) or (own != shape and not _fits(own, shape)):
+        one, many = ", ".join(map(str, shape)), ", ".join(map(str, ("n", *shape)))
+        allowed = f"({one}{',' * (len(shape) == 1)}) or ({many})" if shape else "one number or (n,)"
+        raise InputError(f"{where}: shape {found.shape}; allowed: {allowed}")
+    if rule is not None:
+        _check_rule(where, found, rule)
+    return np.ascontiguousarray(found.reshape(-1, *own))
+
+
+def numbers_of(where: str, values: object) -> Array:
+    """Return an array of float64 of any shape; InputError where it holds anything but real numbers.
+
+    Fractions, decimals, and whole numbers beyond 64 bits are real numbers too.
+    """
+    try:
+        found = np.asarray(values)
+    except Exception as error:  # rows of different lengths, or a class of the user's
+        raise InputError(
+            f"{where}: {kind_of(values)} that is no array of numbers; allowed: rows of one length"
+        ) from error
+    if found.dtype == np.float64:
+        return found
+    if found.dtype.kind == "O":
+        floats = [number(where, each) for each in found.flat]
+        return np.array(floats).reshape(found.shape)
+    if found.dtype.kind not in _REAL:
+        first = found.flat[0] if found.size else values
+        raise InputError(f"{where}: {kind_of(first)} where a number belongs")
+    with np.errstate(over="ignore"):
+        return found.astype(np.float64, copy=False)
+
+
+def waves_of(where: str, values: object) -> Array:
+    """Return waves of torque, shape (n, k, 4): three amplitudes and a frequency each."""
+    found = numbers_of(where, values)
+    return rows_of(where, found, "k", 4) if found.size else np.empty((1, 0, 4))
+
+
+def count_bodies(rows: Mapping[str, Array]) -> int:
+    """Return the number of bodies; InputError for an array with neither one row nor that many."""
+    counts = {len(each) for each in rows.values()}
+    n = 0 if 0 in counts else max(counts, default=1)
+    if not counts <= {1, n}:
+        for name, each in rows.items():
+            check_rows(name, each, n)
+    return n
+
+
+def check_rows(name: str, array: Array, n: int) -> None:
+    """Refuse an array with neither one row nor as many as there are bodies."""
+    if len(array) not in (1, n):
+        raise InputError(
+            f"{name}: {len(array)} rows; allowed: 1, or as many as there are bodies, {n}"
+        )
+
+
+def row_of(array: Array, i: int) -> Any:
+    """Return the row of a body, which may be that of all."""
+    return array[0 if len(array) == 1 else i]
+
+
+def only_one(given: Mapping[str, object]) -> str:
+    """Return which of some arguments is given, nothing for none; InputError for several."""
+    names = [name for name, value in given.items() if value is not None]
+    if len(names) > 1:
+        raise InputError(f"{' and '.join(names)} are both given; allowed: one of them")
+    return names[0] if names else ""
+
+
+def threads_of(threads: object) -> int:
+    """Return a number of threads; InputError where it is none."""
+    found = whole("threads", threads)
+    if not 1 <= found <= _MOST_THREADS:
+        raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
+    return found
+
+
+def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
+    """Return an array that a kernel can write to; InputError for any other."""
+    right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
+    if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
+        raise InputError(
+            f"{where}: allowed: a writable array of {np.dtype(kind)}, shape {shape}, in one piece"
+        )
+    return array
+
+
+def spread(rows: Array, n: int) -> Array:
+    """Return an array with a row for each of n bodies, in one piece."""
+    if len(rows) == n:
+        return rows
+    return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
+
+
+def _fits(own: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
+    return all(isinstance(want, str) or have == want for have, want in zip(own, shape, strict=True))
+
+
+def _check_rule(where: str, values: Array, rule: Rule) -> None:
+    holds, allowed = rule
+    good = holds(values)
+    if not good.all():
+        place = np.unravel_index(int(np.argmin(good)), values.shape)
+        index = "".join(f"[{each}]" for each in place)
+        raise InputError(f"{where}{index} is {values[place]:g}; allowed: {allowed}")

@@ -1,0 +1,40 @@
+"""The result of a batch: what solvers and programs have in common."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.extension import ENDS
+from pyharness.model.shown import short_repr
+from pyharness.model.trajectory import WITH_ALL_ROWS, Array
+
+_RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BatchResult:
+    """The angular velocities of n bodies, and how the computation of each ended.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (n, ..., 3)
+        Angular velocity about the body axes, rad/s; NaN where there is no result.
+    status : ndarray of int8, shape (n,)
+        A code of `pyharness.model.codes.Statuses` for each body.
+    """
+
+    omega: Array
+    status: NDArray[np.int8]
+
+    __repr__ = short_repr
+
+    @property
+    def ended(self) -> NDArray[np.str_]:
+        """How each body ended, in words: complete, sensitive, stopped, overflow, refused, ..."""
+        return np.array(ENDS)[self.status]
+
+    @property
+    def has_result(self) -> NDArray[np.bool_]:
+        """Whether each body has all of its results."""
+        return np.isin(self.status, _RESULTS)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from pyharness.checks.port import Cell, port_cells
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene_file import case_numbers
-from pyharness.verify.port import Cell, port_cells
 
 ROOT = Path(__file__).parent.parent
 WEB = ROOT / "web"

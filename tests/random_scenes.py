@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness import Scene, TorqueLaw
-from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Triple, Wave
-from pyharness.model.turned_scenes import turned
+from pyharness.scenes.rescaled import scaled
+from pyharness.scenes.rotated import turned
 
 Generator = np.random.Generator
 

@@ -98,11 +98,13 @@ def called(name: str, tolerance: float | None, primed: bool = False) -> Candidat
     return Candidate(name, ready, _no_rows)
 
 
-def turning(name: str, tolerance: float | None) -> Candidate:
-    """Return a prepared solver with attitude."""
+def turning(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
+    """Return a prepared solver with attitude; `primed` as in `called`."""
 
     def ready(scene: Scene, time: float) -> Ready:
         solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)
+        if primed:
+            solver(start[::-1].copy(), 0.5 * time, (0.0, 0.0, 1.0, 0.0))
 
         def read(found: tuple[Array, Array]) -> End:
             omega, attitude = found

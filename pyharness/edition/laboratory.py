@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.checks.port_protocol import asked_scene
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, flagged, original, switches
 from pyharness.model.report import short
@@ -15,7 +16,6 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.original.printer import formats_of, page
 from pyharness.original.programs import run_program
 from pyharness.truth.reference import reference
-from pyharness.verify.port_protocol import asked_scene
 
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
 """What the page shows whose address says nothing."""

@@ -7,9 +7,9 @@ import numpy as np
 
 from pyharness.methods.problem import closed_form, known, normalized
 from pyharness.model.extension import extension
-from pyharness.model.same_motion import factor_near_one, scaled
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING
+from pyharness.scenes.rescaled import factor_near_one, scaled
 
 # Of the tolerance: rounding times growth beyond it is told of. One third either way is left to the
 # norm of the growth, and to how many differences were followed.

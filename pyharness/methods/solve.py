@@ -22,11 +22,11 @@ from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import given_back, principal
-from pyharness.model.same_motion import factor_near_one, is_ordinary, scaled, unscaled
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, number, several
 from pyharness.model.waves import with_merged_waves
+from pyharness.scenes.rescaled import factor_near_one, is_ordinary, scaled, unscaled
 
 _ROWS = ("time", "recorded_time", "omega")
 _WORST_FIRST = ("overflow", "sensitive", "complete")

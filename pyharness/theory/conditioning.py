@@ -51,15 +51,14 @@ class Conditioning:
         # What is no number allows nothing.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
-    def angle_limit(self, tolerance: float, time: float) -> float:
+    def angle_limit(self, made: float, time: float) -> float:
         """Return the error that an attitude at `time` (s) may have (rad).
 
-        A tolerance is kept as it stands up to a growth of `LIVELY`, and omega may err by its
-        rounding all the way.
+        `made` is what a method makes of its tolerance; omega may have an error of its rounding all
+        the way.
         """
-        kept = tolerance * (self.amplification if self.amplification > LIVELY else 1.0)
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
-        return kept + turned + ATTITUDE
+        return made + turned + ATTITUDE
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:

@@ -8,20 +8,20 @@ from typing import Any, Never
 import numpy as np
 import pytest
 
+from pyharness.checks.plants.planted_twins import plant_in_twin
 from pyharness.compare import orders
 from pyharness.compare.comparison import compare_programs
 from pyharness.compare.orders import Order, measured_order, order_of
 from pyharness.compare.report import comparison_report
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, corrected
-from pyharness.model.same_motion import scaled
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
+from pyharness.scenes.rescaled import scaled
 from pyharness.theory.conditioning import ROUNDING
 from pyharness.truth.reference import reference
-from pyharness.verify.plants.planted_twins import plant_in_twin
 from pyharness.views.render import render
 
 

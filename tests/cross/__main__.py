@@ -10,8 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from pyharness.compare.checks import Check
-from pyharness.compare.checks_report import checks_report, summary
+from pyharness.checks.check import Check, Name
+from pyharness.checks.report import checks_report, summary
 from pyharness.model.facts import facts
 from pyharness.views.render import render
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
@@ -35,8 +35,8 @@ CALLING = (
     "tests/model",
     "tests/original",
     "tests/compare/test_candidates.py",
-    "tests/stress/test_motions.py::test_bounds_hold",
-    "tests/stress/test_run.py::test_bounds_hold",
+    "tests/checks/test_motions.py::test_bounds_hold",
+    "tests/checks/test_stress.py::test_bounds_hold",
     # Every digest has been computed by then, with traps where there are any.
     "--deselect=tests/original/test_programs.py::test_every_cell_agrees",
     "--deselect=tests/original/test_programs.py::test_nasty_scenes_agree",
@@ -136,7 +136,7 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     try:
         tree = make(build, FOLDER)
     except RuntimeError as error:
-        yield Check(f"build/{name}", False, None, None, replay, str(error))
+        yield Check(Name("build", name), False, None, None, str(error), replay)
         return
     built = time.monotonic()
     if build.faulty:
@@ -146,11 +146,11 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     arguments = ["-m", "tests.cross.digests", "fortran", "digests.json"]
     done = _run(tree, arguments, traps=build.checked)
     if done.returncode:
-        yield Check(f"build/{name}", False, None, None, replay, done.stdout[-1000:])
+        yield Check(Name("build", name), False, None, None, done.stdout[-1000:], replay)
         return
     record = json.loads((tree / "digests.json").read_text())
     wrong = false_claims(build, tree, record)
-    yield Check(f"build/{name}", not wrong, None, None, replay, "; ".join(wrong))
+    yield Check(Name("build", name), not wrong, None, None, "; ".join(wrong), replay)
     entries = facts("divergences")["divergence"]
     listed = {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
     # A compiler may have fewer words.
@@ -163,7 +163,7 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     if build.contract != "off":
         seen = sum(not check.passed for check in bits)
         note = f"{seen} of {len(bits)} cells differ" if seen else "the comparison sees no fault"
-        yield Check("fault/contraction", seen > 0, None, None, replay, note)
+        yield Check(Name("fault", "contraction"), seen > 0, None, None, note, replay)
     else:
         yield from bits
     compared_at = time.monotonic()
@@ -198,7 +198,7 @@ def _suite(build: Build, tree: Path) -> Check:
         died = [line for line in lines if "Fortran runtime error" in line or ", untold" in line]
         words = [*failed, *died] or lines[-3:]
         note = "; ".join([*(each[:300] for each in words), f"see {log.relative_to(ROOT)}"])
-    return Check(f"tests/{name}", done.returncode == 0, None, None, replay, note)
+    return Check(Name("tests", name), done.returncode == 0, None, None, note, replay)
 
 
 def _faults(tree: Path) -> Iterator[Check]:
@@ -212,7 +212,7 @@ def _faults(tree: Path) -> Iterator[Check]:
         seen = done.returncode != 0 and words in done.stdout
         note = "" if seen else f"not seen: {words}\n{done.stdout[-2000:]}"
         replay = "make cross-check ARGS=faulty"
-        yield Check(f"fault/{name}", seen, None, None, replay, note)
+        yield Check(Name("fault", name), seen, None, None, note, replay)
 
 
 def _run(tree: Path, arguments: list[str], traps: bool = False) -> subprocess.CompletedProcess[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping
 
-from pyharness.compare.checks import Check
+from pyharness.checks.check import Check, Name
 from tests.cross.digests import replay
 
 
@@ -26,7 +26,7 @@ def compared(
         elif known:
             note = "a listed divergence that no longer occurs"
         again = inside(build, replay(cell))
-        yield Check(f"bits/{build}/{cell}", differs == known, None, None, again, note)
+        yield Check(Name("bits", build, cell), differs == known, None, None, note, again)
 
 
 def inside(build: str, module: str, variables: str = "") -> str:

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from pyharness import case_scene, run_program
+from pyharness.checks.port_protocol import asked_scene
 from pyharness.edition.bundle import bundle
 from pyharness.model.listing import PROGRAMS, original
-from pyharness.verify.port_protocol import asked_scene
 from tests.ports import WEB, engine
 
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, run_program
+from pyharness.checks.port_protocol import asked_scene
 from pyharness.cli.main import main
-from pyharness.compare.random_scenes import draw
 from pyharness.edition.laboratory import MOST_STEPS, context, data
 from pyharness.methods.solve import solve
 from pyharness.model.listing import PROGRAMS, names_of, subset
@@ -23,8 +23,8 @@ from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.printer import page
+from pyharness.scenes.random_scenes import draw
 from pyharness.truth.reference import reference
-from pyharness.verify.port_protocol import asked_scene
 from tests.ports import WEB, engine
 
 LABORATORY = WEB / "laboratory"

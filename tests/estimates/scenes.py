@@ -11,10 +11,10 @@ from random import Random
 
 import numpy as np
 
-from pyharness.bench.random_loads import _BODIES, _SPEEDS, _WAVES, LAWS, _drawn
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
-from pyharness.model.turned_scenes import turned
+from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
+from pyharness.scenes.rotated import turned
 from tests.estimates.truth import Truth, truth_of
 from tests.random_scenes import NASTY, triple
 
@@ -35,7 +35,7 @@ ATTITUDE, INERTIA, IN_SPACE, SEVERAL = (
     "several times",
 )
 KINDS = (
-    "all", *LAWS, *_SPEEDS, *_BODIES, *dict.fromkeys(_WAYS[:4] + _WAYS[5:]),
+    "all", *LAWS, *SPEEDS, *BODIES, *dict.fromkeys(_WAYS[:4] + _WAYS[5:]),
     *(f"rough: {name}" for name in _ROUGH), ATTITUDE, INERTIA, IN_SPACE, SEVERAL,
     "forward", "backward",
 )  # fmt: skip
@@ -137,9 +137,9 @@ def _times(source: Random, end: float) -> tuple[float, ...]:
 
 
 def _by_kind(source: Random, law: str, way: str) -> tuple[Scene, float, tuple[str, ...]]:
-    body = source.choice(list(_BODIES))
-    speed = source.choice(list(_SPEEDS)) if law in _WAVES else ""
-    scene, time = _drawn(source, "", law, speed, body)
+    body = source.choice(list(BODIES))
+    speed = source.choice(list(SPEEDS)) if law in WAVES else ""
+    scene, time = by_torque(source, "", law, speed, body)
     if way == "near the middle axis":
         start = math.hypot(*scene.omega)
         moments = scene.moments or (1.0, 1.0, 1.0)

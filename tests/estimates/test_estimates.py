@@ -13,7 +13,7 @@ from pyharness import InputError, Scene, TorqueLaw, solve
 from pyharness.model.attitude import product
 from pyharness.model.report import short
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.turned_scenes import shifted
+from pyharness.scenes.rotated import shifted
 from pyharness.truth.free_attitude import free_attitude
 from pyharness.truth.reference import reference
 from pyharness.views.table import write

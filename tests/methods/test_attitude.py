@@ -20,12 +20,12 @@ from pyharness import (
     solve,
     subset,
 )
-from pyharness.compare.random_scenes import draw
 from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.trajectory import Array, turned_to_space
+from pyharness.scenes.random_scenes import draw
 
 TURNED = (0.5, -0.1, 0.7, 0.5)
 # A spin hardly changes omega, and turns the body all the same.

@@ -17,7 +17,7 @@ from pyharness.methods.closed_form import known_solution
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
-from pyharness.stress.trials.separatrix import quarter
+from pyharness.scenes.extreme import quarter
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude
 from tests.attitude_errors import KINDS, Motion, draw, errors, largest_error

@@ -11,12 +11,12 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
 from pyharness.cli.main import main
-from pyharness.compare.random_scenes import draw
 from pyharness.methods.batch import Solver
 from pyharness.methods.plan import plan
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
 from pyharness.methods.solver import PREPARED
 from pyharness.model.listing import original
+from pyharness.scenes.random_scenes import draw
 from tests.conftest import Printed
 
 # Even numbers are bodies that exist, with a torque of any kind, that turn a few radians a second.

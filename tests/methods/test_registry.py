@@ -11,8 +11,8 @@ from pyharness import InputError, Scene, TorqueLaw, case_scene
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.errors import TimedError
-from pyharness.model.same_motion import scaled
 from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.scenes.rescaled import scaled
 
 
 def test_properties_of_the_registry_are_those_of_its_methods() -> None:

@@ -15,8 +15,8 @@ from pyharness.methods import linearised, taylor
 from pyharness.methods import solver as solver_module
 from pyharness.methods.sensitivity import closed_form_estimate, is_sensitive, motion_growth
 from pyharness.model.codes import Statuses
-from pyharness.model.same_motion import scaled, unscaled
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
+from pyharness.scenes.rescaled import scaled, unscaled
 from pyharness.truth.reference import reference
 
 BESIDE = Scene("beside the middle axis", (1e-4, 2.0, 1e-4), moments=(3.0, 2.0, 1.2))

@@ -19,7 +19,6 @@ from pyharness import (
     run_program,
     solve,
 )
-from pyharness.compare.random_scenes import draw
 from pyharness.methods.plan import plan
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
@@ -29,6 +28,7 @@ from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.inertia import principal_axes
 from pyharness.model.listing import corrected
 from pyharness.model.trajectory import Array, turned_to_space
+from pyharness.scenes.random_scenes import draw
 from pyharness.theory.conditioning import along
 from pyharness.theory.rotations import steady_rotations
 from pyharness.truth.integer_series import integer_series

@@ -10,11 +10,11 @@ import pytest
 from pyharness import InputError, Scene, TorqueLaw, case_scene, principal, read_scene
 from pyharness.model.attitude import matrices
 from pyharness.model.records import scene_record
-from pyharness.model.same_motion import scaled
 from pyharness.model.scene import most_steps
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
-from pyharness.model.turned_scenes import shifted, turned
+from pyharness.scenes.rescaled import scaled
+from pyharness.scenes.rotated import shifted, turned
 
 GOOD = """
 name = "spinning brick"

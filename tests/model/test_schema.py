@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from pyharness.checks.external_file import read_problem
+from pyharness.checks.golden import read_record
+from pyharness.checks.port_protocol import request
 from pyharness.cli.main import main
 from pyharness.cli.output import check_tree
 from pyharness.edition.report import MARK
@@ -19,9 +22,6 @@ from pyharness.model.listing import original
 from pyharness.model.scene_file import case_scene, read_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.original.vectors import OURS, answers
-from pyharness.verify.external_file import read_problem
-from pyharness.verify.golden import read_record
-from pyharness.verify.port_protocol import request
 from tests.ensembles.sweeps import TILT, text, written
 from tests.ports import engine
 

@@ -29,7 +29,7 @@ PLANTED = (
     (
         "web/programs/linear-solver.js",
         "order of operands 1: for (let i = j + 1; i < n; i++) a[i][j] = a[i][j] / a[j][j];",
-        "tests/verify/test_port_in_javascript.py::"
+        "tests/checks/test_port_in_javascript.py::"
         "test_the_javascript_has_the_twins_bits_in_random_scenes",
     ),
 )  # fmt: skip

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from pyharness.verify.kinds import KINDS
+from pyharness.checks.kinds import KINDS
 from tests.mutations.tree import PLACE, ROOT, Processes, Tree
 
 # Random draws of `verify` follow a seed; the week's would give another score each week.
@@ -21,7 +21,7 @@ SEED = "mutations"
 # run times, where a failure under load says nothing.
 NOT_HERE = ("tests/mutations/", "tests/browser/", "tests/bench/")
 # Those that most mutations need are recorded first: an interrupted recording is of use then.
-FIRST = ("methods", "model", "original", "truth", "compare", "theory", "ensembles", "verify")
+FIRST = ("methods", "model", "original", "truth", "compare", "theory", "ensembles", "checks")
 OF_ONE_FILE, UNKNOWN = 3000.0, 20.0  # s
 INSTRUMENTED = tuple(f"-D{language}_args=-finstrument-functions" for language in ("c", "fortran"))
 

@@ -17,7 +17,7 @@ from tests.mutations.tree import ROOT
 EQUIVALENT = Path(__file__).parent / "equivalent.toml"
 # What computes, judges, reads and keeps numbers. Not `cli`, `views`, `edition`, pictures and
 # reports, whose texts `tests/outputs` compares; not `bench`, whose results are run times.
-_PYTHON = ("model", "methods", "theory", "truth", "original", "compare", "verify", "stress",
+_PYTHON = ("model", "methods", "theory", "truth", "original", "compare", "checks",
            "ensembles", "history/claims")  # fmt: skip
 _FOR_READERS = re.compile(r"report|picture|sentences|__init__|facts|ledger")
 # Not `levels.c`, `levels.f90`: they choose among instruction sets of equal results; not what f2py

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pyharness.checks.port_protocol import read_answer, request
 from pyharness.cli.main import main
 from pyharness.compare.agreement import differences
 from pyharness.compare.orders import Order, measured_order
@@ -17,7 +18,6 @@ from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.original.cells import subsets
 from pyharness.original.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import Reference, reference
-from pyharness.verify.port_protocol import read_answer, request
 from tests.ports import WEB, engine
 
 ASSUMED = [

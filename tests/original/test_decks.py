@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from pyharness.checks.decks import decks
+from pyharness.checks.selection import Selection
 from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.errors import InputError
@@ -20,8 +22,6 @@ from pyharness.original.decks import (
     model_cards,
     run_deck,
 )
-from pyharness.verify.decks import decks
-from pyharness.verify.selection import Selection
 
 
 def _cards(text: str) -> dict[int, str]:
@@ -133,7 +133,7 @@ def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     # One bit of one card, and a stop that comes too late, are seen.
     for wrong in ("T3=.02", "T3=.010000000000000002"):
         monkeypatch.setattr(
-            "pyharness.verify.decks.deck_text",
+            "pyharness.checks.decks.deck_text",
             lambda *given, wrong=wrong: deck_text(*given).replace("T3=.01", wrong.ljust(6)),
         )
         failed = [check for check in decks(Selection(thin=True)) if not check.passed]
@@ -152,7 +152,7 @@ def test_page_and_records_after_the_stop_are_looked_at(
     old: str, new: str, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "pyharness.verify.decks.deck_text", lambda *given: deck_text(*given).replace(old, new)
+        "pyharness.checks.decks.deck_text", lambda *given: deck_text(*given).replace(old, new)
     )
     (check,) = decks(Selection(only=["decks/runge-kutta/case-2/original"]))
     assert not check.passed

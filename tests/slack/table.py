@@ -16,6 +16,10 @@ from unittest.mock import patch
 
 import numpy as np
 
+from pyharness.checks.plants.plants import changed, instead
+from pyharness.checks.port_process import PortError
+from pyharness.checks.stress import TRIALS, trial
+from pyharness.checks.trials import length, step_size
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.attitude import product
@@ -26,12 +30,8 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.linear_solver import SINGULAR
 from pyharness.original.vectors import Answer
-from pyharness.stress.run import TRIALS, trial
-from pyharness.stress.trials import length, step_size
 from pyharness.theory import brouwer
 from pyharness.truth.reference import Reference, reference
-from pyharness.verify.plants.plants import changed, instead
-from pyharness.verify.port_process import PortError
 
 # Half a unit in the last place of 1, and a whole one.
 U = 2.0**-53
@@ -40,21 +40,20 @@ ULP = 2.0 * U
 _RUN = "pyharness.original.programs.Program.run"
 _COMPILED = "pyharness.original.compiled.run"
 _IN_WORD = "pyharness.original.in_word.run"
-_ANSWER = "pyharness.verify.port.read_answer"
-_DECK = "pyharness.verify.decks.run_deck"
-_DRAWN = "pyharness.verify.random_methods"
+_ANSWER = "pyharness.checks.port.read_answer"
+_DECK = "pyharness.checks.decks.run_deck"
+_DRAWN = "pyharness.checks.random_methods"
 _SOLVE = "pyharness.compare.candidates.solve"
 _ANSWERED = "pyharness.compare.candidates._answered"
 _END = "pyharness.compare.candidates.Candidate.end"
-_NEAR_SEPARATRIX = "pyharness.stress.trials.separatrix.run_method"
-_HELD = "pyharness.stress.hold.run_method"
-_TURNED = "pyharness.stress.trials.invariance"
-_ATTITUDES = "pyharness.verify.attitudes.solve"
-_TURNING = "pyharness.stress.trials.attitude.solve"
-_PREPARED = "pyharness.verify.attitudes.prepare"
-_REGIONS = "pyharness.stress.trials.regions"
-_STEPS = "pyharness.stress.trials.step_size"
-_MATRICES = "pyharness.stress.trials.matrices"
+_NEAR_SEPARATRIX = "pyharness.checks.trials.separatrix.run_method"
+_HELD = "pyharness.checks.hold.run_method"
+_TURNED = "pyharness.checks.trials.invariance"
+_TURNING = "pyharness.checks.trials.attitude.solve"
+_PREPARED = "pyharness.compare.candidates.prepare"
+_REGIONS = "pyharness.checks.trials.regions"
+_STEPS = "pyharness.checks.trials.step_size"
+_MATRICES = "pyharness.checks.trials.matrices"
 
 # A room that is imported while something is planted would keep it.
 for _name in TRIALS:
@@ -105,6 +104,7 @@ class Turned:
     solver: Callable[..., tuple[Array, Array]]
     size: float
     status: str = "complete"
+    steps: int = 0
 
     def __call__(self, *given: Any) -> tuple[Array, Array]:
         """Turn what the solver gives."""
@@ -340,7 +340,7 @@ def form_for_all(
 
 
 def other_library() -> AbstractContextManager[Any]:
-    return patch("pyharness.verify.golden.mathematics", lambda: "another")
+    return patch("pyharness.checks.golden.mathematics", lambda: "another")
 
 
 def without(found: Iterator[Any] | dict[str, Any], size: float) -> Any:
@@ -381,7 +381,7 @@ def some_bits(size: float) -> AbstractContextManager[Any]:
     calls = itertools.count()
     # Seven jobs are made alone before they are made at once.
     return patch(
-        "pyharness.stress.trials.threads.bits", lambda job: bytes(7 <= next(calls) < 7 + size)
+        "pyharness.checks.trials.threads.bits", lambda job: bytes(7 <= next(calls) < 7 + size)
     )
 
 
@@ -403,7 +403,7 @@ VERIFY = (
     exact("cells/two-term/case-3/corrected", on(_COMPILED, bit_off), ULP),
     exact("random/0/program", on(_COMPILED, bit_off), ULP),
     exact("words/two-term/case-3/corrected", on(_IN_WORD, bit_off), ULP),
-    exact("words/vectors", on("pyharness.verify.words.answers", without_answer)),
+    exact("words/vectors", on("pyharness.checks.words.answers", without_answer)),
     exact("port/two-term/case-3/original", on(_ANSWER, partial(bit_off, name="rows")), ULP),
     exact("port/runge-kutta/case-2/original", refuses(_ANSWER, PortError)),
     exact("decks/two-term/case-3/original", on(_COMPILED, bit_off), ULP),
@@ -440,7 +440,7 @@ VERIFY = (
     exact("random/0/solve-taylor", on(_SOLVE, _TIME), ULP),
     exact("random/0/solve-taylor", on(_SOLVE, ended)),
     exact("random/0/solve-taylor", refuses(_SOLVE)),
-    exact("cells/two-term/case-3/corrected", refuses("pyharness.verify.programs.case_scene"),
+    exact("cells/two-term/case-3/corrected", refuses("pyharness.checks.cells.case_scene"),
           failing="cells/refused"),
     # The last step of Case 7 ends at (.25, .91, 1.08): 4 roundings of either end of it, and h times
     # 32 of the sizes of all terms of a rate, in all 2.8, .3 and .16; in collocation times the
@@ -476,16 +476,16 @@ VERIFY = (
     ),
     # The tolerance of an angle, in radians.
     *(
-        near(f"attitudes/{name}/case-{_with_form(name)}/1.0e-06", on(_ATTITUDES, turned_off), 1e-6)
+        near(f"attitudes/{name}/case-{_with_form(name)}/1.0e-06", on(_SOLVE, turned_off), 1e-6)
         for name in ("auto", "taylor", "closed-form", "dop853", "lsoda")
     ),
-    exact("attitudes/taylor/case-5/1.0e-06", refuses(_ATTITUDES)),
+    exact("attitudes/taylor/case-5/1.0e-06", refuses(_SOLVE)),
     exact("attitudes/closed-form/case-5/1.0e-06",
-          made_by(_ATTITUDES, form_for_all)),
-    exact("attitudes/taylor/case-5/1.0e-06", on(_ATTITUDES, ended)),
+          made_by(_SOLVE, form_for_all)),
+    exact("attitudes/taylor/case-5/1.0e-06", on(_SOLVE, ended)),
     near("attitudes/prepared-taylor/case-5/-1/1.0e-06", on(_PREPARED, Turned), 1e-6),
     near("attitudes/prepared-auto/case-4/3/1.0e-06", on(_PREPARED, Turned), 1e-6),
-    near("random/0/attitude-taylor", on(_ATTITUDES, turned_off), 2.65e-7),
+    near("random/0/attitude-taylor", on(_SOLVE, turned_off), 2.65e-7),
     near("random/0/attitude-prepared", on(_PREPARED, Turned), 2.65e-7),
     exact("prepared/quick/case-5/1/1.0e-06", on(_ANSWERED, partial(ended, why="gave up"))),
     *(
@@ -528,8 +528,8 @@ VERIFY = (
     # Both the record and the result may be wrong by 1e-9; where every bit counts, none.
     near("golden/taylor/case-5", on(_SOLVE, off), 2e-9),
     exact("golden/taylor/case-5", on(_SOLVE, _TIME), ULP),
-    exact("golden/taylor/case-5", on("pyharness.verify.golden.read_record", without)),
-    exact("golden/taylor", on("pyharness.verify.golden.recorded", without),
+    exact("golden/taylor/case-5", on("pyharness.checks.golden.read_record", without)),
+    exact("golden/taylor", on("pyharness.checks.golden.recorded", without),
           failing="golden/taylor/case-5-method-taylor-tolerance-1e-09"),
     # Sine and cosine of another library may differ by what rounding may do to a wave.
     near("golden/rk4/case-7", beside(other_library, on(_SOLVE, off)), 3.4e-15),
@@ -537,7 +537,7 @@ VERIFY = (
     exact("golden/two-term/case-5/corrected", on(_RUN, bit_off), ULP),
 )  # fmt: skip
 
-_SCALED = "pyharness.stress.trials.scales.run_method"
+_SCALED = "pyharness.checks.trials.scales.run_method"
 _SPHERE = "near-symmetry/{}/sphere-equal/{}"
 _FREE = f"{_TURNED}.end"
 
@@ -635,14 +635,14 @@ STRESS = (
     near("invariance/taylor/split/free/1e-06", on(_FREE, off, call=5), 1.8e-5),
     # 40 roundings, at any time; of the angular momentum those of omega too, 16 times the largest
     # over the norm.
-    near("attitude/closed-form/plate/1e-14/angle", on(_TURNING, turned_off), 40.0 * U),
+    near("attitude/closed-form/plate/1e-14/angle", on(_SOLVE, turned_off), 40.0 * U),
     near("attitude/closed-form/revolutions-1000000/tumbling/angle",
-         on(_TURNING, turned_off), 40.0 * U),
-    near("attitude/closed-form/plate/1e-14/length", on(_TURNING, longer), 8.0 * U),
-    near("attitude/closed-form/plate/1e-14/momentum", on(_TURNING, turned_off), 78.0 * U),
-    near("attitude/taylor/plate/1e-06/angle", on(_TURNING, turned_off), 1e-6),
-    near("attitude/dop853/needle/1e-06/angle", on(_TURNING, turned_off), 1e-6),
-    exact("attitude/taylor/plate/1e-06/angle", refuses(_TURNING)),
+         on(_SOLVE, turned_off), 40.0 * U),
+    near("attitude/closed-form/plate/1e-14/length", on(_SOLVE, longer), 8.0 * U),
+    near("attitude/closed-form/plate/1e-14/momentum", on(_SOLVE, turned_off), 78.0 * U),
+    near("attitude/taylor/plate/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
+    near("attitude/dop853/needle/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
+    exact("attitude/taylor/plate/1e-06/angle", refuses(_SOLVE)),
     # 2 E T/L is 37 rad here, and 8 roundings of it and of a turn beside those of the attitude.
     near("attitude/closed-form/montgomery/random-0",
          on(_TURNING, partial(turned_off, along=True)), 3.7e-14),
@@ -652,9 +652,9 @@ STRESS = (
     near("attitude/closed-form/space/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
     # What the way there errs in omega, 16 roundings that the way may amplify, turns the way back.
     near("attitude/closed-form/back/random-0", on(_TURNING, turned_off, call=2), 3.9e-12),
-    near("attitude/angles/3-1-3/1", on("pyharness.stress.trials.attitude.angles", degrees_off),
+    near("attitude/angles/3-1-3/1", on("pyharness.checks.trials.attitude.angles", degrees_off),
          64.0 * U),
-    near("attitude/angles/3-2-1/pole", on("pyharness.stress.trials.attitude.angles", degrees_off),
+    near("attitude/angles/3-2-1/pole", on("pyharness.checks.trials.attitude.angles", degrees_off),
          64.0 * U),
     exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
     exact("matrices/two-term/1e-02/bits", linear(bit_off), ULP),
@@ -700,7 +700,7 @@ STRESS = (
     Slack("step-size/rk4/case-5/crossing", crossing_off, 0.3, 0.2),
     # Where the wobble of a spin has doubled.
     near("step-size/rk4/case-4/diverges",
-         on("pyharness.stress.divergence.smallest_divergent", value_off), 0.0575),
+         on("pyharness.checks.divergence.smallest_divergent", value_off), 0.0575),
     exact("threads/linear-solver", some_bits),
 )  # fmt: skip
 

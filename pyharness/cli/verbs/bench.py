@@ -12,10 +12,10 @@ from pyharness.bench.peers import peers
 from pyharness.bench.random_loads import random_load
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import SCENES, check_count
-from pyharness.compare.random_scenes import weekly_seed
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene_file import case_numbers
+from pyharness.scenes.random_scenes import weekly_seed
 
 _Named = TypeVar("_Named", bound=Contender)
 # Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.

@@ -2,10 +2,11 @@
 
 import argparse
 
+from pyharness.checks.check import Check
+from pyharness.checks.stress import TRIALS, stress, trial, worst
+from pyharness.checks.stress_report import stress_report
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError, unknown
-from pyharness.stress.report import stress_report
-from pyharness.stress.run import TRIALS, Outcome, stress, trial, worst
 
 FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
@@ -27,17 +28,16 @@ def run(options: argparse.Namespace) -> int:
 
         check_folder(options.save, (), "--save")
 
-    outcomes: list[Outcome] = []
-    for outcome in stress(only):
-        shared.progress(f"{len(outcomes) + 1}: {outcome.check.id}")
-        outcomes.append(outcome)
+    checks: list[Check] = []
+    for check in stress(only):
+        shared.progress(f"{len(checks) + 1}: {check.id}")
+        checks.append(check)
     shared.progress("")
-    if not outcomes:
+    if not checks:
         raise unknown("check", ",".join(only), TRIALS, "--only")
-    checks = [outcome.check for outcome in outcomes]
-    failed = [outcome for outcome in outcomes if not outcome.check.passed]
+    failed = [check for check in checks if not check.passed]
     if options.save is not None:
-        _save(options.save, outcomes)
+        _save(options.save, checks)
     # One check alone is a replay: its input has been saved before.
     elif not any("/" in each for each in only):
         try:
@@ -53,15 +53,15 @@ def _chosen(only: list[str]) -> list[str]:
     return [name for name in TRIALS if name in names]
 
 
-def _save(folder: str, outcomes: list[Outcome]) -> None:
+def _save(folder: str, checks: list[Check]) -> None:
     from pyharness.cli.output import write_folder
     from pyharness.model.scene_file import scene_text
 
     files = {}
-    for name, outcome in worst(outcomes).items():
-        assert outcome.scene is not None
-        check = outcome.check
+    for name, check in worst(checks).items():
+        scene = check.name.scene
+        assert scene is not None
         comments = [f"worst of {name}: {check.value}, limit {check.limit}", check.replay]
-        files[name.replace("/", "-") + ".toml"] = scene_text(outcome.scene, comments).encode()
+        files[name.replace("/", "-") + ".toml"] = scene_text(scene, comments).encode()
     if files:
         write_folder(folder, files, "--save")

@@ -4,16 +4,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from pyharness.checks.check import Check
+from pyharness.checks.kinds import KINDS, verify
+from pyharness.checks.random_methods import ROUNDING
+from pyharness.checks.report import checks_report, samples, summary
+from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import CHECKS, check_count
-from pyharness.compare.checks import Check
-from pyharness.compare.checks_report import checks_report, samples, summary
 from pyharness.model.errors import InputError
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.decks import compiler
-from pyharness.verify.kinds import KINDS, verify
-from pyharness.verify.random_methods import ROUNDING
-from pyharness.verify.selection import DRAWS, RECORD, Selection
 
 FORMATS = ("table", "json", "junit")
 # Options that no other kind looks at.
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     checks = []
     for check in verify(chosen):
         checks.append(check)
-        if len(checks) % 20 == 0 or check.kind != "cells":
+        if len(checks) % 20 == 0 or check.suite != "cells":
             shared.progress(f"{len(checks)}: {check.id}")
     if not checks:
         if chosen.may_ask("decks") and compiler() is None:
@@ -85,7 +85,7 @@ def _listing_output(options: argparse.Namespace) -> int:
 
 
 def _port(options: argparse.Namespace) -> int:
-    from pyharness.verify.port import port, port_cells
+    from pyharness.checks.port import port, port_cells
 
     shared.refuse(options, "--port", _OF_THE_CHECKS)
     asked = port_cells(*_programs_and_cases(options), shared.names(options.cell))
@@ -112,8 +112,8 @@ def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], l
 
 
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
-    from pyharness.verify.plants.plants import PLANTS
-    from pyharness.verify.plants.self_test import as_check, self_test, self_test_report
+    from pyharness.checks.plants.plants import PLANTS
+    from pyharness.checks.plants.self_test import as_check, self_test, self_test_report
 
     found = []
     for caught in self_test(chosen.seed, chosen.record):
@@ -127,7 +127,7 @@ def _selection(options: argparse.Namespace) -> Selection:
     only = shared.names(options.only)
     problems = None
     if options.external is not None:
-        from pyharness.verify.external_file import read_problem
+        from pyharness.checks.external_file import read_problem
 
         shared.refuse(options, "--external", ("seed", "draws", "record"))
         if any(each.partition("/")[0] != "external" for each in only):
@@ -167,8 +167,8 @@ def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
 
 
 def _update(record: Path) -> int:
+    from pyharness.checks.golden import update
     from pyharness.cli.output import check_folder, write_folder
-    from pyharness.verify.golden import update
 
     if not record.parent.is_dir():
         raise InputError("there is no golden record here to update; give --record DIR")

@@ -21,10 +21,11 @@ from pyharness.methods.batch import Batch
 from pyharness.methods.many import solve_many
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
-from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
 from pyharness.original.many import run_many
+from pyharness.scenes.rotated import shifted
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that say what the cases of Table 1 do.
@@ -95,7 +96,7 @@ class Starts:
         scene, state = self.scene(case), self._starts(case)
         rows = np.empty((len(state), scene.steps, 3))
         for step in range(scene.steps):
-            later = replace(scene, torque=_later(scene.torque, step * scene.step_size))
+            later = shifted(scene, np.array(scene.omega), step * scene.step_size)
             state = solve_many(later, scene.step_size, omega0=state, effort=_EFFORT).omega
             rows[:, step] = state
         return self._shaped(case, rows)
@@ -108,19 +109,6 @@ class Starts:
         bodies, torque = np.array(scene.euler_coefficients), np.array(scene.normalized_torque(0.0))
         rows = march_models(omega0, bodies, torque, terms, h, h, growth, scene.steps)
         return self._shaped(case, rows)
-
-
-def _later(law: TorqueLaw, time: float) -> TorqueLaw:
-    """Return a torque law that begins at a later time (s)."""
-    sines, cosines = [], []
-    for amplitude, frequency in law.sines:
-        sines.append((np.cos(frequency * time) * np.array(amplitude), frequency))
-        cosines.append((np.sin(frequency * time) * np.array(amplitude), frequency))
-    for amplitude, frequency in law.cosines:
-        cosines.append((np.cos(frequency * time) * np.array(amplitude), frequency))
-        sines.append((-np.sin(frequency * time) * np.array(amplitude), frequency))
-    constant = np.array(law.constant) + time * np.array(law.rate)
-    return TorqueLaw(constant, law.rate, sines, cosines)
 
 
 JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))

@@ -1,0 +1,79 @@
+"""Fortran against twin: the same bits in every cell, and in scenes drawn at random."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.selection import Selection
+from pyharness.compare.agreement import differences, distance
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.original.cells import all_cells, cell_name, listing_name
+from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.scenes.random_scenes import draw
+
+# Right-hand sides of a step: at the start and at each point of collocation, or at four stages. The
+# step in which a run overflows is counted.
+_EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
+
+
+def cells(chosen: Selection) -> Iterator[Attempt]:
+    """Hold Fortran against twin in every program, case, subset of defects and reading."""
+    divergences = facts("divergences")["divergence"]
+    listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
+    for listing, case in all_cells():
+        if not chosen.thin or _is_thin(listing, case):
+            is_listed = cell_name(listing, case) in listed
+            yield Attempt(
+                of_cell("cells", listing, case), partial(_of_case, listing, case, is_listed)
+            )
+
+
+def of_cell(suite: str, listing: Listing, case: int) -> Name:
+    """Return the name of the check of a cell."""
+    return Name(suite, listing.program, f"case-{case}", listing_name(listing))
+
+
+def random_programs(chosen: Selection) -> Iterator[Attempt]:
+    """Hold Fortran against twin in scenes, listings and steps drawn from the seed."""
+    for number in range(chosen.draws):
+        yield Attempt(chosen.drawn(number, "program"), partial(_of_draw, chosen.seed, number))
+
+
+def _of_case(listing: Listing, case: int, is_listed: bool, name: Name) -> Check:
+    return _agreement(name, listing, case_scene(case), is_listed)
+
+
+def _of_draw(seed: str, number: int, name: Name) -> Check:
+    drawn = draw(seed, number)
+    return _agreement(name, drawn.listing, drawn.scene, False, drawn.lipschitz, drawn.may_stop)
+
+
+def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
+    """Return the check that both implementations of a program agree to the last bit.
+
+    A listed divergence that no longer occurs fails, as an unexpected one does.
+    """
+    run = PROGRAM_REGISTRY[listing.program].run
+    compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
+    found = differences(compiled, twin)
+    if not np.array_equal(compiled.time, np.arange(1, compiled.steps + 1) * scene.step_size):
+        found.append("time is not n h")
+    evaluations = _EVALUATIONS[listing.program] * (compiled.steps + (compiled.ended == "overflow"))
+    if compiled.evaluations != evaluations:
+        found.append(f"{compiled.evaluations} right-hand sides, due {evaluations}")
+    note = ", ".join(found)
+    if is_listed:
+        note = f"listed: {note}" if found else "a listed divergence that no longer occurs"
+    limit = None if is_listed else 0.0
+    return name.judged(bool(found) == is_listed, note, distance(compiled, twin), limit)
+
+
+def _is_thin(listing: Listing, case: int) -> bool:
+    few = len(listing.defects) <= 1 or listing.label == "original"
+    return case in (3, 7) and few and len(listing.readings) <= 1

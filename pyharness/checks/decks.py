@@ -1,0 +1,87 @@
+"""The decks, compiled from the author's own cards, against the port: a third, independent path.
+
+TAPE5 bit for bit and the page as text, in every case; after an overflow, which ends the port, the
+deck goes on and its numbers are not finite.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from pyharness.checks.cells import of_cell
+from pyharness.checks.check import Check, Name
+from pyharness.checks.selection import Selection
+from pyharness.model.listing import PROGRAMS, Listing, corrected, names_of, original, switches
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.original.cells import cell_name
+from pyharness.original.decks import Run, compiler, deck_text, run_deck, solver_object
+from pyharness.original.printer import page
+from pyharness.original.programs import PROGRAM_REGISTRY
+
+_AT_ONCE = 2
+_THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/case-2/original")
+
+
+def listings(program: str) -> list[Listing]:
+    """Return original and corrected, each defect alone kept and alone mended, each reading."""
+    names = frozenset(switches(program))
+    found = [original(program), corrected(program)]
+    found += [Listing(program, frozenset([name])) for name in switches(program)]
+    found += [Listing(program, names - {name}) for name in switches(program)]
+    for reading in names_of("reading", program):
+        found += [original(program, [reading]), Listing(program, [reading])]
+    return list(dict.fromkeys(found))
+
+
+def decks(chosen: Selection) -> Iterator[Check]:
+    """Hold every deck against the port; none without a compiler, and `verify` says so."""
+    asked = [
+        (of_cell("decks", listing, case), listing, case)
+        for program in PROGRAMS
+        for listing in listings(program)
+        for case in case_numbers()
+        if not chosen.thin or cell_name(listing, case) in _THIN
+    ]
+    asked = [each for each in asked if chosen.asks(each[0].id)]
+    if not asked or compiler() is None:
+        return
+    with TemporaryDirectory() as folder, ThreadPoolExecutor(_AT_ONCE) as pool:
+        solver_object(Path(folder))
+        yield from pool.map(partial(_held, Path(folder)), asked)
+
+
+def _held(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
+    name, listing, case = asked
+    scene = case_scene(case)
+    port = PROGRAM_REGISTRY[listing.program].run(scene, listing)
+    assert port.velocity is not None
+    try:
+        deck = run_deck(deck_text(listing, scene, "gfortran"), folder)
+    except RuntimeError as failure:
+        return name.judged(False, str(failure))
+    wanted = np.column_stack([port.recorded_time, port.omega, port.velocity])
+    found = deck.tape5[: port.steps]
+    faults = []
+    if found.tobytes() != wanted.tobytes():
+        faults.append("TAPE5 differs")
+    whole = page(scene, listing.program, port)
+    overflowed = port.ended == "overflow"
+    if not (deck.page.startswith(whole) if overflowed else deck.page == whole):
+        faults.append("the page differs")
+    faults += _after(deck, port.steps, overflowed)
+    with np.errstate(all="ignore"):
+        apart = float(np.abs(found - wanted[: len(found)]).max(initial=0.0))
+    return name.judged(not faults, ", ".join(faults), apart, 0.0)
+
+
+def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
+    """Say what is wrong with the records after the port's last."""
+    rest = deck.tape5[steps:]
+    if not overflowed:
+        return [f"{len(rest)} records more"] if len(rest) else []
+    fine = len(rest) > 0 and not np.isfinite(rest[:, 1:4]).all(axis=1).any()
+    return [] if fine else ["it goes on with finite numbers where the port has none"]

@@ -1,0 +1,313 @@
+"""Every method against published figures that were not computed here.
+
+A check passes if a method is as near to the print as the print reaches, plus what the method
+itself may be wrong by, plus what rounding the numbers of the problem to binary64 does to it.
+"""
+
+import math
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from decimal import Decimal
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from pyharness.checks.check import REFUSED, Check, Name, may_hold, selected
+from pyharness.checks.external_file import UNITS, Problem, Value, problems
+from pyharness.compare.candidates import called, listed, solved
+from pyharness.methods.problem import closed_form
+from pyharness.methods.registry import METHODS, REGISTRY
+from pyharness.methods.solve import finest
+from pyharness.model.attitude import angle_between
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.scenes.perturbed import perturbed
+
+__all__ = ["external_checks", "problems"]
+
+# The finest that a method claims, except where no one would wait for it.
+_TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
+_SOLVED = (
+    "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
+    "quick", "dop853", "lsoda", "radau", "rk45",
+)  # fmt: skip
+_FEWEST_STEPS, _MOST_STEPS = 4, 2**16
+_HALF_ULP = 2.0**-53
+# A number is rounded when it is read, and once more in what a method makes of it.
+_ROUNDING = 2.0 * _HALF_ULP
+_STEP_ASIDE = 2.0**-30
+# These answer wherever a method does: a choice of method, and a formula.
+_MAY_NOT_REFUSE = ("auto", "closed-form")
+
+_Row = TypeVar("_Row")
+
+
+# What a method gives at one time (rad/s): omega, and by how much each may be wrong.
+_Result = tuple[Array, float]
+
+
+def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
+    """Judge every method that can take a problem by its published figures.
+
+    Checks are ``external/<problem>/<time>/<method>``; value and limit are in the problem's unit, of
+    the component that is worst against its limit.
+    """
+    for problem in problems:
+        # Times on one side are solved together: a replay of one gives the same bits.
+        for side in (1.0, -1.0):
+            values = sorted(
+                (value for value in problem.values if float(value.time) * side > 0.0),
+                key=lambda value: abs(float(value.time)),
+            )
+            if any(may_hold(f"external/{problem.name}/{value.time}", only) for value in values):
+                bare = replace(problem, scene=replace(problem.scene, attitude=None))
+                yield from _side(bare, [each for each in values if any(each.omega)], only)
+                yield from _pointings(problem, [each for each in values if each.pointing], only)
+
+
+def _names(
+    problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
+) -> list[tuple[int, Name]]:
+    """Return the row and the name of each requested check, none where a method can't take it."""
+    given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
+    places = [f"{problem.name}/{value.time}" for value in values]
+    names = [
+        Name("external", method, place, quantity=quantity, command=f"verify{given}")
+        for place in places
+    ]
+    asked = [(row, name) for row, name in enumerate(names) if selected(name.id, only)]
+    times = [float(value.time) for value in values]
+    return asked if asked and _can_take(method, problem.scene, times) else []
+
+
+def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
+    """Return the check of a method that gave nothing at a time.
+
+    The figures of a user's file may be for a time that takes a method too long.
+    """
+    given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
+    if refusal:
+        return name.judged(given, f"{REFUSED}{refusal}")
+    return name.judged(False, f"ended before t = {float(value.time):g} s")
+
+
+def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
+    """Judge every method that propagates the attitude by the printed ones, as an angle (rad)."""
+    scene, times = problem.scene, [float(value.time) for value in values]
+    for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
+        asked = _names(problem, values, method, only, "attitude")
+        if not asked:
+            continue
+        found, refusal, tolerance = np.empty((0, 4)), "", 0.0
+        try:
+            tolerance = max(_TOLERANCES.get(method, 0.0), finest(method, scene, times[-1]))
+            attitude = solved(method, tolerance).rows(scene, times).attitude
+            found = found if attitude is None else attitude
+        except InputError as reason:
+            refusal = str(reason)
+        rounding = _turns(scene, times) if len(found) else np.zeros(0)
+        for row, name in asked:
+            pointing = values[row].pointing
+            if row >= len(found):
+                yield _without(problem, name, refusal, values[row])
+                continue
+            assert pointing is not None
+            wanted = np.array([pointing.attitude])
+            error = float(angle_between(found[row : row + 1], wanted)[0])
+            limit = pointing.accuracy + tolerance + float(rounding[row])
+            yield name.bounded(error, limit, "angle, rad")
+
+
+def _turns(scene: Scene, times: Sequence[float]) -> Array:
+    """Return by how much rounding the numbers of a scene turns the body (rad), as `_moves`.
+
+    Nothing where that can't be solved.
+    """
+    turned = np.full(len(times), 8.0 * _HALF_ULP)
+    run = solved("auto", METHODS["auto"].finest).rows
+    try:
+        here = run(scene, times)
+        others = [run(other, times).attitude for other in perturbed(scene, _STEP_ASIDE)]
+    except InputError:
+        return turned
+    for there in others:
+        if here.attitude is not None and there is not None and len(there) == len(times):
+            turned += angle_between(there, here.attitude) * (_ROUNDING / _STEP_ASIDE)
+    for row, time in enumerate(times[: len(here.omega)]):
+        turned[row] += float(np.linalg.norm(here.omega[row])) * abs(time) * _ROUNDING
+    return turned
+
+
+def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
+    rounding = _rounding(problem.scene, values)
+    for method in (*_SOLVED, *PROGRAMS):
+        asked = _names(problem, values, method, only)
+        if not asked:
+            continue
+        results, refusal = _as_far_as_solved(partial(_results, problem, method), values)
+        for row, name in asked:
+            value = values[row]
+            if row >= len(results):
+                yield _without(problem, name, refusal, value)
+            elif (result := results[row]) is not None:
+                yield _check(name, problem.unit, value, result, rounding[value.time])
+            else:
+                # In the problems that come with the project LEQT1F solves the longest steps.
+                note = "no step long enough for the linear equations"
+                yield name.judged(problem.path is not None, note)
+
+
+def _as_far_as_solved(
+    solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
+) -> tuple[list[_Row], str]:
+    """Return a row for each value, and why there are no more; all are solved together.
+
+    Where that is refused they are solved one by one up to the first that is refused: what takes
+    too long to the furthest time may not to the nearest.
+    """
+    try:
+        return solve(values), ""
+    except InputError as refusal:
+        if len(values) == 1:
+            return [], str(refusal)
+    rows: list[_Row] = []
+    for value in values:
+        try:
+            found = solve([value])
+        except InputError as refusal:
+            return rows, str(refusal)
+        if not found:
+            break
+        rows += found
+    return rows, ""
+
+
+def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
+    """Solve a problem by a method, to the times of the values."""
+    if method in PROGRAMS:
+        return [_program(problem, value, method) for value in values]
+    return [*_solved(problem.scene, [float(value.time) for value in values], method)]
+
+
+def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
+    """Whether a method takes the problem at all; programs run forward only."""
+    if method == "closed-form":
+        return closed_form(scene) is not None
+    if method == "quick":
+        return called(method, _TOLERANCES[method]).end(scene, times[0]).ended != "refused"
+    return method not in PROGRAMS or times[0] > 0.0
+
+
+def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Result]:
+    tolerance = _TOLERANCES.get(method, 0.0)
+    if method == "quick":
+        ends = [called(method, tolerance).end(scene, time) for time in times]
+        if refused := next((end.ended for end in ends if end.is_refused), ""):
+            raise InputError(f"{method} {refused}")
+        rows = np.array([end.omega for end in ends])
+    else:
+        tolerance = max(tolerance, finest(method, scene, times[-1]))
+        rows = solved(method, tolerance).rows(scene, times).omega
+    for omega in rows:
+        yield omega, tolerance * _scale(scene, omega)
+
+
+def _program(problem: Problem, value: Value, program: str) -> _Result | None:
+    """Run a corrected program in steps that are halved until the print is met or rounding reigns.
+
+    The error is taken from the last halving, and twice that for safety; rounding may add half a
+    unit in the last place a step. None where no step is long enough for its linear equations.
+    """
+    scene, time = problem.scene, float(value.time)
+    finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
+    accuracy = finest_print * UNITS[problem.unit]
+    run = listed(corrected(program), may_stop=False, velocity=False).rows
+    order = PROGRAM_REGISTRY[program].order
+    result, before, steps, ended = None, None, _FEWEST_STEPS, ""
+    previous = 0.0
+    while steps <= _MOST_STEPS:
+        stepped = replace(scene, step_size=time / steps, steps=steps)
+        rows = run(stepped)
+        if rows.ier is not None and rows.ier.any():
+            # LEQT1F takes the matrices of tiny steps for singular and leaves a step of order 1.
+            break
+        # In steps far too long a motion overflows that in shorter ones does not.
+        ended = rows.ended
+        omega = rows.omega[-1] if ended == "complete" else None
+        if omega is not None and before is not None:
+            halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
+            rounding = steps * _HALF_ULP * _scale(scene, omega)
+            result = omega, halving + rounding
+            # Two coarse runs may agree by accident: only where halving helps is it believed.
+            if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
+                break
+            previous = halving
+        before = omega
+        steps *= 2
+    if ended not in ("", "complete"):
+        raise InputError(f"{program} in steps of {time / _MOST_STEPS:g} s: {ended}")
+    return result
+
+
+def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array) -> Check:
+    factor = UNITS[unit]
+    omega, error = result
+    judged = []
+    for axis, figure in enumerate(value.omega):
+        if figure is not None:
+            # Subtracted in decimals: the print may have more digits than binary64.
+            distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
+            limit = figure.accuracy + float(error + rounding[axis]) / factor
+            judged.append((distance, limit, f"w{axis + 1}, {unit}"))
+    # NaN is the worst of all, and no comparison shows it.
+    worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
+    distance, limit, note = worst
+    return name.bounded(distance, limit, note)
+
+
+def _scale(scene: Scene, omega: Array) -> float:
+    """Return the largest angular velocity at both ends: no more than the largest on the way."""
+    return max(*map(abs, scene.omega), float(np.abs(omega).max()))
+
+
+def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
+    """Return by how much rounding the numbers of a scene moves omega, by time (rad/s).
+
+    Nothing where that can't be solved, and so not be excused: the method's own check tells.
+    """
+
+    def solve(values: Sequence[Value]) -> list[Array]:
+        times = [float(value.time) for value in values]
+        try:
+            return [*_moves(scene, times, "taylor")]
+        except InputError:
+            # A closed form goes further than a series.
+            return [*_moves(scene, times, "auto")]
+
+    rows, _ = _as_far_as_solved(solve, values)
+    rows += [np.zeros(3)] * (len(values) - len(rows))
+    return {value.time: row for value, row in zip(values, rows, strict=True)}
+
+
+def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
+    """Return by how much rounding the numbers of a scene and its times moves omega (rad/s).
+
+    The sum over all numbers of what each moves alone, to first order; nothing in the rows that
+    the motion does not have.
+    """
+    moved = np.zeros((len(times), 3))
+    run = solved(method, METHODS[method].finest).rows
+    here = run(scene, times).omega
+    for other in perturbed(scene, _STEP_ASIDE):
+        there = run(other, times).omega
+        rows = min(len(here), len(there))
+        moved[:rows] += np.abs(there[:rows] - here[:rows]) * (_ROUNDING / _STEP_ASIDE)
+    slope = scene.right_hand_side()
+    for row, (time, omega) in enumerate(zip(times, here, strict=False)):
+        moved[row] += np.abs(slope(time, omega.tolist())) * abs(time) * _ROUNDING
+    return moved

@@ -1,0 +1,248 @@
+"""The golden record: the trajectories that this version produces, as exact text.
+
+One file for each program or method, one entry for each trajectory: the command that makes it,
+how it ended, its first, tenth and last row as hexadecimal floats, and a digest of all its rows.
+"""
+
+import hashlib
+import math
+import platform
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.selection import RECORD, Selection
+from pyharness.compare.agreement import ulps
+from pyharness.compare.candidates import listed, solved
+from pyharness.methods.problem import closed_form
+from pyharness.methods.registry import METHODS, SCIPY_METHODS
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.pipes import read_input
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_numbers, case_scene, toml_of
+from pyharness.model.schema import SCHEMAS, check_schema
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.theory.conditioning import conditioning
+
+_ANEW = "verify --update writes it anew"
+_STEPS = (1, 10)
+_RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
+_TOLERANCE = 1e-9
+_LARGEST = 1 << 24  # bytes of a file
+_KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A trajectory of the record."""
+
+    source: str  # the program or method, which names its file
+    name: str  # the rest of the name of its check, as in ``case-3/original``
+    command: str  # what prints it
+    scene: Scene  # what it solves
+    tolerance: float | None  # of a method that states its error; None where every bit counts
+
+    def run(self) -> Trajectory:
+        """Compute the trajectory."""
+        if self.source in PROGRAMS:
+            listing = (original if self.name.endswith("original") else corrected)(self.source)
+            return listed(listing).rows(self.scene)
+        return solved(self.source, self.tolerance or 1.0).rows(self.scene)
+
+
+def recorded() -> Iterator[Recorded]:
+    """Return what the record holds."""
+    for case in case_numbers():
+        scene = case_scene(case)
+        command = f"python -m pyharness run --case {case}"
+        for program, label in product(PROGRAMS, ("original", "corrected")):
+            printed = f"{command} --program {program} --listing {label}"
+            yield Recorded(program, f"case-{case}/{label}", printed, scene, None)
+        for name in _RECORDED_METHODS:
+            if name == "closed-form" and closed_form(scene) is None:
+                continue
+            tolerance = max(METHODS[name].finest, _TOLERANCE)
+            printed = f"{command} --method {name} --tolerance {tolerance:g}"
+            stated = None if tolerance == 1.0 else tolerance
+            yield Recorded(name, f"case-{case}", printed, scene, stated)
+
+
+def golden(chosen: Selection) -> Iterator[Attempt]:
+    """Hold what is produced now against the record.
+
+    Programs and fixed-step methods to the last bit; methods that state an error within it,
+    since processors and compilers may round their operations in another way. With another
+    mathematical library than the record's, a torque of waves may differ by rounding.
+    """
+    if not chosen.record.is_dir():
+        return
+    known = read_record(chosen.record)
+    entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
+    libraries = {file["mathematics"] for file in known.values()}
+    due = list(recorded())
+    options = "" if chosen.record == RECORD else f" --record {shlex.quote(str(chosen.record))}"
+    same_library = libraries == {mathematics()}
+    for each in due:
+        name = Name("golden", each.source, each.name, options=options)
+        yield Attempt(name, partial(_held, each, entries.get(each.command), same_library))
+    for command in sorted(set(entries) - {each.command for each in due}):
+        rest = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
+        source = next(s for s, file in known.items() if entries[command] in file["trajectory"])
+        yield Attempt(Name("golden", source, rest, options=options), _forgotten)
+
+
+def _forgotten(name: Name) -> Check:
+    return name.judged(False, "is recorded and no longer produced; verify --update forgets it")
+
+
+def _held(each: Recorded, entry: dict[str, Any] | None, same_library: bool, name: Name) -> Check:
+    if entry is None:
+        return name.judged(False, "is not recorded; verify --update records it")
+    run = each.run()
+    now = _entry(each, run)
+    if now == entry:
+        return name.judged(True, "", 0.0, 0.0)
+    moved = _moved(entry, now)
+    waves = each.scene.torque.sines + each.scene.torque.cosines
+    if each.tolerance is not None:
+        limit = 2.0 * each.tolerance
+    elif waves and not same_library:
+        limit = conditioning(each.scene, each.scene.times()[-1]).rounding
+    else:
+        return name.judged(False, moved, limit=0.0)
+    old, new = _rows(entry), _rows(now)
+    away = math.inf
+    # Step, time and TIME have no error to be within.
+    same_times = old.shape == new.shape and np.array_equal(old[:, :3], new[:, :3])
+    if same_times and entry["ended"] == now["ended"]:
+        scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
+        away = float(np.abs(old[:, 3:6] - new[:, 3:6]).max(initial=0.0)) / scale
+    return name.bounded(away, limit, f"within its error: {moved}")
+
+
+def read_record(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return the files of a record by name; InputError for one that is no record."""
+    found = {}
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            file = toml_of(read_input(path, "file", _LARGEST, "a record"), "file")
+        except InputError as error:
+            raise InputError(f"'{path}': is no record ({error}); {_ANEW}") from None
+        check_schema(f"'{path}'", "golden record", file.get("schema"), _ANEW)
+        try:
+            for entry in file["trajectory"]:
+                _rows(entry)
+                _ = [entry[key] for key in _KEYS]
+            _ = file["mathematics"]
+            found[path.stem] = file
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(
+                f"'{path}': is no record ({' '.join(str(error).split()) or 'empty'}); {_ANEW}"
+            ) from None
+    return found
+
+
+def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
+    """Return the files of a new record, and what moved against the one in `folder`.
+
+    A file of the old record without a trajectory that is still produced is not among them.
+    """
+    try:
+        known = read_record(folder) if folder.is_dir() else {}
+    except InputError:
+        # Damaged: all of it is new.
+        known = {}
+    entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
+    files: dict[str, list[dict[str, Any]]] = {}
+    news = []
+    for each in recorded():
+        now = _entry(each, each.run())
+        files.setdefault(each.source, []).append(now)
+        before = entries.pop(each.command, None)
+        if before is None:
+            news.append(f"new: {each.command}")
+        elif before != now:
+            news.append(f"moved: {each.command}: {_moved(before, now)}")
+    news += [f"gone: {command}" for command in entries]
+    return {f"{name}.toml": _text(name, rows).encode() for name, rows in files.items()}, news
+
+
+def mathematics() -> str:
+    """Name the library whose sine and cosine are in the record."""
+    return " ".join([*platform.libc_ver(), platform.system(), platform.machine()]).strip()
+
+
+def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
+    columns = [run.time, run.recorded_time, run.omega, run.velocity]
+    rows = np.column_stack([column for column in columns if column is not None])
+    n = len(rows)
+    shown = sorted({step for step in (*_STEPS, n) if 1 <= step <= n})
+    stop = run.stop
+    return {
+        "command": each.command,
+        "ended": run.ended,
+        "steps": run.steps,
+        "evaluations": run.evaluations,
+        "stop": "" if stop is None else f"{stop.step} {stop.variable} {stop.quotient.hex()}",
+        "digest": _digest(rows, run),
+        "rows": [[str(step), *map(float.hex, rows[step - 1].tolist())] for step in shown],
+    }
+
+
+def _digest(rows: Array, run: Trajectory) -> str:
+    """Return a digest of every bit of the rows, NaN being one value."""
+    digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
+    if run.ier is not None:
+        digest.update(run.ier.astype("<i4").tobytes())
+    return digest.hexdigest()[:32]
+
+
+def _rows(entry: dict[str, Any]) -> Array:
+    """Return the rows of an entry, the number of the step first."""
+    return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
+
+
+def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
+    """Say in what two entries differ, numbers in units in the last place."""
+    parts = [
+        f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"
+        for key in ("ended", "steps", "evaluations", "stop")
+        if old[key] != new[key]
+    ]
+    before, after = _rows(old), _rows(new)
+    if before.shape == after.shape:
+        names = ("time", "TIME", "omega", "velocity")
+        for name, first, last in zip(names, (1, 2, 3, 6), (2, 3, 6, 9), strict=True):
+            away = ulps(before[:, first:last], after[:, first:last])
+            if away:
+                parts.append(f"{name} by {away:.4g} ulp")
+    if not parts:
+        parts.append("between the rows that are shown")
+    return ", ".join(parts)
+
+
+def _text(name: str, entries: list[dict[str, Any]]) -> str:
+    kind = "program" if name in PROGRAMS else "method"
+    lines = [
+        f"# The {kind} {name}: rows are step, time, TIME, omega, velocity (programs).",
+        "# Written by: python -m pyharness verify --update",
+        f"schema = {SCHEMAS['golden record']}",
+        f'mathematics = "{mathematics()}"',
+    ]
+    for entry in entries:
+        lines += ["", "[[trajectory]]"]
+        for key, value in entry.items():
+            if key != "rows":
+                lines.append(f"{key} = {value}" if isinstance(value, int) else f'{key} = "{value}"')
+        lines.append("rows = [")
+        lines += ["  [" + ", ".join(f'"{x}"' for x in row) + "]," for row in entry["rows"]]
+        lines.append("]")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,249 @@
+"""Methods and programs against the truth on one scene, each within a bound derived beforehand."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.judge import (
+    MOST,
+    Policy,
+    Tried,
+    Truth,
+    allowed,
+    judge,
+    linear,
+    of_end,
+    reference_truth,
+)
+from pyharness.checks.stress import LISTINGS, named
+from pyharness.checks.tolerances import affordable
+from pyharness.compare.candidates import Candidate, End, called, solved, unstopped
+from pyharness.methods.problem import closed_form
+from pyharness.methods.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.scenes.extreme import EXTREMES, Circumstance, speed
+from pyharness.theory import promises
+from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
+from pyharness.truth.elliptic import torque_free
+from pyharness.truth.reference import reference
+
+# Ours at two tolerances: near the finest, where rounding shows, and a middling one.
+OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
+ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
+_SERIES = ("taylor", "auto", "prepared-auto")
+_TOO_MANY_RADIANS = 1e8  # of a wave, for a series
+_ROWS = 10  # of a program's run that are compared with the truth
+FORMS = ("closed-form", "auto")
+
+
+def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
+    """Return the truth at `time` (s); the flow's conditioning, where it is known, as given."""
+    flow = flow or conditioning(scene, time)
+    if not _is_free(scene):
+        return reference_truth(scene, [time], flow=flow)
+    exact = torque_free(scene, time)
+    held = torque_free(scene, time, rounded=True)
+    data = max(float(abs(x - y)) for x, y in zip(exact, held, strict=True)) / flow.largest
+    omega = np.array([[float(x) for x in exact]])
+    error = ROUNDING * float(np.abs(omega).max())
+    return Truth(np.array([time]), omega, error, flow, data=data, exact=True)
+
+
+def _is_free(scene: Scene) -> bool:
+    return scene.torque.is_zero and scene.moments is not None
+
+
+# From the truth and a tolerance, None in the scene's steps, to the checks of one method.
+Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
+
+
+def hold_all(
+    suite: str,
+    held: Callable[[Name, float], Iterable[Attempt]] | None = None,
+    has_programs: Callable[[Circumstance], bool] = lambda each: True,
+) -> Iterator[Attempt]:
+    """Judge all methods by the truth in a suite's extreme scenes, and describe the programs."""
+    for each in EXTREMES[suite]():
+        name = named(suite, "", each.name, scene=each.scene)
+        yield from (held or hold)(name, each.time)
+        if has_programs(each):
+            yield from describe_programs(name)
+
+
+def hold(
+    name: Name,
+    time: float,
+    methods: Sequence[str] = ALL,
+    truth: Callable[[Scene, float], Truth] = truth_of,
+    tolerances: Callable[[str, Scene, float], Sequence[float | None]] | None = None,
+    judged: Judged | None = None,
+) -> Iterator[Attempt]:
+    """Judge each method by the truth at `time`: by default at two tolerances, fine and coarse.
+
+    The limit is the sum of the errors that the method promises to make, amplified by the flow;
+    rounding amplified likewise; and the error of the truth. Where no more than two digits are left
+    it says nothing. Energy and momentum without torque are judged always: the flow does not
+    amplify their errors. A method that refuses a scene which it has to take fails.
+    """
+    scene = scene_of(name)
+    known = cache(partial(truth, scene, time))
+
+    def settings(name: Name) -> Iterator[Attempt]:
+        tried_at = tolerances or partial(affordable, flow=known().flow)
+        for tolerance in tried_at(name.subject, scene, time):
+            setting = "steps" if tolerance is None else f"{tolerance:.0e}"
+            make = partial(judged or _judged, known(), tolerance)
+            yield Attempt(replace(name, setting=setting), make)
+
+    for method in methods:
+        yield Attempt(replace(name, subject=method), settings)
+
+
+def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
+    """Run a method; in the scene's steps where the tolerance is None; InputError on refusal."""
+    if name in ("auto", "quick") or tolerance is None:
+        return called(name, tolerance or 1.0).end(scene, time)
+    return solved(name, tolerance).end(scene, time)
+
+
+def _steps(scene: Scene, time: float) -> int:
+    return max(1, math.ceil(abs(time) / scene.step_size * (1.0 - 1e-6)))
+
+
+def refusable(tried: Tried, truth: Truth, why: str) -> bool:
+    """Whether a method may refuse a scene; anything else that refuses is at fault.
+
+    `closed-form` where there is none. `quick`, which takes three products and leaves to the series
+    what takes too many steps. The series where a wave turns more often than anyone waits for.
+    """
+    method, scene = tried.method, tried.scene
+    if method == "closed-form":
+        return closed_form(scene) is None
+    waves = scene.torque.sines + scene.torque.cosines
+    radians = max((abs(frequency * truth.end) for _, frequency in waves), default=0.0)
+    return method == "quick" or (method in _SERIES and radians > _TOO_MANY_RADIANS)
+
+
+def _derived(truth: Truth, tried: Tried) -> float | None:
+    """Return the limit that follows from what a method promises."""
+    made = made_on_the_way(tried, truth)
+    if truth.exact and tried.method in FORMS:
+        # It makes no errors on the way: beside its own there is the rounding of A, B and C.
+        return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
+    if made is None:
+        # It claims no error in steps of this size, only that it conserves.
+        return None
+    growth, steps = truth.flow.amplification, _roundings(tried, truth)
+    return linear(allowed(truth, made, growth, steps=steps))
+
+
+DERIVED = Policy(_derived, refusable)
+"""The errors that a method promises to make, amplified."""
+
+
+def _roundings(tried: Tried, truth: Truth) -> float:
+    """Return the steps after which the method rounds omega and forgets what it took off."""
+    method, answer = tried.method, tried.answer
+    if tried.tolerance is None:
+        return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
+    if method == "auto":
+        return float(answer.steps)
+    return promises.steps_of(method, answer.steps, answer.evaluations or 0)
+
+
+def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
+    method, scene = name.subject, scene_of(name)
+    ask = partial(run_method, method, scene, truth.end, tolerance)
+    tried = Tried(method, tolerance, scene, lambda: of_end(method, ask()))
+    yield judge(name.of("error"), tried, truth, DERIVED)
+    answer = tried.answer
+    if truth.exact and answer.is_whole and not answer.refusal:
+        made = made_on_the_way(tried, truth)
+        lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
+        if made is None:
+            # Each step rounds omega, its sums, and the last iteration.
+            lost += 4.0 * ROUNDING * _steps(scene, truth.end)
+        total = (made or 0.0) + lost
+        # An error of omega changes what is conserved by no more than itself.
+        limit = DERIVED.limit(truth, tried)
+        most = min(math.inf if limit is None else limit, total + total * total)
+        found = conserved(scene, answer.omega[-1], truth.flow.largest)
+        yield name.of("drift").bounded(found, most)
+
+
+def scene_of(name: Name) -> Scene:
+    """Return the scene of a check that has one."""
+    assert name.scene is not None
+    return name.scene
+
+
+def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
+    """Return the sum of the errors that a method promises to make, over the largest omega.
+
+    None where it promises none.
+    """
+    if tried.method in FIXED_STEP and truth.exact:
+        radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
+        steps = _steps(tried.scene, truth.end)
+        return promises.fixed_step_sum(tried.method, radians / steps, steps)
+    return tried.tolerance
+
+
+def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
+    """Return how wrong omega must be, over `largest`, for energy and momentum to be as they are.
+
+    An error e of every omega changes sum q w**2 by at most 2 e sum q abs(w): no less than e is
+    needed to change it by as much as was found.
+    """
+    assert scene.moments is not None
+    if not np.isfinite(omega).all():
+        return math.inf
+    worst = Fraction(0)
+    big = Fraction(largest)
+    for power in (1, 2):
+        weights = np.array([Fraction(moment) ** power for moment in scene.moments])
+        before, after = (
+            np.array([Fraction(float(w)) for w in each]) for each in (scene.omega, omega)
+        )
+        change = abs(weights @ after**2 - weights @ before**2)
+        slope = max(weights @ abs(before), weights @ abs(after))
+        if change:
+            worst = max(worst, change / (2 * slope * big))
+    return float(worst)
+
+
+def describe_programs(name: Name) -> Iterator[Attempt]:
+    """Say how far the programs, original and corrected, are from the truth over their steps."""
+    scene = scene_of(name)
+    every = max(1, scene.steps // _ROWS)
+    rows = slice(every - 1, None, every)
+
+    @cache
+    def wanted() -> Array:
+        times = scene.times()[rows]
+        if _is_free(scene):
+            return np.array([[float(x) for x in torque_free(scene, t)] for t in times])
+        return reference(scene, times).omega
+
+    def describe(candidate: Candidate, name: Name) -> Check:
+        run = candidate.rows(scene)
+        scale = float(np.abs(wanted()).max(initial=max(map(abs, scene.omega)))) or 1.0
+        error = apart(run.omega[rows], wanted()) / scale if len(run.omega[rows]) else None
+        note = "" if run.ended == "complete" else f"{run.ended} after {run.steps} steps"
+        return name.described(error, note)
+
+    for listing in LISTINGS:
+        own = replace(name, subject=listing.program, setting=listing.label)
+        yield Attempt(own, partial(describe, unstopped(listing)))
+
+
+def apart(found: Array, wanted: Array) -> float:
+    """Return the largest difference of the rows that both have."""
+    n = min(len(found), len(wanted))
+    return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))

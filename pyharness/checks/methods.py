@@ -1,0 +1,125 @@
+"""Methods against the reference in every case, omega and attitude, solved and prepared.
+
+A tolerance is on the error relative to the largest omega, or on the angle in radians.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.judge import AS_STATED, Tried, Truth, by_end, by_rows, judge, reference_truth
+from pyharness.checks.selection import Selection
+from pyharness.checks.tolerances import OF_CASES, of_case
+from pyharness.compare.agreement import ulps
+from pyharness.compare.candidates import called, solved, turning
+from pyharness.methods.plan import FEW_DIGITS
+from pyharness.methods.problem import closed_form, normalized
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
+from pyharness.methods.solve import finest
+from pyharness.model.attitude import Quaternion
+from pyharness.model.extension import extension
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_numbers, case_scene
+
+START: Quaternion = (0.5, -0.1, 0.7, 0.5)
+# s: one time far from those of the case, and those of prepared solvers.
+_LATER = 3.0
+_ENDS = (1.0, 3.0, -1.0)
+# What states an error, and what propagates the attitude too.
+_SOLVED = tuple(name for name in METHODS if METHODS[name].finest < 1.0 and name != "reference")
+_TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
+_PREPARED = ("auto", "taylor", "quick", "closed-form")
+_PREPARED_TURNED = ("auto", "taylor")
+
+
+def methods(chosen: Selection) -> Iterator[Attempt]:
+    """Judge every method that states an error, at all results of a case and one time later."""
+    for case in cases(chosen):
+        scene = case_scene(case)
+        yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
+
+
+def prepared(chosen: Selection) -> Iterator[Attempt]:
+    """Judge prepared solvers, forward and backward; in the scene's own steps by their bits."""
+    for case in cases(chosen):
+        scene = case_scene(case)
+        forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
+        yield from _prepared(Name("prepared"), case, scene, forms, chosen.thin)
+        for method in (*FIXED_STEP, *GAUSS):
+            name = Name("prepared", method, f"case-{case}", quantity="bits")
+            yield Attempt(name, partial(_same_steps, scene))
+
+
+def attitudes(chosen: Selection) -> Iterator[Attempt]:
+    """Judge the attitude of every method that propagates it, solved and prepared."""
+    for case in cases(chosen):
+        scene = replace(case_scene(case), attitude=START)
+        times = (*scene.times()[9::10], _LATER)
+        yield from _solved("attitudes", case, scene, times, _TURNED, chosen.thin)
+        name = Name("attitudes", "prepared-")
+        yield from _prepared(name, case, scene, _PREPARED_TURNED, chosen.thin)
+
+
+def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
+    """Return the cases in which checks are made, `thin` of them for the self-test."""
+    return thin if chosen.thin else list(case_numbers())
+
+
+def _solved(
+    suite: str, case: int, scene: Scene, times: Sequence[float], names: Sequence[str], thin: bool
+) -> Iterator[Attempt]:
+    truth = cache(partial(reference_truth, scene, times))
+    for method in names:
+        for tolerance in of_case(method, thin):
+            name = Name(suite, method, f"case-{case}", f"{tolerance:.1e}")
+            tried = partial(solve_tried, method, tolerance, scene, times)
+            yield Attempt(name, partial(_judged, tried, truth))
+
+
+def _prepared(
+    name: Name, case: int, scene: Scene, methods: Sequence[str], thin: bool
+) -> Iterator[Attempt]:
+    for time in _ENDS:
+        truth = cache(partial(reference_truth, scene, (time,)))
+        where = replace(name, circumstance=f"case-{case}/{time:g}")
+        for method in methods:
+            for tolerance in (1e-6,) if thin else OF_CASES:
+                if method == "quick" and tolerance < FEW_DIGITS:
+                    continue
+                own = replace(where, subject=name.subject + method, setting=f"{tolerance:.1e}")
+                tried = partial(call_tried, method, tolerance, scene, time)
+                yield Attempt(own, partial(_judged, tried, truth))
+
+
+def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
+    """Try a method at all times."""
+    if method in SCIPY_METHODS and scene.attitude:
+        # Over a long time it can't be told to have so small an error.
+        tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
+    return by_rows(method, tolerance, scene, times)
+
+
+def call_tried(method: str, tolerance: float, scene: Scene, time: float) -> Tried:
+    """Try a prepared solver at one time (s), after a call from which nothing may stay."""
+    prepare = turning if scene.attitude else called
+    return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
+
+
+def _judged(tried: Callable[[], Tried], truth: Callable[[], Truth], name: Name) -> Check:
+    return judge(name, tried(), truth(), AS_STATED)
+
+
+def _same_steps(scene: Scene, name: Name) -> Check:
+    """Hold a prepared solver in the scene's own steps to the bits of the kernel itself."""
+    method, time = name.subject, 100.0 * scene.step_size
+    found = called(method, 1.0).end(scene, time).omega
+    if method in FIXED_STEP:
+        wanted = solved(method, 1.0).end(scene, time).omega
+    else:
+        steps = int(method.partition("-")[2]), scene.step_size
+        rows, *_ = extension().gauss_solution(*normalized(scene), scene.omega, [time], *steps)
+        wanted = rows[:, 0]
+    return name.bounded(ulps(found, np.ascontiguousarray(wanted)), 0.0)

@@ -1,0 +1,84 @@
+"""Orders: the power with which the error falls as the step is halved, against the one that is due.
+
+Of corrected programs it is measured by `solve_ivp`, of methods by the reference; that of the
+programs' velocity too, against the reference: no other method has one.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.methods import cases
+from pyharness.checks.selection import Selection
+from pyharness.compare.candidates import listed, solved
+from pyharness.compare.orders import Order, measured_order, order_of
+from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.methods.solve import finest
+from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array
+from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.truth.reference import Reference, reference
+
+# The truth that solve_ivp gives is requested as finely as it goes.
+_IVP = "dop853"
+# Halvings in which an order has to show, one after another, and what may be missing in the last;
+# .006 is at the most.
+_PAIRS = 4
+_ORDER_SLACK = 0.2
+
+
+def orders(chosen: Selection) -> Iterator[Attempt]:
+    """Measure every order; the value is what is missing to the order that is due."""
+    for case in cases(chosen, (5,)):
+        scene = case_scene(case)
+        known = cache(partial(reference, scene, scene.times()))
+        by_ivp = cache(partial(_by_ivp, scene))
+        for name in PROGRAMS:
+            yield Attempt(Name("orders", name, f"case-{case}"), partial(_of_program, scene, by_ivp))
+        for name in PROGRAMS:
+            where = Name("orders", name, f"case-{case}", quantity="velocity")
+            yield Attempt(where, partial(_of_velocity, scene, known))
+        for name in FIXED_STEP:
+            yield Attempt(Name("orders", name, f"case-{case}"), partial(_of_method, scene, known))
+
+
+def _of_program(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
+    program, listing = PROGRAM_REGISTRY[name.subject], corrected(name.subject)
+    return judged_order(name, measured_order(scene, program, listing, truth(), _PAIRS))
+
+
+def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> Check:
+    def run(scene: Scene) -> Array:
+        velocity = listed(corrected(name.subject), may_stop=False).rows(scene).velocity
+        # None is as good as no rows: nothing settles.
+        return np.empty((0, 3)) if velocity is None else velocity
+
+    due = PROGRAM_REGISTRY[name.subject].order
+    return judged_order(name, order_of(scene, run, due, truth(velocity=True), "velocity", _PAIRS))
+
+
+def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
+    run = solved(name.subject, 1.0)
+    due = METHODS[name.subject].order
+    return judged_order(
+        name, order_of(scene, lambda each: run.rows(each).omega, due, truth(), pairs=_PAIRS)
+    )
+
+
+def judged_order(name: Name, found: Order) -> Check:
+    """Return the check that the order is as due; what the cases can't judge fails."""
+    missing = None if found.value is None else found.due - found.value
+    passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
+    return name.judged(passed, str(found), missing, _ORDER_SLACK)
+
+
+def _by_ivp(scene: Scene) -> Reference:
+    """Return what `solve_ivp` takes for the truth, good to its tolerance."""
+    tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
+    run = solved(_IVP, tolerance).rows(scene)
+    largest = float(np.abs(run.omega).max())
+    return Reference(run.time, run.omega, None, "solve_ivp", tolerance * largest)

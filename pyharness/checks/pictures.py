@@ -1,0 +1,280 @@
+"""The pictures: of any trial what each method found, of Brouwer's law, of linear stability."""
+
+import re
+import textwrap
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from pyharness.checks.check import Check
+from pyharness.checks.stress import Trial
+from pyharness.model.errors import InputError
+from pyharness.model.report import Column, Picture, Table, digits, numbers
+from pyharness.theory.brouwer import LAWS
+from pyharness.theory.regions import Regions
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from pyharness.checks.trials.length import Drift
+
+_FLOOR = 1e-18  # what is less, or exactly 0, lies here
+_TOP = 3.0
+_COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
+_MARKERS = {"error": "o", "drift": "v"}
+_COLUMNS = 2
+_PLACES_PER_LETTER = 0.6
+_COARSE = 1e-6
+
+
+class _Mark(NamedTuple):
+    """A check: its method, the kind of its circumstance and all of it, and what sets it apart.
+
+    `rank` is the kind of setting, `what` error or drift where it is either.
+    """
+
+    method: str
+    kind: str
+    circumstance: str
+    rank: str
+    what: str
+    check: Check
+
+    @property
+    def style(self) -> dict[str, Any]:
+        """Of the marker."""
+        marker = _MARKERS.get(self.what, "s" if self.rank else "D")
+        return {"marker": marker, "color": _COLORS.get(self.rank, "black"), "linestyle": "none"}
+
+
+def _mark(check: Check) -> _Mark:
+    name = check.name
+    kind = re.split(r"[-^]?\d", name.circumstance, maxsplit=1)[0].rstrip("-")
+    rank = name.setting or name.quantity
+    with suppress(ValueError):
+        # Tolerances that vary are one series.
+        rank = "coarse" if float(rank) >= _COARSE else "fine"
+    what = name.quantity if name.quantity in _MARKERS else ""
+    return _Mark(name.subject, kind, name.circumstance, rank, what, check)
+
+
+def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
+    """Draw a panel for each method.
+
+    Circumstances whose names begin alike stand together, in the order in which they were tried.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    drawn = [check for check in checks if check.name.circumstance and check.value is not None]
+    if not drawn:
+        raise InputError(
+            "--plot: none of these checks has a number to draw; choose others by --only"
+        )
+    marks = list(map(_mark, drawn))
+    places = _places(marks)
+    methods = list(dict.fromkeys(mark.method for mark in marks))
+    columns = min(_COLUMNS, len(methods))
+    rows = -(-len(methods) // columns)
+    width = max(5.0, 2.0 + 0.11 * max(places.values(), default=0.0))
+    figure = Figure(figsize=(width * columns, 2.6 * rows + 1.6), dpi=110, layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    for axes, name in zip(grid.flat, methods, strict=False):
+        _panel(axes, name, [mark for mark in marks if mark.method == name], places)
+    for axes in grid.flat[len(methods) :]:
+        axes.set_visible(False)
+    # What tells a circumstance from others of its kind.
+    labels = [name[len(kind) :].lstrip("-") or name for kind, name in places]
+    for axes in grid[-1]:
+        axes.set_xticks(list(places.values()), labels, rotation=90)
+        axes.tick_params(axis="x", labelsize=6)
+    grid[0, 0].set_ylim(_FLOOR / 2.0, _TOP * 2.0)
+    series = {(mark.rank, mark.what): mark for mark in reversed(marks)}
+    handles = [
+        Line2D([], [], **series[each].style, markersize=4.0, label=_label(*each))
+        for each in dict.fromkeys((mark.rank, mark.what) for mark in marks)
+    ]
+    inches = width * columns
+    told = (
+        f"{trial.name}: {trial.title}",
+        "Drift: of energy and momentum. Lines: limits. Open: described, no limit. "
+        f"Coarse: tolerances of {_COARSE:g} and more, fine: below.",
+    )
+    lines = [line for each in told for line in textwrap.wrap(each, int(13.0 * inches))]
+    # The title is the key's: they would not make room for each other.
+    figure.legend(
+        handles=handles, loc="outside upper center", ncols=min(len(handles), int(inches)),
+        frameon=False, fontsize=8, title="\n".join(lines), title_fontsize=9,
+    )  # fmt: skip
+    found = [[check.id, repr(check.value), repr(check.limit), check.note] for check in drawn]
+    return Picture(figure, numbers("id value limit note", found))
+
+
+def _label(rank: str, what: str) -> str:
+    return f"{rank} {what}".strip() or "no setting"
+
+
+def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
+    """Return where each circumstance stands: kinds side by side, with room for their names."""
+    names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
+    places = {}
+    place = 0.0
+    for kind in dict.fromkeys(kind for kind, _ in names):
+        members = [each for each in names if each[0] == kind]
+        spare = max(0.0, _PLACES_PER_LETTER * len(kind) - len(members))
+        place += 0.5 * spare
+        for each in members:
+            places[each] = place
+            place += 1.0
+        place += 1.0 + 0.5 * spare
+    return places
+
+
+def _panel(
+    axes: "Axes", name: str, marks: Sequence[_Mark], places: dict[tuple[str, str], float]
+) -> None:
+    def at(some: Sequence[_Mark]) -> list[float]:
+        return [places[mark.kind, mark.circumstance] for mark in some]
+
+    for rank, what in dict.fromkeys((mark.rank, mark.what) for mark in marks):
+        members = [mark for mark in marks if (mark.rank, mark.what) == (rank, what)]
+        style = members[0].style
+        for judged in (True, False):
+            own = [mark for mark in members if (mark.check.limit is not None) == judged]
+            axes.plot(
+                at(own), [_inside(mark.check.value) for mark in own], **style, markersize=3.0,
+                markerfacecolor=style["color"] if judged else "none", markeredgewidth=0.6,
+            )  # fmt: skip
+        limited = [mark for mark in members if mark.check.limit is not None]
+        for kind in dict.fromkeys(mark.kind for mark in members):
+            own = [mark for mark in limited if mark.kind == kind]
+            axes.plot(
+                at(own), [_inside(mark.check.limit) for mark in own], color=style["color"],
+                linewidth=0.8, linestyle=(0, (1, 1.2)) if what == "drift" else "-",
+            )  # fmt: skip
+    axes.set_yscale("log")
+    # Above the names of the kinds.
+    axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
+    axes.grid(visible=True, axis="y", linewidth=0.3)
+    axes.tick_params(labelsize=7)
+    for kind in dict.fromkeys(kind for kind, _ in places):
+        own_places = [place for (each, _), place in places.items() if each == kind]
+        middle = 0.5 * (min(own_places) + max(own_places))
+        axes.text(middle, 1.01, kind, fontsize=7, ha="center", transform=axes.get_xaxis_transform())
+
+
+def _inside(value: float | None) -> float:
+    if value is None or value != value:
+        return _TOP
+    return min(_TOP, max(_FLOOR, abs(value)))
+
+
+_SHOWN = ("energy", "phase")
+_OF_METHODS: dict[str, dict[str, Any]] = {
+    "taylor": {"linestyle": "-", "marker": "o", "color": "#1040a0"},
+    "gauss-8": {"linestyle": (0, (6, 1.5)), "marker": "s", "color": "#3a86c8"},
+    "gauss-4": {"linestyle": (0, (1, 1.5)), "marker": "^", "color": "#b02018"},
+}
+
+
+def length_picture(found: Sequence["Drift"]) -> Picture:
+    """Draw energy and phase of each motion."""
+    from matplotlib.figure import Figure
+
+    motions = list(dict.fromkeys(each.motion for each in found))
+    figure = Figure(figsize=(10.0, 8.0), dpi=100, layout="constrained")
+    axes = figure.subplots(len(_SHOWN), len(motions), squeeze=False, sharex=True, sharey="row")
+    for row, what in enumerate(_SHOWN):
+        for column, motion in enumerate(motions):
+            one = axes[row, column]
+            own = [each for each in found if (each.motion, each.what) == (motion, what)]
+            for each in own:
+                style = _OF_METHODS[each.method]
+                many = each.starts > 1
+                marked = {"label": each.method, "markersize": 4, **style}
+                one.loglog(each.steps[many], each.error[many], **marked)
+                # One start alone: open, and not joined to what twelve came to.
+                alone = style | {"linestyle": "", "markerfacecolor": "none"}
+                one.loglog(each.steps[~many], each.error[~many], markersize=5, **alone)
+                one.loglog(each.steps, each.limits, color=style["color"], linewidth=0.5)
+            ends = np.array([1e2, 1e7])
+            begin = min(each.error[0] for each in own)
+            for power, line in ((LAWS[what], "--"), (LAWS[what] + 0.5, ":")):
+                law = begin * (ends / ends[0]) ** power
+                label = f"power {power:g}: " + ("chance" if line == "--" else "a preference")
+                one.loglog(ends, law, line, color="#707070", linewidth=1.0, label=label)
+            one.grid(visible=True, linewidth=0.3)
+            one.set_title(f"{motion}: {what}", fontsize=10)
+            one.legend(fontsize=8, loc="upper left")
+            if row == len(_SHOWN) - 1:
+                one.set_xlabel("steps")
+        axes[row, 0].set_ylabel("error of phase (rad)" if what == "phase" else "relative error")
+    figure.suptitle(
+        "Errors over many starts of one motion; open: of one start. Thin: the bounds.", fontsize=10
+    )
+    rows = [
+        [each.motion, each.method, each.what, f"{n:.0f}", *row]
+        for each in found
+        for n, *row in zip(each.steps, each.error, each.limits, each.starts, strict=True)
+    ]
+    return Picture(figure, numbers("motion method what steps error limit starts", rows))
+
+
+# Told apart without colour: by dash and width.
+_OF_REGIONS: tuple[dict[str, Any], ...] = (
+    {"color": "#000000", "linestyle": "solid", "linewidth": 2.2},
+    {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.2},
+    {"color": "#c02020", "linestyle": (0, (6, 2)), "linewidth": 1.8},
+    {"color": "#107040", "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.1},
+    {"color": "#806000", "linestyle": (0, (2, 3)), "linewidth": 1.1},
+)
+_LEAST = 1e-13
+
+
+def regions_picture(found: Regions) -> Picture:
+    """Draw the regions beside the growth along the imaginary axis."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")
+    plane, axis = figure.subplots(1, 2)
+    plane.axvspan(found.real[0], 0.0, color="#ededed", zorder=0)
+    told = "grey: Gauss collocation, the whole left half-plane"
+    plane.text(-4.5, 3.25, told, fontsize=8, color="#505050")
+    handles = []
+    for each, style in zip(found.regions, _OF_REGIONS, strict=True):
+        plane.contour(
+            found.real, found.imaginary, each.radius, levels=[1.0],
+            colors=style["color"], linestyles=[style["linestyle"]],
+            linewidths=style["linewidth"],
+        )  # fmt: skip
+        for sign, alpha in ((1.0, 1.0), (-1.0, 0.35)):
+            shown = sign * each.growth > _LEAST
+            values = np.where(shown, sign * each.growth, np.nan)
+            (line,) = axis.plot(found.distances, values, alpha=alpha, label=each.name, **style)
+            if sign > 0.0:
+                handles.append(line)
+    plane.axhline(0.0, color="#808080", linewidth=0.6)
+    plane.axvline(0.0, color="#808080", linewidth=0.6)
+    plane.set_aspect("equal")
+    plane.set_xlabel("real part of z = h lambda")
+    plane.set_ylabel("imaginary part")
+    plane.set_title("Where a disturbance does not grow", fontsize=10)
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_ylim(_LEAST, 10.0)
+    axis.axvline(0.05, color="#808080", linewidth=0.8)
+    axis.text(0.053, 2e-13, "Case 2 at .01 s", fontsize=8, color="#505050")
+    axis.set_xlabel("z / i: angle of the wobble in a step (rad)")
+    axis.set_ylabel("growth of a wobble in a step; faint: decay")
+    axis.set_title("Along the imaginary axis: spinning about a stable axis", fontsize=10)
+    axis.grid(visible=True, linewidth=0.3)
+    figure.legend(
+        handles, [each.name for each in found.regions], loc="outside lower center", ncols=3,
+        handlelength=5.0, frameon=False, fontsize=9,
+    )  # fmt: skip
+    columns = [Column("distance", full=digits(".6g"), unit="rad")]
+    columns += [Column(each.name, full=digits(".3g")) for each in found.regions]
+    rows = np.column_stack([found.distances, *(each.growth for each in found.regions)])
+    return Picture(figure, Table(columns, rows))

@@ -1,0 +1,87 @@
+"""Self-test of `verify`: one plant after another, which check catches which, and its report."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pyharness.checks.check import Check, Name
+from pyharness.checks.kinds import verify
+from pyharness.checks.plants.plants import PLANTS, Plant
+from pyharness.checks.report import checks_report
+from pyharness.checks.selection import Selection
+from pyharness.model.report import Report
+
+# What is recorded can't tell a fault from a change that was meant.
+_NOT_ENOUGH = "golden"
+_DRAWS = 12
+
+
+@dataclass(frozen=True)
+class Caught:
+    """How a plant fared, or the control, without a fault.
+
+    Attributes
+    ----------
+    failed : mapping of str to int
+        Failed checks by kind.
+    example : str
+        The name of one check that failed, not of the record where there is another.
+    """
+
+    plant: Plant | None
+    failed: Counter[str]
+    example: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether a check that is not the record caught it; of the control, whether none did."""
+        return bool(self.failed.keys() - {_NOT_ENOUGH}) if self.plant else not self.failed
+
+    @property
+    def counts(self) -> str:
+        """How many checks of each kind failed."""
+        return ", ".join(f"{kind} {count}" for kind, count in self.failed.items())
+
+
+def self_test(seed: str, record: Path) -> Iterator[Caught]:
+    """Verify a part of everything without a fault, and with each plant the kinds that see it."""
+    chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
+    yield _caught(None, chosen)
+    for plant in PLANTS:
+        with plant.planted():
+            yield _caught(plant, replace(chosen, only=plant.kinds))
+
+
+def _caught(plant: Plant | None, chosen: Selection) -> Caught:
+    failed: Counter[str] = Counter()
+    example = ""
+    for check in verify(chosen):
+        if not check.passed:
+            failed[check.suite] += 1
+            if not example or example.startswith(_NOT_ENOUGH):
+                example = check.id
+    return Caught(plant, failed, example)
+
+
+def as_check(caught: Caught) -> Check:
+    """Return the finding as a check."""
+    name = Name("self-test", caught.plant.name if caught.plant else "none")
+    value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
+    again = "python -m pyharness verify --self-test"
+    note = f"caught by {caught.counts or 'nothing'}"
+    return Check(name, caught.passed, value, None, note, again)
+
+
+def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:
+    """Report each fault, and how many checks of each kind caught it."""
+    told = []
+    for caught in found:
+        plant = caught.plant or Plant("none", "no fault: nothing may fail", nullcontext, ())
+        by = f"caught by {caught.counts} ({caught.example})" if caught.failed else "nothing fails"
+        told += [f"{'' if caught.passed else 'FAILED '}{plant.name}: {plant.fault}", f"  {by}"]
+    missed = sum(not caught.passed for caught in found)
+    end = f"{missed} not as it should be" if missed else "each caught by more than the record"
+    end = f"{len(found) - 1} plants and a control: {end}"
+    return checks_report("verify", list(map(as_check, found)), [title, told, [end]], seed=seed)

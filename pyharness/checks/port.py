@@ -1,0 +1,103 @@
+"""A port of the programs by anyone, in any language, against the twins: bit for bit in all cells.
+
+`docs/ports.md` tells the protocol.
+"""
+
+import math
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pyharness.checks.cells import of_cell
+from pyharness.checks.check import Check, Name, selected
+from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
+from pyharness.checks.port_protocol import VARIABLES, Answer, read_answer, request
+from pyharness.compare.agreement import ulps
+from pyharness.model.listing import Listing
+from pyharness.model.report import counted
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.original.cells import all_cells, cell_name
+from pyharness.original.programs import PROGRAM_REGISTRY
+
+Cell = tuple[str, Listing, int]
+
+
+def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
+    """Return name, listing and case of the cells asked for, `cells` by leading parts of names."""
+    return [
+        (cell_name(listing, case), listing, case)
+        for listing, case in all_cells()
+        if listing.program in programs
+        and case in cases
+        and selected(cell_name(listing, case), cells)
+    ]
+
+
+def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[Check]:
+    """Hold a port against the twins; what is no answer fails, and ends the checks.
+
+    `patience`: how long to wait for an answer (s). InputError for no command.
+    """
+    verb = f"python -m pyharness verify --port {shlex.quote(command)}"
+    name, again = Name("port", "start"), verb
+    try:
+        with PortProcess(command, patience) as process:
+            for cell, listing, case in cells:
+                name, again = of_cell("port", listing, case), f"{verb} --cell {cell}"
+                yield replace(_held(name, process, listing, case_scene(case)), again=again)
+    except PortError as error:
+        yield replace(name.judged(False, str(error)), again=again)
+
+
+def _held(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> Check:
+    answer = read_answer(process.ask(request(scene, listing)), scene.steps)
+    twin = PROGRAM_REGISTRY[listing.program].run(scene, listing, "python")
+    note = "; ".join(differences(twin, answer))
+    wanted = _rows(twin)
+    same = len(wanted) == len(answer.rows)
+    apart = ulps(wanted, answer.rows) if same else math.inf
+    return name.judged(not note, note, apart, 0.0)
+
+
+def differences(twin: Trajectory, answer: Answer) -> list[str]:
+    """Say where an answer first differs from the twin, and all that differs in how it ended."""
+    wanted, given = _rows(twin), answer.rows
+    found = []
+    for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
+        apart = [ulps(due[i : i + 1], row[i : i + 1]) for i in range(len(VARIABLES))]
+        if any(apart):
+            first = next(i for i, distance in enumerate(apart) if distance)
+            found.append(
+                f"first at step {step}, {VARIABLES[first]}: {apart[first]:.0f} ulp "
+                f"({float(row[first]).hex()}, due {float(due[first]).hex()})"
+            )
+            break
+    for name, value, wants in (
+        ("rows", len(given), len(wanted)),
+        ("ended", answer.ended, twin.ended),
+        ("stop", answer.stop, twin.stop),
+    ):
+        if value != wants:
+            found.append(f"{name}: {value}, due {wants}")
+    found += _of_ier(None if twin.ier is None else twin.ier.tolist(), answer.ier)
+    return found
+
+
+def _of_ier(wanted: list[int] | None, given: list[int] | None) -> list[str]:
+    if wanted is None or given is None:
+        due = "null" if wanted is None else counted(len(wanted), "value")
+        return [] if wanted is given else [f"ier: due {due}"]
+    pairs = enumerate(zip(wanted, given, strict=False), 1)
+    wrong = [
+        f"IER at step {step}: {value}, due {due}" for step, (due, value) in pairs if due != value
+    ]
+    return wrong[:1]
+
+
+def _rows(twin: Trajectory) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    assert twin.velocity is not None
+    return np.column_stack([twin.recorded_time, twin.omega, twin.velocity])

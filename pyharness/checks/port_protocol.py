@@ -1,0 +1,145 @@
+"""The lines that a port reads and writes (docs/ports.md has every field)."""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pyharness.checks.port_process import PortError
+from pyharness.model.errors import kind_of
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing
+from pyharness.model.records import listing_record, scene_record
+from pyharness.model.scene import Scene
+from pyharness.model.schema import SCHEMAS
+from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop
+from pyharness.original.equations import card_torque
+
+VARIABLES = ("TIME", "U1", "U2", "U3", "V1", "V2", "V3")
+"""Of a row, as TAPE5 has them: s, rad/s and m/s."""
+ENDINGS = ("complete", "stopped", "overflow")
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A run as a port has it.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (n, 7)
+        `VARIABLES` after each step.
+    ended : str
+        One of `ENDINGS`.
+    stop : Stop or None
+        What the Lipschitz test found.
+    ier : list of int, or None
+        IER of each step; None for a program that prints none.
+    """
+
+    rows: Array
+    ended: str
+    stop: Stop | None
+    ier: list[int] | None
+
+
+def request(
+    scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
+) -> bytes:
+    """Return the line that asks for a run; its decimals give the floats back.
+
+    `lipschitz` in 1/s, by default that of the decks; without `may_stop` no test ends the run.
+    """
+    asked = {
+        "schema": SCHEMAS["port request"],
+        "program": listing.program,
+        "scene": asked_scene(scene),
+        "listing": listing_record(listing),
+        "lipschitz": facts("cases")["deck"]["lipschitz"] if lipschitz is None else lipschitz,
+        "may_stop": may_stop,
+    }
+    return json.dumps(asked, allow_nan=False).encode()
+
+
+def asked_scene(scene: Scene) -> dict[str, Any]:
+    """Return a scene as a port reads it."""
+    return {
+        **scene_record(scene),
+        "masses": scene.masses,
+        "forces": scene.forces,
+        "initial_torque": card_torque(scene),
+    }
+
+
+def read_answer(line: bytes, steps: int) -> Answer:
+    """Return what a port answered to a scene of so many steps; PortError for what is no answer."""
+    try:
+        given = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        shown = repr(line[:60].decode(errors="replace"))
+        raise PortError(f"no JSON: {shown} ({error})") from None
+    if not isinstance(given, dict):
+        raise PortError(f"{kind_of(given)} where an object belongs")
+    for name in ("rows", "ended", "stop", "ier"):
+        if name not in given:
+            raise PortError(f"no '{name}'; an answer has rows, ended, stop and ier")
+    ended = given["ended"]
+    if ended not in ENDINGS:
+        raise PortError(f"ended is {json.dumps(ended)[:60]}; allowed: {', '.join(ENDINGS)}")
+    rows = [_row(n, row) for n, row in enumerate(_list("rows", given["rows"]), 1)]
+    if len(rows) > steps or (ended == "complete" and len(rows) < steps):
+        raise PortError(f"{len(rows)} rows of a run of {steps} steps that ended '{ended}'")
+    stop = None if given["stop"] is None else _stop(given["stop"])
+    if (stop is None) == (ended == "stopped"):
+        raise PortError(f"ended '{ended}' with {'no' if stop is None else 'a'} stop")
+    ier = given["ier"]
+    if ier is not None:
+        ier = [_whole("ier", value) for value in _list("ier", ier)]
+        if len(ier) != len(rows):
+            raise PortError(f"{len(ier)} values of ier with {len(rows)} rows")
+    return Answer(np.array(rows).reshape(-1, len(VARIABLES)), ended, stop, ier)
+
+
+def _row(number: int, row: object) -> list[float]:
+    where = f"row {number}"
+    values = _list(where, row)
+    if len(values) != len(VARIABLES):
+        count = f"{len(values)} numbers"
+        raise PortError(f"{where} has {count}; it takes {len(VARIABLES)}: {' '.join(VARIABLES)}")
+    return [_number(where, value) for value in values]
+
+
+def _stop(stop: object) -> Stop:
+    if not isinstance(stop, dict) or {"step", "variable", "quotient"} - set(stop):
+        raise PortError("stop is no object with step, variable and quotient")
+    if stop["variable"] not in STOP_VARIABLES:
+        allowed = ", ".join(STOP_VARIABLES)
+        raise PortError(f"stop variable {json.dumps(stop['variable'])[:60]}; allowed: {allowed}")
+    step = _whole("stop step", stop["step"])
+    return Stop(step, stop["variable"], _number("stop quotient", stop["quotient"]))
+
+
+def _list(where: str, value: object) -> list[Any]:
+    if not isinstance(value, list):
+        raise PortError(f"{where}: {kind_of(value)} where a list belongs")
+    return value
+
+
+def _whole(where: str, value: object) -> int:
+    if type(value) is not int:
+        raise PortError(f"{where}: {kind_of(value)} where a whole number belongs")
+    return value
+
+
+def _number(where: str, value: object) -> float:
+    """Return a number that JSON has as such, or as text: hexadecimal, decimal, inf, nan."""
+    if type(value) is float:
+        return value
+    try:
+        if type(value) is int:
+            return float(value)
+        if isinstance(value, str):
+            return float.fromhex(value) if "x" in value.lower() else float(value)
+    except (ValueError, OverflowError):
+        raise PortError(f"{where}: {json.dumps(value)[:60]} is no number of binary64") from None
+    raise PortError(f"{where}: {kind_of(value)} where a number belongs")

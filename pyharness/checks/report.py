@@ -1,0 +1,115 @@
+"""The report of checks: each failure, a summary by kind, the record, the cases of JUnit."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from pyharness.checks.check import Check, Sample, severity
+from pyharness.model.records import build_record
+from pyharness.model.report import Column, Line, Report, Section, Table, counted, short, words
+
+_MOST_FAILURES = 50
+_FEW = 10  # checks, each of which is told
+_GROUPS = (
+    *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
+)  # fmt: skip
+
+
+def checks_report(
+    verb: str, checks: Sequence[Check], text: Sequence[Section], **extra: Any
+) -> Report:
+    """Report checks: told in `text`, with `extra` in the record."""
+    return Report(
+        verb,
+        text,
+        record=lambda: {
+            "checks": [check.record() for check in checks],
+            "passed": all(check.passed for check in checks),
+            **extra,
+            "build": build_record(),
+        },
+        cases=[(each.suite, each.id, _failure(each), each.replay) for each in checks],
+    )
+
+
+def _failure(check: Check) -> str:
+    if check.passed:
+        return ""
+    note = f": {check.note}" if check.note else ""
+    return f"{short(check.value)}, limit {short(check.limit)}{note}"
+
+
+def summary(
+    title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Section = ()
+) -> list[Section]:
+    """Return the failures, then a row for each group of checks that share `depth` parts.
+
+    `more` stands between these rows and the verdict.
+    """
+    groups: dict[str, list[Check]] = {}
+    for check in checks:
+        groups.setdefault("/".join(check.id.split("/")[:depth]), []).append(check)
+    rows = []
+    for name, members in groups.items():
+        worst = max((severity(check)[1] for check in members if check.limit), default=None)
+        rows.append([name, len(members), sum(not check.passed for check in members), worst])
+    return [title, told_singly(checks), [Table(_GROUPS, rows)], more, [verdict(checks)]]
+
+
+def told_singly(checks: Sequence[Check]) -> list[str]:
+    """Return each check that failed with its replay, and each that passed where there are few."""
+    failed = [check for check in checks if not check.passed]
+    lines = []
+    for check in failed[:_MOST_FAILURES]:
+        # The replay whole, however long: it is there to be copied.
+        lines += [f"FAILED {check.id}{_seen(check, ' > ')}", Line(f"  {check.replay}")]
+    if len(failed) > _MOST_FAILURES:
+        lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")
+    if len(checks) <= _FEW:
+        lines += [f"{each.id}:{_seen(each, ', limit ')}" for each in checks if each.passed]
+    return lines
+
+
+def _seen(check: Check, against: str) -> str:
+    found = "" if check.value is None else f" {short(check.value)}"
+    allowed = "" if check.limit is None else f"{against}{short(check.limit)}"
+    return f"{found}{allowed}" + (f" ({check.note})" if check.note else "")
+
+
+_BANDS = ((1e-6, "1e-3 to 1e-6"), (1e-9, "1e-6 to 1e-9"), (0.0, "finer"))
+_GROWTHS = (10.0, 1e3, math.inf)
+_SAMPLES = (
+    *words("entrance tolerance"), Column("K<10"), Column("worst", short),
+    Column("K<1e3"), Column("worst", short), Column("K>1e3"), Column("worst", short),
+)  # fmt: skip
+
+
+def samples(checks: Sequence[Check], rounding: float) -> Section:
+    """Return a row for each entrance and band of tolerances: the worst error over the tolerance.
+
+    What rounding makes, `rounding` for each factor of growth, is taken off the error. Columns are
+    the growth of small differences: checks with a result, and the worst of them.
+    """
+    cells: dict[tuple[str, str], list[list[float]]] = {}
+    for check in checks:
+        if isinstance(check, Sample) and check.value is not None:
+            band = next(name for least, name in _BANDS if check.tolerance >= least)
+            column = next(k for k, most in enumerate(_GROWTHS) if check.growth < most)
+            over = (check.value - rounding * check.growth) / check.tolerance
+            cells.setdefault((check.entrance, band), [[], [], []])[column].append(max(0.0, over))
+    if not cells:
+        return []
+    bands = [name for _, name in _BANDS]
+    rows = [
+        [*key, *(x for values in cells[key] for x in (len(values), max(values, default=None)))]
+        for key in sorted(cells, key=lambda each: (each[0], bands.index(each[1])))
+    ]
+    told = "worst: error less rounding (2e-15 K) over the tolerance; K: growth of a difference"
+    return [Table(_SAMPLES, rows), told]
+
+
+def verdict(checks: Sequence[Check]) -> str:
+    """Say in a line how many checks were made and how many failed."""
+    failed = sum(not check.passed for check in checks)
+    made = counted(len(checks), "check")
+    return f"{made}, {failed} failed" if failed else f"{made}, all well"

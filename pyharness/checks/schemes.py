@@ -1,0 +1,134 @@
+"""The corrected programs against the schemes that they are, every step worked out anew.
+
+Both languages could be wrong alike, by less than an order shows. Here each step starts from what
+the program had before it, so that only the rounding of one step may differ.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.methods import cases
+from pyharness.checks.selection import Selection
+from pyharness.model.listing import PROGRAMS, corrected
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.theory.collocation_matrices import PARTS
+from pyharness.theory.conditioning import ROUNDING, magnitudes
+
+# Of a rate, with the stages that lead to it, and of the sum that it goes into.
+_ROUNDINGS = 32.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One stage of every step; columns are U1 ... U3, V1 ... V3."""
+
+    # shape (n, 6); where the right-hand sides are taken (rad/s, m/s), and what they are
+    state: Array
+    rate: Array
+    rounding: Array  # shape (n, 6); by how much the rate of another who computes it may differ
+
+
+def schemes(chosen: Selection) -> Iterator[Attempt]:
+    """Hold every step of the corrected programs against its scheme, omega and velocity.
+
+    The value is the largest share of what rounding may do.
+    """
+    for case in cases(chosen, (7,)):
+        for program in PROGRAMS:
+            yield Attempt(
+                Name("schemes", program, f"case-{case}"), partial(_held, case_scene(case))
+            )
+
+
+def _held(scene: Scene, name: Name) -> Check:
+    program = name.subject
+    run = PROGRAM_REGISTRY[program].run(scene, corrected(program), may_stop=False)
+    if not is_whole(scene, run):
+        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0)
+    due, rounding = _scheme(program, scene, run)
+    off = np.abs(rows(run) - due)
+    share = np.divide(off, rounding, out=np.zeros_like(off), where=off != 0.0)
+    step, column = divmod(int(share.argmax()), 6)
+    note = f"most at step {step + 1}, {'UV'[column // 3]}{column % 3 + 1}"
+    return name.bounded(float(share.max()), 1.0, note)
+
+
+def is_whole(scene: Scene, run: Trajectory) -> bool:
+    """Whether a run has all its rows, with velocity."""
+    return run.velocity is not None and len(run.omega) == len(run.velocity) == scene.steps
+
+
+def rows(run: Trajectory) -> Array:
+    """Return U and V after every step, shape (n, 6)."""
+    assert run.velocity is not None
+    return np.hstack([run.omega, run.velocity])
+
+
+def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
+    """Return those of W. Kutta (1901), of every step of a whole run."""
+    h = scene.step_size
+    first = _beginning(scene, run)
+    second = _stage(scene, 0.5, first.state + 0.5 * h * first.rate)
+    third = _stage(scene, 0.5, first.state + 0.5 * h * second.rate)
+    fourth = _stage(scene, 1.0, first.state + h * third.rate)
+    return first, second, third, fourth
+
+
+def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
+    """Return U and V after every step, and the rounding that is granted to them."""
+    if name not in PARTS:
+        kutta = stages(scene, run)
+        return _put_together(scene, kutta[0], kutta, (1 / 6, 1 / 3, 1 / 3, 1 / 6), 1.0)
+    first = _beginning(scene, run)
+    parts = np.array([float(part) for part in PARTS[name]])
+    powers = np.arange(1, len(parts) + 1)
+    matrix = np.power.outer(parts, powers - 1)
+    # The integral over the step of the polynomial through the rates at the points.
+    weights = np.linalg.solve(matrix.T, 1.0 / powers)
+    points = [
+        _stage(scene, part, first.state + part * scene.step_size * first.rate) for part in parts
+    ]
+    # The programs solve for the coefficients of t, t**2, ... first.
+    condition = float(np.linalg.cond(powers * matrix, np.inf))
+    return _put_together(scene, first, points, weights, condition)
+
+
+def _put_together(
+    scene: Scene,
+    first: Stage,
+    points: Sequence[Stage],
+    weights: Sequence[float] | Array,
+    condition: float,
+) -> tuple[Array, Array]:
+    h = scene.step_size
+    rates = sum(weight * point.rate for weight, point in zip(weights, points, strict=True))
+    after = first.state + h * rates
+    sizes = np.max([point.rounding for point in points], axis=0)
+    return after, 4.0 * ROUNDING * (np.abs(first.state) + np.abs(after)) + h * condition * sizes
+
+
+def _beginning(scene: Scene, run: Trajectory) -> Stage:
+    before = np.vstack([[*scene.omega, 0.0, 0.0, 0.0], rows(run)[:-1]])
+    return _stage(scene, 0.0, before)
+
+
+def _stage(scene: Scene, part: float, state: Array) -> Stage:
+    """Return equations 16-18 and dV/dt = F/m - omega x V, `part` of a step after its beginning."""
+    omega, velocity = state[:, :3], state[:, 3:]
+    times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)
+    torque = np.array([scene.normalized_torque(time) for time in times.tolist()])
+    products = scene.euler_coefficients * np.roll(omega, -1, axis=1) * np.roll(omega, -2, axis=1)
+    pull = np.divide(scene.forces, scene.masses[0])  # corrected: one mass
+    rate = np.hstack([torque + products, pull + np.cross(velocity, omega)])
+    u, v = np.abs(omega), np.abs(velocity)
+    crossed = np.roll(v, -1, axis=1) * np.roll(u, -2, axis=1)
+    crossed += np.roll(v, -2, axis=1) * np.roll(u, -1, axis=1)
+    size = np.hstack([magnitudes(scene, times, omega), np.abs(pull) + crossed])
+    return Stage(state, rate, _ROUNDINGS * ROUNDING * size)

@@ -1,0 +1,43 @@
+"""What to verify: which checks, which random draws, which record."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pyharness.checks.check import Name, may_hold, selected
+from pyharness.scenes.random_scenes import weekly_seed
+
+if TYPE_CHECKING:
+    from pyharness.checks.external_file import Problem
+
+DRAWS = 1000
+RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What to verify."""
+
+    only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; all where empty
+    seed: str = field(default_factory=weekly_seed)  # of the random draws; by default the week
+    draws: int = DRAWS  # how many of them
+    record: Path = RECORD  # the folder of the golden record, by default that of the checkout
+    # with published figures; None for those that come with the project
+    problems: Sequence["Problem"] | None = None
+    thin: bool = False  # a part that touches every kind, for `verify --self-test`
+
+    def asks(self, id: str) -> bool:
+        """Whether the check of that id is requested."""
+        return selected(id, self.only)
+
+    def may_ask(self, id: str) -> bool:
+        """Whether a check below that id may be requested."""
+        return may_hold(id, self.only)
+
+    def drawn(self, number: int, subject: str = "") -> Name:
+        """Return the name of a check of a random draw."""
+        draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
+        options = f"{draws} --seed {shlex.quote(self.seed)}"
+        return Name("random", subject, str(number), options=options)

@@ -1,0 +1,126 @@
+"""The stop test of the Runge-Kutta program, against eq. 19 worked out anew along its own run.
+
+Both languages could test the wrong thing alike. Here the quotients of all steps are known before
+the program is run with constants just below and just above each that is larger than all before.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.methods import cases
+from pyharness.checks.schemes import Stage, is_whole, rows, stages
+from pyharness.checks.selection import Selection
+from pyharness.model.listing import Listing, corrected, names_of
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
+from pyharness.original.cells import listing_name, subsets
+from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.theory.conditioning import ROUNDING
+
+_PROGRAM = "runge-kutta"
+
+Stages = tuple[Stage, Stage, Stage, Stage]
+
+
+@dataclass(frozen=True, eq=False)
+class Quotients:
+    """Change of K over change of U in every step, in the order in which the program looks."""
+
+    values: Array  # shape (n, m), 1/s
+    rounding: Array  # shape (n, m); by how much those of another who computes them may differ
+    names: list[str]  # what the m of a step are called
+
+
+def stops(chosen: Selection) -> Iterator[Attempt]:
+    """Hold where the program stops, why and at which quotient against the formula.
+
+    With every way of testing that a listing can have. The value is the largest share of what
+    rounding may do to a quotient.
+    """
+    ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
+    for case in cases(chosen, (3,)):
+        known = cache(partial(_run, case_scene(case)))
+        for defects in subsets(ways):
+            listing = Listing(_PROGRAM, defects)
+            name = Name("stops", "", f"case-{case}", listing_name(listing))
+            yield Attempt(name, partial(_held, case_scene(case), listing, known))
+
+
+def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
+    """Return a run that is not stopped, and the stages of its steps where it is whole."""
+    run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
+    return run, stages(scene, run) if is_whole(scene, run) else None
+
+
+def _held(
+    scene: Scene,
+    listing: Listing,
+    known: Callable[[], tuple[Trajectory, Stages | None]],
+    name: Name,
+) -> Check:
+    run, kutta = known()
+    if kutta is None:
+        return name.judged(False, f"{run.ended}, or no velocity", limit=1.0)
+    quotients = _quotients(scene, run, kutta, listing)
+    largest = 0.0
+    constants = _constants(quotients)
+    for constant in constants:
+        found = PROGRAM_REGISTRY[_PROGRAM].run(scene, listing, lipschitz=constant)
+        due = _due(quotients, constant)
+        seen = found.stop and (found.steps, found.stop.step, found.stop.variable)
+        if seen != (due and (due.step, due.step, due.variable)):
+            note = f"with {constant!r}: {found.stop or found.ended}, due {due or 'complete'}"
+            return name.judged(False, note, limit=1.0)
+        if found.stop and due:
+            granted = quotients.rounding[due.step - 1, quotients.names.index(due.variable)]
+            largest = max(largest, abs(found.stop.quotient - due.quotient) / granted)
+    return name.bounded(largest, 1.0, f"{len(constants)} constants")
+
+
+def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -> Quotients:
+    first, _, _, fourth = kutta
+    after = rows(run) if listing.has("lipschitz-mismatched-pairs") else fourth.state
+    velocity = listing.has("lipschitz-tests-velocity")
+    columns = [3, 4, 5, 0, 1, 2] if velocity else [0, 1, 2]
+    k, u = np.abs(fourth.rate - first.rate)[:, columns], np.abs(after - first.state)[:, columns]
+    k_rounding = (first.rounding + fourth.rounding)[:, columns]
+    # U4 and the result are the state before and an increment, each rounded.
+    stored = 2.0 * ROUNDING * (np.abs(first.state) + np.abs(after))
+    u_rounding = (stored + scene.step_size * (first.rounding + fourth.rounding))[:, columns]
+    names = [STOP_VARIABLES[column] for column in columns]
+    if not listing.has("lipschitz-per-component"):
+        names = ["UV" if velocity else "U"]
+        k, u, k_rounding, u_rounding = (
+            np.linalg.norm(each, axis=1, keepdims=True) for each in (k, u, k_rounding, u_rounding)
+        )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # 0 over 0 stops nothing.
+        values = np.where(k > 0.0, k / u, 0.0)
+        relative = np.where(k > 0.0, k_rounding / k + u_rounding / u, 0.0)
+    return Quotients(values, values * relative, names)
+
+
+def _constants(quotients: Quotients) -> list[float]:
+    """Return constants beside every quotient above all of the steps before, beyond rounding."""
+    constants = []
+    below = 0.0
+    for values, rounding in zip(quotients.values, quotients.rounding, strict=True):
+        beside = np.concatenate([values - 2.0 * rounding, values + 2.0 * rounding])
+        is_clear = (np.abs(beside[:, np.newaxis] - values) > rounding).all(axis=1)
+        constants += beside[is_clear & (beside > below)].tolist()
+        below = max(below, float(beside.max()))
+    return constants or [below]
+
+
+def _due(quotients: Quotients, constant: float) -> Stop | None:
+    """Return the stop at the first quotient above `constant`, or None."""
+    above = np.argwhere(quotients.values > constant)
+    if not len(above):
+        return None
+    row, column = above[0].tolist()
+    return Stop(row + 1, quotients.names[column], float(quotients.values[row, column]))

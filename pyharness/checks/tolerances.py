@@ -1,0 +1,103 @@
+"""Tolerances at which a method is tried, suite by suite, and what they may cost: no bounds.
+
+A budget counts right-hand sides; it decides which tolerances are affordable, not which pass.
+"""
+
+import math
+
+from pyharness.methods.plan import FEW_DIGITS
+from pyharness.methods.problem import closed_form
+from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.methods.scipy_ivp import steps_sum
+from pyharness.methods.solve import finest as finest_of
+from pyharness.model.scene import Scene
+from pyharness.scenes.extreme import speed
+from pyharness.theory.conditioning import Conditioning
+
+# In the cases; of solve_ivp no more is requested than it answers in a second.
+OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
+_SCIPY_OF_CASES = (1e-6, 1e-9)
+_OF_SELF_TEST = 1e-9
+# A middling tolerance; where a motion is violent, the next of the ladder.
+MIDDLING = 1e-6
+_LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
+# At their finest these take minutes for what the others do in seconds.
+_ONLY_MIDDLING = ("quick", "rk45", "radau")
+# Right-hand sides; and so many times as many for the coarsest tolerance.
+_BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
+_PATIENCE = 10.0
+_ORDERS = {"dop853": 8, "lsoda": 8, "radau": 5, "rk45": 5}
+_STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
+
+
+def of_case(name: str, thin: bool) -> list[float]:
+    """Return the tolerances at which a method is tried in a case; `thin` for the self-test."""
+    finest = METHODS[name].finest
+    if name in SCIPY_METHODS:
+        return [_SCIPY_OF_CASES[0]] if thin else list(_SCIPY_OF_CASES)
+    if thin:
+        return [max(finest, _OF_SELF_TEST)]
+    return [*(each for each in OF_CASES if each > finest), finest]
+
+
+def finest(name: str, scene: Scene, time: float) -> float:
+    """Return the finest tolerance at which a method is tried until `time` (s).
+
+    The one that it claims; where `solve_ivp` can't meet that in the scene, the next of the ladder.
+    """
+    met = finest_of(name, scene, time)
+    claimed = REGISTRY[name].finest
+    return claimed if met <= claimed else min((t for t in _LADDER if t >= 1.1 * met), default=1.0)
+
+
+def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
+    """Return two tolerances at which a method is tried: its finest, and one in the middle."""
+    if name in _ONLY_MIDDLING:
+        return [MIDDLING]
+    least = finest(name, scene, time)
+    return sorted({least, max(least, MIDDLING)})
+
+
+def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
+    """Return the finest tolerance within the budget and a coarse one; None for the scene's steps.
+
+    The scene's steps are for methods with a fixed step, and for Gauss collocation too.
+    """
+    if name in FIXED_STEP:
+        return [None]
+    if name == "closed-form" or (name == "auto" and closed_form(scene)):
+        return [METHODS["closed-form"].finest]
+    least = FEW_DIGITS if name == "quick" else finest(name, scene, time)
+    if name in GAUSS:
+        # Two solutions that are to agree can't where rounding parts them: the next of the ladder.
+        meetable = [each for each in _LADDER if each >= 4.0 * flow.rounding]
+        least = max(least, min(meetable, default=math.inf))
+    radians = speed(scene, flow.largest) * abs(time)
+    found = _within_budget(name, least, radians, flow.amplification)
+    return [*found, None] if name in GAUSS else [*found]
+
+
+def _within_budget(name: str, least: float, radians: float, amplification: float) -> list[float]:
+    most, coarsest = _BUDGETS.get(name, math.inf), _LADDER[-1]
+    costs = {
+        each: _cost(name, each, radians, amplification)
+        for each in sorted({least, *_LADDER})
+        if least <= each <= coarsest
+    }
+    allowed = [each for each, cost in costs.items() if cost <= most]
+    if not allowed and least <= coarsest:
+        return [coarsest] if costs[coarsest] <= _PATIENCE * most else []
+    return sorted({*allowed[:1], *({MIDDLING} & set(allowed))})
+
+
+def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
+    """Estimate the right-hand sides that a tolerance takes."""
+    if name in GAUSS:
+        stages = int(name[-1])
+        # The error of steps of z radians each, amplified: radians z**order.
+        z = math.pow(tolerance / (max(radians, 1.0) * amplification), 0.5 / stages)
+        return 12.0 * stages * radians / min(z, 1.0)
+    if name in SCIPY_METHODS:
+        a_step = tolerance / steps_sum(SCIPY_METHODS[name], radians, amplification)
+        return _STAGES[name] * radians / math.pow(a_step, 1.0 / (_ORDERS[name] + 1))
+    return 0.0

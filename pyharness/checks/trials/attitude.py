@@ -1,0 +1,298 @@
+"""Attitude without torque: separatrix, symmetry, a million revolutions, poles of the angles."""
+
+import math
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.hold import FORMS, refusable, scene_of
+from pyharness.checks.judge import (
+    Answer,
+    Policy,
+    Tried,
+    Truth,
+    by_rows,
+    judge,
+    linear,
+    lively,
+    tolerance_of,
+    unknown_flow,
+)
+from pyharness.checks.stress import Trial, named
+from pyharness.checks.tolerances import MIDDLING
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
+from pyharness.model.attitude import (
+    SEQUENCES,
+    Quaternion,
+    angle_between,
+    angles,
+    product,
+)
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.trajectory import Array, turned_to_space
+from pyharness.scenes.extreme import EXTREMES, POINTED
+from pyharness.scenes.random_scenes import random_scene
+from pyharness.scenes.rotated import turned
+from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
+from pyharness.truth.elliptic import torque_free
+from pyharness.truth.free_attitude import free_attitude, period_of
+
+# A closed form does not need the flow of a million revolutions.
+_unknown = partial(unknown_flow, 1.0)
+_SERIES = ("taylor", "dop853")
+_TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
+# An angle in degrees is rounded when it is formed, converted and read again, and three add up.
+_ANGLES = 64.0 * ROUNDING
+_BODIES = 8
+
+_MOTIONS = {
+    "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0), attitude=POINTED),
+    "tumbling": Scene(
+        "tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0), attitude=POINTED
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A problem turned as a whole, body or space, and its attitude turned back."""
+
+    scene: Callable[[Scene], Scene]
+    back: Callable[[Array], Array]
+
+
+def _about_body(turn: Quaternion, vectors: Callable[[Triple], Triple], moments: bool) -> Turn:
+    w, x, y, z = turn
+
+    def scene(given: Scene) -> Scene:
+        other = turned(given, vectors, body=moments)
+        return replace(other, attitude=product(given.attitude or POINTED, turn))
+
+    return Turn(scene, lambda q: _product(q, (w, -x, -y, -z)))
+
+
+TURNS = {
+    # Axes 1, 2, 3 of the turned body are 2, 3, 1 of the body.
+    "cyclic": _about_body((0.5, 0.5, 0.5, 0.5), lambda v: (v[1], v[2], v[0]), True),
+    "half-turn": _about_body((0.0, 1.0, 0.0, 0.0), lambda v: (v[0], -v[1], -v[2]), False),
+    # The axes of space are anybody's choice.
+    "space": Turn(
+        lambda scene: replace(scene, attitude=product(POINTED, scene.attitude or POINTED)),
+        lambda q: _from_left((POINTED[0], -POINTED[1], -POINTED[2], -POINTED[3]), q),
+    ),
+}
+
+
+def _limit(truth: Truth, tried: Tried) -> float:
+    return linear(_allowed(tried.method, tolerance_of(tried), truth.flow, truth.end))
+
+
+def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
+    """Return the largest error of an angle that a method may have (rad)."""
+    if method in FORMS:
+        return ATTITUDE
+    return flow.angle_limit(tolerance * lively(flow.amplification), time)
+
+
+POLICY = Policy(_limit, refusable)
+"""The rounding of a closed form; else the tolerance, and rounding, amplified."""
+
+
+def _truth(scene: Scene, time: float, flow: Callable[[], Conditioning]) -> Truth:
+    q = np.array([[float(x) for x in free_attitude(scene, time)]])
+    return Truth(np.array([time]), np.empty((0, 3)), 0.0, flow(), q, is_signed=True)
+
+
+def _attempts() -> Iterator[Attempt]:
+    for circumstance, scene, time in EXTREMES["attitude"]():
+        name = named("attitude", "", circumstance, scene=scene)
+        flow = cache(partial(conditioning, scene, time))
+        for method in (*FORMS, *_SERIES):
+            known = partial(_truth, scene, time, _unknown if method in FORMS else flow)
+            for tolerance in _TOLERANCES.get(method, (METHODS["closed-form"].finest,)):
+                own = replace(name, subject=method, setting=f"{tolerance:.0e}")
+                yield Attempt(own, partial(_judged, known, tolerance))
+    for motion, scene in _MOTIONS.items():
+        turn = 2.0 * math.pi / max(map(abs, scene.omega))
+        for k in range(2, 13):
+            known = partial(_truth, scene, 10.0 ** (0.5 * k) * turn, _unknown)
+            where = f"revolutions-{10.0 ** (0.5 * k):.0f}"
+            name = named("attitude", "closed-form", where, motion, scene=scene)
+            yield Attempt(name, partial(_judged, known, METHODS["closed-form"].finest))
+    for number in range(_BODIES):
+        scene = random_scene("pointing", f"attitude {number}", f"random-{number}")
+        name = named("attitude", "closed-form", "montgomery", f"random-{number}", scene=scene)
+        yield Attempt(name, _montgomery)
+        for method in ("closed-form", "taylor"):
+            own = replace(name, subject=method)
+            for what, each in TURNS.items():
+                yield Attempt(replace(own, circumstance=what), partial(_turned, each))
+            yield Attempt(replace(own, circumstance="back"), _back)
+    for sequence in SEQUENCES:
+        for power in range(1, 18):
+            name = named("attitude", "angles", sequence, f"{power if power < 17 else 'pole'}")
+            yield Attempt(name, partial(_angles, 10.0**-power if power < 17 else 0.0))
+
+
+def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
+    """Judge a method's angle by the truth, and by the same limit what the motion conserves."""
+    scene, truth = scene_of(name), known()
+    tried = by_rows(name.subject, tolerance, scene, [truth.end])
+    # Not the angle alone: signs are continuous.
+    yield judge(name.of("angle"), tried, truth, POLICY)
+    answer = tried.answer
+    if answer.attitude is None:
+        return
+    off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
+    yield name.of("length").bounded(off, 8.0 * ROUNDING)
+    if name.subject in FORMS:
+        # An angle turns the angular momentum by no more than itself; moments multiply, and the
+        # turning takes two products.
+        limit = ATTITUDE + _omega_limit(scene)
+        yield name.of("momentum").bounded(_momentum_drift(scene, answer), limit)
+
+
+def _omega_limit(scene: Scene) -> float:
+    """Return what the error of omega, 16 roundings, makes of the angular momentum, relative."""
+    momentum = np.array(scene.moments) * scene.omega
+    size = float(np.linalg.norm(momentum)) or 1.0
+    largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
+    return 16.0 * ROUNDING * math.sqrt(3.0) * largest / size
+
+
+def _momentum_drift(scene: Scene, found: Answer) -> float:
+    moments = np.array(scene.moments)
+    assert found.attitude is not None
+    before = turned_to_space(np.array([scene.attitude]), (moments * scene.omega)[None, :])[0]
+    change = turned_to_space(found.attitude, moments * found.omega)[0] - before
+    return float(np.linalg.norm(change)) / (float(np.linalg.norm(before)) or 1.0)
+
+
+def _montgomery(name: Name) -> Check:
+    """Hold the turn of one period about the angular momentum to the area that omega goes round.
+
+    It is 2 E T/L less the solid angle on the side of the axis that keeps its sign: no invariant,
+    and the only check that sees a wrong rate of the turn.
+    """
+    scene = scene_of(name)
+    period = float(period_of(scene) or 0.0)
+    momentum = np.array(scene.moments) * scene.omega
+    size = float(np.linalg.norm(momentum))
+    energy = 0.5 * float(momentum @ scene.omega)
+    area = _solid_angle(scene, period)
+    wanted = 2.0 * energy * period / size - area
+    q = solve(scene, [period], "closed-form", 1e-14, attitude=True).attitude
+    assert q is not None
+    w, x, y, z = scene.attitude or POINTED
+    turn = _product(q, (w, -x, -y, -z))[0]
+    along = turned_to_space(np.array([scene.attitude]), momentum[None, :] / size)[0]
+    found = 2.0 * math.atan2(float(turn[1:] @ along), float(turn[0]))
+    apart = abs(math.remainder(found - wanted, 2.0 * math.pi))
+    # The time is rounded, and so are the terms.
+    limit = ATTITUDE + 8.0 * ROUNDING * (2.0 * energy * period / size + 2.0 * math.pi)
+    return name.bounded(apart, limit)
+
+
+def _solid_angle(scene: Scene, period: float) -> float:
+    """Return the solid angle of the path of the angular momentum in the body.
+
+    Trapezoids are as good as any rule for what is periodic and smooth; omega comes from the
+    elliptic functions in decimals.
+    """
+    moments = np.array(scene.moments)
+    before, count, rows = math.inf, 32, np.empty((0, 3))
+    while True:
+        times = [period * n / count for n in range(count)]
+        rows = np.array([[float(x) for x in torque_free(scene, t)] for t in times])
+        m = rows * moments
+        m /= np.linalg.norm(m, axis=1, keepdims=True)
+        third = int(np.argmax(np.abs(m).min(axis=0)))
+        axes = [(third + 1) % 3, (third + 2) % 3, third]
+        m, omega = m[:, axes], rows[:, axes]
+        if m[0, 2] < 0.0:
+            # A half turn about the first axis.
+            m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
+        rate = np.cross(m, omega)
+        found = float(((m[:, 0] * rate[:, 1] - m[:, 1] * rate[:, 0]) / (1.0 + m[:, 2])).mean())
+        if abs(found - before) * period < 4.0 * ROUNDING * math.pi or count >= 1024:
+            return found * period
+        before, count = found, 2 * count
+
+
+def _turned(turn: Turn, name: Name) -> Check:
+    """Hold the attitude of the turned problem, turned back, to that of the problem itself."""
+    scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
+    plain, other = (
+        solve(each, [time], method, tolerance, attitude=True).attitude
+        for each in (scene, turn.scene(scene))
+    )
+    assert plain is not None
+    assert other is not None
+    apart = 2.0 * float(np.linalg.norm(turn.back(other) - plain))
+    limit = _allowed(method, tolerance, conditioning(scene, time), time)
+    return name.bounded(apart, 2.0 * limit + 8.0 * ROUNDING)
+
+
+def _back(name: Name) -> Check:
+    """Hold a way forth and back to the start."""
+    scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
+    there = solve(scene, [time], method, tolerance, attitude=True)
+    assert there.attitude is not None
+    x, y, z = there.omega[0].tolist()
+    a, b, c, d = there.attitude[0].tolist()
+    start = replace(scene, omega=(x, y, z), attitude=(a, b, c, d))
+    again = solve(start, [-time], method, tolerance, attitude=True).attitude
+    assert again is not None
+    forth, back = conditioning(scene, time), conditioning(start, -time)
+    # The error of omega at the end of the first part turns the second.
+    made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
+    turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
+    limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)
+    return name.bounded(float(angle_between(again, np.array([scene.attitude]))[0]), limit + turns)
+
+
+def _angles(off: float, name: Name) -> Check:
+    """Hold angles beside a pole to what SciPy's matrices make of them."""
+    from scipy.spatial.transform import Rotation
+
+    sequence = name.circumstance
+    source, worst = random.Random(f"{sequence} {off}"), 0.0
+    for _ in range(20):
+        first, last = source.uniform(-math.pi, math.pi), source.uniform(-math.pi, math.pi)
+        pole = source.choice((0.0, math.pi) if sequence == "3-1-3" else (-math.pi, math.pi))
+        tilt = math.copysign(1.0, 1.0 - pole) * off + (pole if sequence == "3-1-3" else 0.5 * pole)
+        q: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        for axis, angle in zip(sequence.split("-"), (first, tilt, last), strict=True):
+            turn = [math.cos(0.5 * angle), 0.0, 0.0, 0.0]
+            turn[int(axis)] = math.sin(0.5 * angle)
+            q = product(q, (turn[0], turn[1], turn[2], turn[3]))
+        told = angles(np.array([q]), sequence)[0]
+        letters = "".join(" XYZ"[int(axis)] for axis in sequence.split("-"))
+        back = Rotation.from_euler(letters, told, degrees=True).as_quat(scalar_first=True)
+        worst = max(worst, float(angle_between(np.array([q]), back[None, :])[0]))
+    return name.bounded(worst, _ANGLES)
+
+
+def _product(q: Array, by: Quaternion) -> Array:
+    a, b, c, d = q.T
+    return np.array(product((a, b, c, d), by)).T
+
+
+def _from_left(by: Quaternion, q: Array) -> Array:
+    a, b, c, d = q.T
+    return np.array(product(by, (a, b, c, d))).T
+
+
+TRIAL = Trial(
+    "attitude",
+    "attitude without torque: separatrix, symmetry, 1e6 revolutions, axes turned, poles of angles",
+    "closed form: some twenty roundings of each component at any time, 4.4e-15 rad. Others: the "
+    "tolerance and rounding, amplified by the flow and turned all the way. Montgomery: 2 E T/L "
+    "less the solid angle, to the rounding of its terms. Angles: of three, rounded thrice.",
+    lambda only: _attempts(),
+)

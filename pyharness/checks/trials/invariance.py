@@ -1,0 +1,224 @@
+"""Invariance: what must come out the same, or turned, when the problem is turned.
+
+Where the operations of a method are those of the turned problem in another order of axes, with
+other signs or other exponents, not a bit may differ; where they are not, the bound holds.
+"""
+
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from itertools import pairwise
+
+import numpy as np
+
+from pyharness.checks.check import REFUSED, Attempt, Check, Name
+from pyharness.checks.hold import OURS, apart, run_method, scene_of
+from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.tolerances import finest_and_middling
+from pyharness.compare.candidates import unstopped
+from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
+from pyharness.methods.solve import finest, solve
+from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.scene import Scene, TorqueLaw, Triple
+from pyharness.model.trajectory import Array
+from pyharness.scenes.random_scenes import random_scene
+from pyharness.scenes.rescaled import scaled
+from pyharness.scenes.rotated import shifted, turned
+from pyharness.theory.conditioning import Conditioning, conditioning
+
+_ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
+_PREPARED = ("quick", "auto")
+
+_BODY = (40.0, 30.0, 20.0)
+_START = (0.3, 1.1, 2.7)
+_PUSHED = TorqueLaw(constant=(10.0, -20.0, 15.0))
+_DRIVEN = TorqueLaw(
+    (3.0, 2.0, -4.0), (0.0, 1.0, 2.0), (((20.0, 0.0, 5.0), 7.0),), (((0.0, 30.0, 0.0), 11.0),)
+)
+
+
+_FREE = Scene("free", _START, moments=_BODY, step_size=0.01, steps=300)
+SCENES = {
+    "free": (_FREE, 3.0),
+    "pushed": (replace(_FREE, name="pushed", torque=_PUSHED, steps=200), 2.0),
+    "driven": (replace(_FREE, name="driven", torque=_DRIVEN, steps=200), 2.0),
+    **{(name := f"random-{seed}"): (random_scene("driven", seed, name), 1.0) for seed in range(8)},
+}
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A way to turn a problem: the scene, and the result back.
+
+    The turned motion takes the time over `faster`. `bitwise` are the methods and programs whose
+    operations turn with it, so that no bit may differ.
+    """
+
+    turn: Callable[[Scene], Scene]
+    faster: float
+    back: Callable[[Array], Array]
+    bitwise: tuple[str, ...]
+
+
+def _signs(first: float, second: float, third: float) -> Symmetry:
+    def turn(v: Triple) -> Triple:
+        return first * v[0], second * v[1], third * v[2]
+
+    return Symmetry(
+        lambda scene: turned(scene, turn, body=False),
+        1.0,
+        lambda omega: omega * [first, second, third],
+        # Rounding to nearest knows no sign. Radau and LSODA difference their Jacobian in a
+        # direction of their own.
+        (*OURS, *_PREPARED, "dop853", "rk45", *FIXED_STEP, *PROGRAMS),
+    )
+
+
+def _faster(factor: float, *bitwise: str) -> Symmetry:
+    return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
+
+
+# Exponents alone change, and ours compare only what has the same unit. SciPy's first step is
+# not so, and the implicit row scaling of LEQT1F compares powers of the step.
+_POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
+SYMMETRIES = {
+    # Each axis does what the next does: products of the next two, in this order. The series of
+    # Taylor and the sums of the others add over the axes, or multiply them, in a fixed order.
+    "cyclic": Symmetry(
+        lambda scene: turned(scene, lambda v: (v[1], v[2], v[0]), body=True),
+        1.0,
+        lambda omega: np.asarray(np.roll(omega, 1)),
+        ("closed-form", "gauss-2", "gauss-4", "gauss-8", *FIXED_STEP, "runge-kutta"),
+    ),
+    "signs-12": _signs(-1.0, -1.0, 1.0),
+    "signs-23": _signs(1.0, -1.0, -1.0),
+    "times-2**7": _faster(2.0**7, *_POWERS_OF_TWO),
+    "times-2**-9": _faster(2.0**-9, *_POWERS_OF_TWO),
+    "times-1.7": _faster(1.7),
+}
+
+
+def _attempts() -> Iterator[Attempt]:
+    for circumstance, (scene, time) in SCENES.items():
+        name = named("invariance", "", "", circumstance, scene=scene)
+        for method in (*_ADAPTIVE, *FIXED_STEP):
+            if method == "closed-form" and circumstance != "free":
+                continue
+            for tolerance in _tolerances(method, scene, time):
+                ways: dict[str, Callable[[float, float, Name], Check]]
+                ways = {what: partial(_turned, each) for what, each in SYMMETRIES.items()}
+                ways["back"] = _back
+                if method not in FIXED_STEP:
+                    ways["split"] = _split
+                for way, make in ways.items():
+                    own = replace(
+                        name, subject=method, circumstance=way, quantity=f"{tolerance:.0e}"
+                    )
+                    yield Attempt(own, partial(make, time, tolerance))
+        for listing in LISTINGS:
+            for what, symmetry in SYMMETRIES.items():
+                own = replace(
+                    name, subject=listing.program, circumstance=what, quantity=listing.label
+                )
+                yield Attempt(own, partial(_program, listing, symmetry))
+
+
+def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
+    if name in FIXED_STEP:
+        return [1.0]
+    if name == "closed-form":
+        return [METHODS[name].finest]
+    return finest_and_middling(name, scene, time)
+
+
+def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
+    """Return omega at `time`; NaN where a prepared kernel did not get there."""
+    return run_method(name, scene, time, tolerance).omega
+
+
+def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
+    """Hold the rotated problem against the problem itself."""
+    scene, method = scene_of(name), name.subject
+    try:
+        plain = end(scene, time, method, tolerance)
+        other = symmetry.back(end(symmetry.turn(scene), time / symmetry.faster, method, tolerance))
+    except InputError as refusal:
+        return name.judged(False, f"{REFUSED}{refusal}")
+    if method in symmetry.bitwise:
+        return name.bounded(float(np.count_nonzero(plain != other)), 0.0, "bits")
+    flow = _flow(scene.name, 0.0, time)
+    difference = float(np.abs(plain - other).max()) / flow.largest
+    if method in FIXED_STEP:
+        return name.described(difference)
+    # Either may be wrong by what the method is allowed.
+    return name.bounded(difference, 2.0 * flow.limit(tolerance))
+
+
+def _back(time: float, tolerance: float, name: Name) -> Check:
+    scene, method = scene_of(name), name.subject
+    there = end(scene, time, method, tolerance)
+    start = shifted(scene, there, time)
+    # A method of SciPy may meet a little less on the way back.
+    coarser = tolerance
+    if method in SCIPY_METHODS:
+        coarser = max(tolerance, 1.1 * finest(method, start, -time))
+    again = end(start, -time, method, coarser)
+    flow, back = _flow(scene.name, 0.0, time), _flow(scene.name, time, -time)
+    difference = float(np.abs(again - scene.omega).max()) / flow.largest
+    if method in FIXED_STEP:
+        return name.described(difference, "not reversible")
+    # The error of the way there is an error of the start of the way back.
+    limit = flow.limit(tolerance) * back.amplification + back.limit(coarser)
+    return name.bounded(difference, limit)
+
+
+def _split(time: float, tolerance: float, name: Name) -> Check:
+    scene, method = scene_of(name), name.subject
+    # Always the same three.
+    source = random.Random("cuts")
+    cuts = sorted(source.uniform(0.0, time) for _ in range(3))
+    omega = np.array(scene.omega)
+    flow = _flow(scene.name, 0.0, time)
+    limit = flow.limit(tolerance)
+    for begin, stop in pairwise([0.0, *cuts, time]):
+        omega = end(shifted(scene, omega, begin), stop - begin, method, tolerance)
+        piece = _flow(scene.name, begin, stop - begin)
+        rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
+        # The rest of the way propagates the error of each piece.
+        limit += piece.limit(tolerance) * rest
+    whole = end(scene, time, method, tolerance)
+    difference = float(np.abs(omega - whole).max()) / flow.largest
+    return name.bounded(difference, limit, f"{len(cuts)} cuts")
+
+
+@cache
+def _flow(circumstance: str, begin: float, length: float) -> Conditioning:
+    scene = SCENES[circumstance][0]
+    omega = np.array(scene.omega)
+    if begin > 0.0:
+        omega = solve(scene, [begin], "taylor", METHODS["taylor"].finest).omega[-1]
+    return conditioning(shifted(scene, omega, begin), length)
+
+
+def _program(listing: Listing, symmetry: Symmetry, name: Name) -> Check:
+    scene = scene_of(name)
+    plain, other = (unstopped(listing).rows(each).omega for each in (scene, symmetry.turn(scene)))
+    n = min(len(plain), len(other))
+    other = np.array([symmetry.back(row) for row in other]).reshape(-1, 3)
+    if listing.program in symmetry.bitwise:
+        count = np.count_nonzero(plain[:n] != other[:n]) + 3 * abs(len(plain) - len(other))
+        return name.bounded(float(count), 0.0, "bits")
+    size = float(np.abs(plain[:n]).max(initial=0.0)) or 1.0
+    return name.described(apart(plain, other) / size)
+
+
+TRIAL = Trial(
+    "invariance",
+    "forth and back, in pieces, axes turned, two signs changed, omega scaled against time",
+    "no bit where rounding can't tell the two apart: the same operations in another order of "
+    "axes, with other signs, with other exponents; else the tolerance and rounding of each "
+    "solution, amplified by the flow that follows it",
+    lambda only: _attempts(),
+)

@@ -1,0 +1,268 @@
+"""Length: a million revolutions; energy, momentum and phase against Brouwer's law."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.hold import scene_of
+from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.tolerances import finest
+from pyharness.compare.candidates import called, solved, unstopped
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import METHODS
+from pyharness.model.codes import Series
+from pyharness.model.errors import InputError
+from pyharness.model.extension import COMPLETE, extension
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+from pyharness.scenes.extreme import speed
+from pyharness.theory import brouwer
+from pyharness.theory.brouwer import LAWS, Noise, Orbit
+from pyharness.truth.elliptic import torque_free
+
+# A revolution is 2 pi over the largest component of omega: the body's own turn.
+REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
+MOTIONS = {
+    # Case 4: quick precession about the axis of the spin.
+    "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0)),
+    # All three components take part, and the modulus is large.
+    "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
+}
+# With so many, over two decades, chance takes a walk for a drift less than once in a thousand.
+STARTS = 12
+# Below it the last rounding of a result still counts beside those before it.
+_FIT_FROM = 10**2.5
+# Midway between what chance makes of rounding and what a preference does.
+_HALFWAY = 0.25
+# A phase error (rad) beyond which its linear measure says only that it is large.
+_LOST = 0.1
+
+# At the finest tolerance the last two terms of the series have no larger part of omega.
+_LEFT_OUT = Series.SLACK * Series.LEAST_SHARE
+# Steps of Gauss collocation, in radians of the fastest rate: with 8 stages truncation is far below
+# rounding, with 4 it leads the phase and must leave energy alone.
+_PARTS = {8: 1.0, 4: 0.25}
+# A value of the closed form, at any time: tests/methods/test_closed_form.py.
+_CLOSED_FORM = 16.0 * brouwer.ROUNDING
+
+Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Marcher:
+    """A method: how it runs, the noise of its steps, and how far it is followed.
+
+    Attributes
+    ----------
+    run : callable
+        ``run(scene, times)``: omega at the times, shape (n, 3), and the steps until then.
+    revolutions, others : float
+        The longest run, of one start and of the others.
+    preference : bool
+        Whether what a step adds is known to prefer a direction: then powers of 1 and 2 are due.
+    """
+
+    run: Runner
+    noise: Callable[[Orbit, Scene, float], Noise]
+    revolutions: float
+    others: float
+    preference: bool = False
+
+
+def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
+    found = solved("taylor", METHODS["taylor"].finest).rows(scene, times)
+    return found.omega, found.steps * np.array(times) / times[-1]
+
+
+def _gauss(stages: int) -> Runner:
+    def run(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
+        step = _PARTS[stages] / _rate(scene)
+        rows, _, n_rows, status, evaluations = extension().gauss_solution(
+            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
+        )
+        if (n_rows, status) != (len(times), COMPLETE):
+            raise InputError(f"gauss-{stages} gave up after {evaluations} right-hand sides")
+        lengths = np.diff([0.0, *times])
+        return rows.T, np.cumsum(np.ceil(lengths / step - 1e-6))
+
+    return run
+
+
+def _rate(scene: Scene) -> float:
+    """Return the largest rate of the linearised equations (1/s), within a third."""
+    return speed(scene, max(map(abs, scene.omega)))
+
+
+MARCHERS = {
+    # What a series leaves out keeps its sign; and its steps fall in with a periodic motion, so
+    # that the rounding of a step comes back with every revolution. The last two terms are at most
+    # SLACK shares; what follows them falls at least by halves.
+    "taylor": Marcher(
+        _taylor,
+        partial(brouwer.taylor_noise, order=Series.MOST_ORDER, left_out=_LEFT_OUT),
+        1e6,
+        10**5.5,
+        preference=True,
+    ),
+    # Equal steps of a part of a radian; ten times as costly as a Taylor step.
+    "gauss-8": Marcher(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
+    "gauss-4": Marcher(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
+}
+
+
+def _attempts() -> Iterator[Attempt]:
+    for motion, scene in MOTIONS.items():
+        name = named("length", "", motion, scene=scene)
+        for method, marcher in MARCHERS.items():
+            own = replace(name, subject=method)
+            yield Attempt(own, partial(hold, marcher))
+            if method != "gauss-4":
+                yield Attempt(replace(own, setting="prepared"), _prepared)
+        yield Attempt(replace(name, subject="closed-form"), _closed_form)
+        for method in ("dop853", "lsoda"):
+            yield Attempt(replace(name, subject=method, setting="100"), _scipy)
+        # A hundred steps for each of 1e4 revolutions.
+        step = 2.0 * math.pi / orbit_of(motion).largest / 100.0
+        stepped = replace(scene, step_size=step, steps=1_000_000)
+        for listing in LISTINGS:
+            own = named("length", listing.program, motion, listing.label, scene=stepped)
+            yield Attempt(own, partial(_program, listing))
+
+
+def hold(marcher: Marcher, name: Name) -> Iterator[Check]:
+    """Hold one method to Brouwer's law: a bound at each horizon, and the power of the growth."""
+    motion = name.circumstance
+    for what, found, steps, limits in measured(marcher, MOTIONS[motion], orbit_of(motion)):
+        horizons = np.array(REVOLUTIONS[: len(steps)])
+        for k, revolutions in enumerate(horizons):
+            value = float(np.nanmax(np.abs(found[:, k])))
+            note = f"{steps[k]:.0f} steps, {steps[k] ** LAWS[what]:.1e} to the power {LAWS[what]}"
+            yield name.of(f"{what}/{revolutions:.0f}").bounded(value, limits[k], note)
+        fitted = (horizons >= 0.99 * _FIT_FROM) & ~np.isnan(found).any(axis=0)
+        power = brouwer.exponent(steps[fitted], found[:, fitted])
+        due = LAWS[what] + (0.5 if marcher.preference else 0.0)
+        yield name.of(f"{what}/power").bounded(power, due + _HALFWAY, f"due {due}")
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """The error of one method over the number of steps, its bound, and by how many starts."""
+
+    motion: str
+    method: str
+    what: str
+    steps: Array
+    error: Array
+    limits: Array
+    starts: Array
+
+
+def curves() -> Iterator[Drift]:
+    """Measure every method on every motion, as the trial does."""
+    for motion, scene in MOTIONS.items():
+        for method, marcher in MARCHERS.items():
+            for what, found, steps, limits in measured(marcher, scene, orbit_of(motion)):
+                starts = (~np.isnan(found)).sum(axis=0)
+                error = brouwer.root_mean_square(found)
+                yield Drift(motion, method, what, steps, error, np.array(limits), starts)
+
+
+def measured(
+    marcher: Marcher, scene: Scene, body: Orbit
+) -> Iterator[tuple[str, Array, Array, list[float]]]:
+    """Yield what is watched, its errors, the steps to each horizon and the bounds there.
+
+    The errors have a row for each start and a column for each horizon, NaN beyond its run.
+    """
+    turn = 2.0 * math.pi / body.largest
+    reached = [r for r in REVOLUTIONS if r <= 1.01 * marcher.revolutions]
+    found = {what: np.full((STARTS, len(reached)), math.nan) for what in LAWS}
+    steps = np.zeros(len(reached))
+    for number, start in enumerate(starts(scene, body)):
+        most = marcher.others if number else marcher.revolutions
+        times = [r * turn for r in reached if r <= 1.01 * most]
+        rows, counted = marcher.run(start, times)
+        steps[: len(times)] = np.maximum(steps[: len(times)], counted)
+        for k, (time, row) in enumerate(zip(times, rows, strict=True)):
+            for what, error in brouwer.errors(start, body, time, row).items():
+                found[what][number, k] = error
+    noise = marcher.noise(body, scene, reached[-1] * turn / steps[-1])
+    limits = [body.limits(noise, count) for count in steps]
+    for what in LAWS:
+        yield what, found[what], steps, [each[what] for each in limits]
+
+
+@cache
+def orbit_of(motion: str) -> Orbit:
+    """Return the orbit of a motion."""
+    return brouwer.orbit(MOTIONS[motion])
+
+
+def starts(scene: Scene, body: Orbit) -> list[Scene]:
+    """Return states of one motion, so that no lucky phase decides."""
+    times = [0.37 * k / body.frequency for k in range(STARTS)]
+    rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
+    return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
+
+
+def _prepared(name: Name) -> Check:
+    """Hold a prepared solver, which takes the same steps, to the bits of the rows."""
+    method, scene = name.subject, MOTIONS[name.circumstance]
+    time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
+    rows, _ = MARCHERS[method].run(scene, [time])
+    stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
+    found = called(method, METHODS[method].finest).end(stepped, time).omega
+    return name.bounded(float(np.count_nonzero(rows[-1] != found)), 0.0)
+
+
+def _closed_form(name: Name) -> Iterator[Check]:
+    scene, body = MOTIONS[name.circumstance], orbit_of(name.circumstance)
+    times = [r * 2.0 * math.pi / body.largest for r in REVOLUTIONS]
+    rows = solved("closed-form", METHODS["closed-form"].finest).rows(scene, times).omega
+    found = [brouwer.errors(scene, body, t, row, False) for t, row in zip(times, rows, strict=True)]
+    for what in LAWS:
+        gain = body.turn if what == "phase" else body.gains[what]
+        limit = _CLOSED_FORM * gain + (0.0 if what == "phase" else 4.0 * brouwer.ROUNDING)
+        yield name.of(what).bounded(max(abs(each[what]) for each in found), limit, "at any time")
+
+
+def _scipy(name: Name) -> Iterator[Check]:
+    scene = MOTIONS[name.circumstance]
+    time = 1e2 * 2.0 * math.pi / orbit_of(name.circumstance).largest
+    found = solved(name.subject, finest(name.subject, scene, time)).end(scene, time)
+    yield from _described(name, scene, time, found.omega)
+
+
+def _program(listing: Listing, name: Name) -> Iterator[Check]:
+    """Say what a program makes of 10 and of 1e4 revolutions."""
+    scene = scene_of(name)
+    found = unstopped(listing).rows(scene)
+    for count in (1_000, 1_000_000):
+        own = replace(name, setting=f"{name.setting}/{count // 100}")
+        if len(found.omega) < count:
+            yield own.described(None, f"{found.ended} after {found.steps} steps")
+        else:
+            row = found.omega[count - 1]
+            yield from _described(own, scene, count * scene.step_size, row)
+
+
+def _described(name: Name, scene: Scene, time: float, row: Array) -> Iterator[Check]:
+    for what, error in brouwer.errors(scene, orbit_of(name.circumstance), time, row).items():
+        lost = what == "phase" and abs(error) > _LOST
+        yield name.of(what).described(error, "lost" if lost else "")
+
+
+TRIAL = Trial(
+    "length",
+    "a million revolutions of torque-free bodies; energy, momentum and phase",
+    "Brouwer's law: independent roundings of mean 0, each within a running error analysis of "
+    "the step, add up to 4 sqrt(n) of one (Hoeffding), phase to the shear of the motion times "
+    "n**1.5; truncation adds n times its bound. The power of the growth must be nearer to what is "
+    "due, to chance (1/2, 3/2) or to a known preference (1, 2), than to the next",
+    lambda only: _attempts(),
+)

@@ -1,0 +1,98 @@
+"""The collocation matrices at steps from 1e-10 to 10 s, and when they are declared singular."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.hold import scene_of
+from pyharness.checks.stress import Trial, named
+from pyharness.model.listing import Listing, corrected, original
+from pyharness.model.scene_file import case_scene
+from pyharness.original import compiled
+from pyharness.original.linear_solver import SINGULAR
+from pyharness.theory.collocation_matrices import (
+    PARTS,
+    Solved,
+    declared_singular_below,
+    singular_below,
+    solved,
+)
+
+STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
+# Steps of runs in which the four-term program meets the singularity.
+_RUN_STEPS = (1e-7, 1e-6, 1e-5, 1e-4)
+
+
+def _attempts() -> Iterator[Attempt]:
+    for program in PARTS:
+        for step in STEPS:
+            name = named("matrices", program, f"{step:.0e}")
+            yield Attempt(name, partial(_matrix, program, step))
+        yield Attempt(named("matrices", program, "threshold"), _threshold)
+        for step in _RUN_STEPS:
+            scene = replace(case_scene(5), step_size=step, steps=300)
+            for listing in (original(program), corrected(program)):
+                where = f"ier-{step:.0e}"
+                name = named("matrices", program, listing.label, where, scene=scene)
+                yield Attempt(name, partial(_counted, listing))
+
+
+def _matrix(program: str, step: float, name: Name) -> Iterator[Check]:
+    found = solved(program, step)
+    expected = SINGULAR if step <= singular_below(program) else 0
+    yield name.of("ier").bounded(abs(found.ier - expected), 0.0, f"IER = {found.ier}")
+    yield name.of("bits").bounded(found.differing, 0.0)
+    yield name.of("condition").described(found.condition, _condition_note(found))
+    if found.ier == SINGULAR:
+        return
+    rows = ", ".join(str(row + 1) for row in found.order)
+    yield name.of("pivots").bounded(*found.pivoting, f"rows {rows}")
+    yield name.of("residual").bounded(found.residual, 1.0)
+    yield name.of("forward").bounded(found.forward, 1.0)
+    note = f"{found.increment_error:.1e} of the step"
+    yield name.of("increment").bounded(found.increment, 1.0, note)
+    yield name.of("numpy").described(found.yardstick, f"ours {found.forward:.2g}")
+
+
+def _condition_note(found: Solved) -> str:
+    growth = "" if math.isnan(found.growth) else f", growth {found.growth:.3g}"
+    return f"with scaled columns {found.scaled_condition:.3g}{growth}"
+
+
+def _threshold(name: Name) -> Check:
+    """Hold the step below which IER is 129 against the exact last pivot."""
+    program = name.subject
+    wanted = singular_below(program)
+    found = declared_singular_below(program)
+    # The pivot goes with a power of the step: its rounding counts by the root.
+    _, rounding = solved(program, 1.01 * wanted).pivoting
+    limit = rounding / (len(PARTS[program]) - 1)
+    return name.bounded(abs(found / wanted - 1.0), limit, f"{found:.6g} s")
+
+
+def _counted(listing: Listing, name: Name) -> Check:
+    """Count the steps of a run that print 129; original the points move out of danger."""
+    scene = scene_of(name)
+    ier = compiled.run(scene, listing, velocity=False).ier
+    assert ier is not None
+    count = int((ier == SINGULAR).sum())
+    singular = singular_below(listing.program) / scene.step_size
+    if listing.has("dt-accumulates"):
+        expected = min(scene.steps, math.floor(singular))
+    else:
+        expected = scene.steps if singular >= 1.0 else 0
+    note = f"IER = 129 in {count} of {scene.steps} steps"
+    return name.bounded(abs(count - expected), 0.0, note)
+
+
+TRIAL = Trial(
+    "matrices",
+    "collocation matrices at steps from 1e-10 to 10 s",
+    "componentwise, 3n u |L||U||x| for residuals and that times abs(inverse) for solutions "
+    "(Higham 2002, theorem 9.4), both in exact fractions; pivots may miss the largest candidate "
+    "by the rounding of two sums; IER = 129 exactly where the exact last pivot is half a unit in "
+    "the last place of n",
+    lambda only: _attempts(),
+)

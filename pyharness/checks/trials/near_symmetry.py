@@ -1,0 +1,27 @@
+"""Bodies that are all but symmetric, symmetric, all but spheres, and spheres."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from pyharness.checks.check import Attempt, Name
+from pyharness.checks.hold import FORMS, hold, hold_all, truth_of
+from pyharness.checks.judge import unknown_flow
+from pyharness.checks.stress import Trial
+from pyharness.scenes.extreme import LONG, SYMMETRIC_START
+
+# The closed form alone needs no bound on the amplification of errors.
+_UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
+
+
+def _held(name: Name, time: float) -> Iterator[Attempt]:
+    if time == LONG:
+        return hold(name, time, FORMS, partial(truth_of, flow=_UNKNOWN))
+    return hold(name, time)
+
+
+TRIAL = Trial(
+    "near-symmetry",
+    "two moments, or all, that differ by 1e-1 to 1e-16 of their size, and equal ones",
+    "as of the separatrix. The difference of two moments is exact, and so is no loss of digits.",
+    lambda only: hold_all("near-symmetry", _held, lambda each: each.time != LONG),
+)

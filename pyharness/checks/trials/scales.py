@@ -1,0 +1,98 @@
+"""Angular velocities from 1e-300 to 1e300 rad/s, time scaled to match."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import REFUSED, Attempt, Check, Name
+from pyharness.checks.hold import ALL, hold, hold_all, run_method, scene_of, truth_of
+from pyharness.checks.judge import Truth
+from pyharness.checks.stress import Trial, named
+from pyharness.checks.tolerances import MIDDLING
+from pyharness.compare.candidates import End, not_finite
+from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_steps
+from pyharness.scenes.rescaled import scaled
+from pyharness.theory.conditioning import Conditioning, conditioning
+
+_DRIVEN = replace(
+    ORDINARY, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
+)
+# Squares and cubes of the scale have to be numbers too.
+_DRIVEN_TWOS = (-320, -100, 100, 320)
+
+
+def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
+    """Hold one of our methods to the same digits where a power of two scales the motion."""
+    time = scene.step_size * scene.steps
+    plain = cache(lambda: _tried(method, scene, time))
+
+    def same(factor: float, name: Name) -> Check:
+        # In the order of the calls: the motion itself first.
+        first, run = plain(), _tried(method, scene_of(name), time / factor)
+        with np.errstate(invalid="ignore"):
+            wrong = float(np.abs(run.omega / factor - first.omega).max())
+        passed = run.ended == first.ended and run.has_result and wrong == 0.0
+        note = "" if run.has_result else run.ended
+        return name.judged(passed, note, wrong, 0.0)
+
+    for power in powers:
+        factor = math.ldexp(1.0, power)
+        name = named("scales", method, f"{kind}-2^{power}", scene=scaled(scene, factor))
+        yield Attempt(name, partial(same, factor))
+
+
+def _beyond(name: Name) -> Check:
+    """Hold a method to say so where omega leaves the range of numbers."""
+    run = _tried(name.subject, scene_of(name), 1e300)
+    silent = run.has_result
+    note = "a silent wrong number" if silent else run.ended
+    return name.judged(not silent, note, float(silent), 0.0)
+
+
+def _tried(name: str, scene: Scene, time: float) -> End:
+    try:
+        return run_method(name, scene, time, None if name in FIXED_STEP else MIDDLING)
+    except InputError as refusal:
+        return not_finite(f"{REFUSED}{refusal}")
+
+
+@cache
+def _flow() -> Conditioning:
+    return conditioning(ORDINARY, ORDINARY_TIME)
+
+
+def _truth(scene: Scene, time: float) -> Truth:
+    """Return the truth: the flow does to a scaled motion what it does to the motion."""
+    size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
+    return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
+
+
+def _attempts() -> Iterator[Attempt]:
+    yield from hold_all("scales", partial(hold, truth=_truth))
+    free, driven = in_steps(ORDINARY, ORDINARY_TIME), in_steps(_DRIVEN, 3.0)
+    for method in ALL:
+        if method not in SCIPY_METHODS:
+            yield from _bit_for_bit(method, "same", free, TWOS)
+    for method in ALL:
+        if method not in (*SCIPY_METHODS, "closed-form"):
+            yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)
+    law = TorqueLaw((1e10, 2e10, -1e10))
+    # Of a sphere, which no coupling makes turn ever faster on the way.
+    scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
+    for method in ALL:
+        yield Attempt(named("scales", method, "beyond", scene=scene), _beyond)
+
+
+TRIAL = Trial(
+    "scales",
+    "omega from 1e-300 to 1e300 rad/s, time scaled to match",
+    "as of the separatrix, relative to omega; ours scaled by a power of two: the same bits. "
+    "Where omega leaves the range of numbers: a status that says so.",
+    lambda only: _attempts(),
+)

@@ -1,0 +1,50 @@
+"""Spin about the middle axis, disturbed by ever less and by nothing, over several flips."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.hold import ALL, hold_all, run_method
+from pyharness.checks.stress import Trial, named
+from pyharness.checks.tolerances import MIDDLING
+from pyharness.methods.registry import FIXED_STEP
+from pyharness.model.scene import Scene
+from pyharness.scenes.extreme import MIDDLE_AXIS, in_steps
+
+_STAYS = 50.0  # s
+
+
+def _undisturbed() -> Iterator[Attempt]:
+    """Hold every method to the exact answer: a disturbance of 0 stays 0 for ever."""
+    scene = in_steps(
+        Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS
+    )
+
+    def stay(name: Name) -> Check:
+        method = name.subject
+        run = run_method(method, scene, _STAYS, None if method in FIXED_STEP else MIDDLING)
+        wrong = float(np.abs(run.omega - scene.omega).max())
+        # What is exactly zero keeps zero; the spin may be rounded where units are changed.
+        limit = 2.0**-52 if method == "quick" else 0.0
+        stays = run.omega[0] == run.omega[2] == 0.0 and run.has_result
+        note = "" if stays else "it left the axis"
+        return name.judged(bool(stays and wrong <= limit), note, wrong, limit)
+
+    for method in ALL:
+        yield Attempt(named("separatrix", method, "none", scene=scene), stay)
+
+
+def _attempts() -> Iterator[Attempt]:
+    yield from hold_all("separatrix", has_programs=lambda each: not each.name.startswith("early"))
+    yield from _undisturbed()
+
+
+TRIAL = Trial(
+    "separatrix",
+    "spin about the middle axis, disturbed by 1e-1 to 1e-15 and by 0, over several flips",
+    "closed form: 1e-14 and what the rounding of A, B, C changes. Others: tolerance, or order "
+    "times steps, and rounding, amplified by the flow; where that leaves less than two digits, "
+    "energy and momentum, which the flow does not amplify. Undisturbed: exact.",
+    lambda only: _attempts(),
+)

@@ -1,0 +1,188 @@
+"""Step sizes from 1 to 1e-6 s: truncation, rounding, where they cross, where runs diverge."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.divergence import Runner, divergence, smallest_divergent
+from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.compare.candidates import unstopped
+from pyharness.methods.fixed_step import fixed_step
+from pyharness.methods.problem import normalized
+from pyharness.methods.registry import FIXED_STEP
+from pyharness.model.extension import COMPLETE, extension
+from pyharness.model.listing import Listing, corrected
+from pyharness.model.scene import Scene
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.original.linear_solver import SINGULAR
+from pyharness.theory.amplification import amplification
+from pyharness.theory.collocation_matrices import PARTS, singular_below
+from pyharness.theory.schemes import SCHEMES
+from pyharness.theory.step_errors import Forecaster, Path, path
+from pyharness.truth.reference import reference
+
+CASES = (2, 3, 4, 5, 6)
+TIME = 1.0
+SMALLEST = 1e-6
+# Half a decade apart.
+COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
+# Where runs diverge is looked for over a long time, down to a step that leaves them no excuse.
+_LONG, _SMALLEST_LONG = 100.0, 2e-3
+_SPINNING = (2, 3, 4)
+
+
+def _attempts() -> Iterator[Attempt]:
+    for name in SCHEMES:
+        listings: list[Listing | None] = [each for each in LISTINGS if each.program == name]
+        for case in CASES:
+            for listing in listings or [None]:
+                yield from _of_case(name, case, listing)
+
+
+def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
+    """Judge the error at the end, for every step, where it is least, and where runs diverge."""
+    before = listing is not None and listing.label == "original"
+    label = listing.label if listing else ""
+    place = named("step-size", method, f"case-{case}", label, scene=case_scene(case))
+    scenes = {n: replace(case_scene(case), step_size=TIME / n, steps=n) for n in COUNTS}
+    error = cache(lambda count: _error(scenes[count], method, case, listing))
+
+    def foretold(count: int, name: Name) -> Check:
+        found, note = error(count)
+        if before:
+            return name.described(found, note)
+        due = _forecaster(case, method).at(count)
+        said = f"truncation {due.truncation:.1e}, rounding below {due.rounding:.0e}"
+        note = f"{said}{', ' if note else ''}{note}"
+        if math.isfinite(due.bound):
+            return name.bounded(found, due.bound, note)
+        return name.described(found, f"step too large to foretell; {note}")
+
+    for count, scene in scenes.items():
+        own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
+        yield Attempt(own, partial(foretold, count))
+    gauss = method.startswith("gauss")
+    # Nothing of order above 4 has truncation left at a step that shows rounding.
+    if not (before or gauss) and SCHEMES[method].order in (2, 4):
+        crossing = partial(_crossing, method, case, lambda count: error(count)[0])
+        yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
+    if not gauss:
+        yield Attempt(place.of("diverges"), partial(_divergence, case, listing))
+
+
+def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
+    """Hold the step below which truncation no longer rules against that foretold.
+
+    It rules where the error is that of truncation, within a factor of 2.
+    """
+    forecaster = _forecaster(case, method)
+    smallest = SMALLEST
+    if method in PARTS:
+        # At smaller ones the matrix is declared singular.
+        smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
+    counts = [count for count in COUNTS if TIME / count >= smallest]
+    ruled = [c for c in counts if 0.5 < error(c) / forecaster.at(c).truncation < 2.0]
+    found = TIME / max(ruled, default=1)
+    if found > TIME / counts[-1]:
+        # Somewhere on the way to the next one.
+        found /= 10.0**0.25
+    foretold = forecaster.crossing(smallest)
+    # Half a decade from one step to the next; rounding may be a tenth or ten times as large.
+    limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
+    best = min(counts, key=error)
+    note = (
+        f"truncation down to {found:.1e} s, foretold {foretold:.1e} s; "
+        f"least error {error(best):.1e} at {TIME / best:.0e} s"
+    )
+    return name.bounded(abs(math.log10(found / foretold)), limit, note)
+
+
+def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
+    """Return the error at the end over the largest omega, and what else was seen."""
+    largest = _path(case).flow.largest
+    note = ""
+    if listing is not None:
+        run = unstopped(listing).rows(scene)
+        if run.ended != "complete":
+            return math.inf, f"{run.ended} after {run.steps} steps"
+        omega = run.omega[-1]
+        singular = 0 if run.ier is None else int((run.ier == SINGULAR).sum())
+        note = f"IER = 129 in {singular} of {run.steps} steps" if singular else ""
+    else:
+        omega = _end(scene, name)
+    return float(np.abs(omega - _truth(case)).max()) / largest, note
+
+
+def _end(scene: Scene, name: str) -> Array:
+    """Return what a modern method with a fixed step gives at the end; NaN after an overflow."""
+    if name in FIXED_STEP:
+        rows = fixed_step(name)(scene, [TIME], 1.0).omega
+        return rows[-1] if len(rows) else np.full(3, math.nan)
+    stages = int(name.partition("-")[2])
+    rows, _, _, status, _ = extension().gauss_solution(
+        *normalized(scene), scene.omega, [TIME], stages, scene.step_size
+    )
+    return np.asarray(rows[:, 0]) if status == COMPLETE else np.full(3, math.nan)
+
+
+def _rows(name: str, scene: Scene) -> Trajectory:
+    return fixed_step(name)(scene, scene.times(), 1.0)
+
+
+def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
+    """Say with which steps a run diverges, and where theory knows, hold it to that."""
+    scene, method = case_scene(case), name.subject
+    if listing is None:
+        runner: Runner = partial(_rows, method)
+        scheme = corrected("runge-kutta" if SCHEMES[method].order == 4 else "two-term")
+    else:
+        runner = unstopped(listing).rows
+        scheme = listing
+    if case not in _SPINNING:
+        found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)
+        return name.described(found, _from(found, TIME))
+    seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
+    note = f"{_from(seen.found, _LONG)}, foretold from {seen.foretold:.4g} s"
+    # Linear theory knows nothing of points that move, unless the equations are linear.
+    if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
+        return name.bounded(abs(seen.found / seen.foretold - 1.0), seen.limit, note)
+    return name.described(seen.found, note)
+
+
+def _from(found: float, time: float) -> str:
+    if found == 0.0:
+        return f"leaves twice the bound within {time:g} s with every step"
+    if math.isinf(found):
+        return f"stays within {time:g} s with every step"
+    return f"leaves twice the bound within {time:g} s from {found:.4g} s"
+
+
+@cache
+def _path(case: int) -> Path:
+    return path(case_scene(case), TIME)
+
+
+@cache
+def _truth(case: int) -> Array:
+    return np.asarray(reference(case_scene(case), [TIME], precise=True).omega[0])
+
+
+@cache
+def _forecaster(case: int, name: str) -> Forecaster:
+    return Forecaster(_path(case), name)
+
+
+TRIAL = Trial(
+    "step-size",
+    "steps from 1 to 1e-6 s over 1 s, and from 2e-3 s over 100 s until runs diverge",
+    "what each step misses, as a power series of the step worked out from the scheme alone, "
+    "carried to the end by the linearised flow, twice that for what it changes itself; a few "
+    "roundings of each step carried likewise; divergence where the amplification matrix doubles "
+    "a wobble",
+    lambda only: _attempts(),
+)

@@ -1,0 +1,156 @@
+"""Threads: the same calls from many threads at once give the same bits.
+
+`choose_instructions` sets the level of the kernels for the whole process; it belongs before the
+threads, and is not called here.
+"""
+
+import random
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from pyharness.checks.check import Check, may_hold
+from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.tolerances import finest
+from pyharness.compare.candidates import listed, solved
+from pyharness.methods.prepared import prepare
+from pyharness.methods.registry import METHODS
+from pyharness.methods.solver import PREPARED, Solver
+from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.scene_file import case_scene
+from pyharness.original.programs import IMPLEMENTATIONS
+
+THREADS = 8
+_REPEATS = 30
+# The interpreter changes threads a hundred times as often as it does by itself.
+_SWITCH = 5e-5
+_TOLERANCE = 1e-9
+_TIMES = (0.05, 0.1, 0.2)
+
+_WAVE = TorqueLaw(sines=(((100.0, 0.0, 3.0), 5.0),))
+_WAVES = TorqueLaw(
+    (10.0, 0.0, 2.0), (0.0, 0.0, 1.0),
+    (((1.0, 0.0, 0.0), 100.0), ((0.0, 2.0, 0.0), 3.0)), (((0.0, 1.0, 0.0), 100.0),),
+)  # fmt: skip
+SCENES = (
+    Scene("free", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), steps=20),
+    Scene("sphere", (1.0, 1.0, 1.0), moments=(40.0, 40.0, 40.0), torque=_WAVE, steps=20),
+    Scene("driven", (0.0, 1.0, 1.0), moments=(40.0, 30.0, 20.0), torque=_WAVES, steps=20),
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A call, of a method or program, that gives the same bits whenever and wherever it is made."""
+
+    subject: str
+    scene: Scene
+    call: Callable[[], bytes]
+
+
+def _run(only: Sequence[str]) -> Iterator[Check]:
+    """Make every call alone, then all of them at once, mixed, several times each."""
+    asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
+    differing = different(asked)
+    for subject in dict.fromkeys(job.subject for job in asked):
+        own = [job for job in asked if job.subject == subject]
+        wrong = [job for job in differing if job.subject == subject]
+        note = f"{_REPEATS * len(own)} calls in {THREADS} threads"
+        scene = (wrong or own)[0].scene
+        yield named("threads", subject, scene=scene).bounded(len(wrong), 0.0, note)
+
+
+def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
+    """Return the jobs whose bits in many threads were not those of a call alone, each time."""
+    alone = [bits(job) for job in jobs]
+    order = [index for index in range(len(jobs)) for _ in range(repeats)]
+    random.Random("threads").shuffle(order)
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(_SWITCH)
+    try:
+        with ThreadPoolExecutor(threads) as pool:
+            found = list(pool.map(lambda index: bits(jobs[index]), order))
+    finally:
+        sys.setswitchinterval(before)
+    return [jobs[i] for i, each in zip(order, found, strict=True) if each != alone[i]]
+
+
+def bits(job: Job) -> bytes:
+    """Make the call; what it refuses is refused in the same words."""
+    try:
+        return job.call()
+    except InputError as refusal:
+        return str(refusal).encode()
+
+
+def jobs() -> list[Job]:
+    """Return the calls: every method, prepared solver, program and twin, and what they refuse."""
+    found = []
+    for scene in SCENES:
+        for name in METHODS:
+            found.append(Job(name, scene, partial(_rows, scene, name)))
+        for name in PREPARED:
+            found.append(Job(f"prepared-{name}", scene, partial(_prepared, scene, name)))
+        for listing in LISTINGS:
+            for implementation in IMPLEMENTATIONS:
+                call = partial(_program, scene, listing, implementation)
+                found.append(Job(listing.program, scene, call))
+        found.append(Job("refusals", scene, partial(_refusal, scene)))
+    for case in range(1, 8):
+        found.append(Job("linear-solver", case_scene(case), partial(_linear, case)))
+    return found
+
+
+def _rows(scene: Scene, name: str) -> bytes:
+    tolerance = max(_TOLERANCE, finest(name, scene, _TIMES[-1]))
+    found = solved(name, tolerance).rows(scene, _TIMES)
+    return found.omega.tobytes() + f"{found.steps} {found.evaluations} {found.ended}".encode()
+
+
+def _prepared(scene: Scene, name: str) -> bytes:
+    solver, other = _shared(scene, name), _shared(SCENES[0], name)
+    found = []
+    for k in range(20):
+        start = np.array(scene.omega) + 0.1 * k
+        found.append(solver(start, _TIMES[-1]).tobytes() + solver.status.encode())
+        found.append(other(start, -_TIMES[0]).tobytes())
+    return b"".join(found)
+
+
+@cache
+def _shared(scene: Scene, name: str) -> Solver:
+    """Return the one solver that all threads call."""
+    return prepare(scene, name, 1e-7)
+
+
+def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:
+    found = listed(listing, implementation).rows(scene)
+    velocity = b"" if found.velocity is None else found.velocity.tobytes()
+    return found.recorded_time.tobytes() + found.omega.tobytes() + velocity + found.ended.encode()
+
+
+def _refusal(scene: Scene) -> bytes:
+    """Ask for a tolerance that no method claims to meet."""
+    return solved("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
+
+
+def _linear(seed: int) -> bytes:
+    source = np.random.default_rng(seed)
+    a, b = source.normal(size=(5, 5)), source.normal(size=(5, 3))
+    factors, x, ier = extension().solve_linear(a, b)
+    return bytes(factors.tobytes() + x.tobytes() + str(ier).encode())
+
+
+TRIAL = Trial(
+    "threads",
+    "the same calls from eight threads at once",
+    "no call shares state with another, so that no bit may differ",
+    _run,
+)

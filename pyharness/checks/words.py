@@ -1,0 +1,71 @@
+"""Words: the vectors of the CDC, and our own arithmetic against the processor's and Fortran's."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+from pyharness.checks.cells import of_cell
+from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.selection import Selection
+from pyharness.compare.agreement import differences, distance
+from pyharness.model.listing import Listing
+from pyharness.model.scene_file import case_scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.original import compiled_in_word, in_word
+from pyharness.original.cells import all_cells
+from pyharness.original.programs import BINARY64, run_program
+from pyharness.original.vectors import answers
+from pyharness.original.word import WORDS
+
+_THIN_CASE = 3
+
+
+def words(chosen: Selection) -> Iterator[Attempt]:
+    """Hold every vector, the twin in `Word(53)` against that in floats, and Fortran in its words.
+
+    Bit for bit: in every cell where words are requested by name; else in those that have all
+    defects, one or none, of which Fortran has those of all and none.
+    """
+    yield Attempt(Name("words", "vectors"), _vectors)
+    for listing, case in all_cells():
+        if chosen.thin and (case != _THIN_CASE or not _has_all_or_none(listing)):
+            continue
+        name = of_cell("words", listing, case)
+        if chosen.only or _is_few(listing):
+            yield Attempt(name, partial(_against_floats, listing, case))
+        if chosen.only or _has_all_or_none(listing):
+            for word in compiled_in_word.compiled_words():
+                own = replace(name, subject=f"{word}/{listing.program}")
+                yield Attempt(own, partial(_against_fortran, listing, case, word))
+
+
+def _vectors(name: Name) -> Check:
+    wrong = [each.vector.name for each in answers() if not each.agrees]
+    return name.bounded(len(wrong), 0.0, ", ".join(wrong))
+
+
+def _against_floats(listing: Listing, case: int, name: Name) -> Check:
+    floats = run_program(case_scene(case), listing, "python")
+    return _same(name, floats, in_word.run(case_scene(case), listing, WORDS[BINARY64]))
+
+
+def _against_fortran(listing: Listing, case: int, word: str, name: Name) -> Check:
+    scene = case_scene(case)
+    fortran = compiled_in_word.run(scene, listing, WORDS[word])
+    return _same(name, in_word.run(scene, listing, WORDS[word]), fortran)
+
+
+def _same(name: Name, one: Trajectory, other: Trajectory) -> Check:
+    found = differences(one, other)
+    return name.judged(not found, ", ".join(found), distance(one, other), 0.0)
+
+
+def _has_all_or_none(listing: Listing) -> bool:
+    """Whether a listing is the original or the corrected one."""
+    return listing.label != "custom" and not listing.readings
+
+
+def _is_few(listing: Listing) -> bool:
+    """Whether a listing has no reading and all defects, one or none; or a reading alone."""
+    few = len(listing.defects) + len(listing.readings) <= 1
+    return few or _has_all_or_none(listing)

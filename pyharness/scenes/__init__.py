@@ -1,0 +1,1 @@
+"""Random scenes by kind, and transformations of a scene."""

@@ -1,0 +1,182 @@
+"""Extreme scenes without torque, and their images: tables by suite, each of name, scene and time.
+
+Near the separatrix, near symmetry, bodies of extreme shape, and other units of time.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+from pyharness.model.attitude import Quaternion, unit_quaternion
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene_file import case_scene
+from pyharness.scenes.rescaled import scaled
+
+
+class Circumstance(NamedTuple):
+    """A scene that is tried until a time (s)."""
+
+    name: str
+    scene: Scene
+    time: float
+
+
+def speed(scene: Scene, largest: float) -> float:
+    """Return the largest coefficient times the largest omega (1/s)."""
+    return max(map(abs, scene.euler_coefficients)) * largest
+
+
+def in_steps(scene: Scene, time: float) -> Scene:
+    """Return the scene with equal steps until `time` (s), each of .002 radians if not too many."""
+    rate = speed(scene, max(map(abs, scene.omega)))
+    count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
+    return replace(scene, step_size=abs(time) / count, steps=count)
+
+
+def _stepped(name: str, scene: Scene, time: float) -> Circumstance:
+    return Circumstance(name, in_steps(scene, time), time)
+
+
+# Separatrix. A = C = 1/2 are exact in binary64: a disturbance that is the same about axes 1 and 3
+# is on the separatrix, and the body turns over once and never again.
+MIDDLE_AXIS = (6.0, 5.0, 2.0)
+_A, _B = 0.5, 0.8
+_FLIPS = 5
+
+
+def quarter(disturbance: float) -> float:
+    """Return the time from a start (d, 1, 0) until axis 2 has no part in the spin (s)."""
+    # K(k) over the frequency, by the arithmetic-geometric mean.
+    mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
+    while mean - other > 1e-9 * mean:
+        mean, other = 0.5 * (mean + other), math.sqrt(mean * other)
+    return 0.5 * math.pi / mean
+
+
+def _separatrix() -> Iterator[Circumstance]:
+    """Return spins about the middle axis, disturbed by ever less."""
+    for d in (10.0**-k for k in range(1, 16)):
+        beside, on = (d, 1.0, 0.0), (d, 1.0, d)
+        flip = quarter(d)
+        # To the middle of a turn, where the motion is the fastest and errors are the largest.
+        for name, omega, time in (
+            ("early", beside, min(14.0, 0.75 * flip)),
+            ("flip", beside, flip),
+            ("flips", beside, (2.0 * _FLIPS - 1.0) * flip),
+            ("on", on, flip),
+        ):
+            scene = Scene(f"middle axis, {name}, {d:.0e}", omega, moments=MIDDLE_AXIS)
+            yield _stepped(f"{name}-{d:.0e}", scene, time)
+
+
+# 1 - 1e-16 is the number next to 1; below 1 they are twice as close as above.
+_DIFFERENCES = (*(10.0**-k for k in range(1, 17)), 0.0)
+SYMMETRIC_START = (0.3, 0.9, -0.7)
+_SHORT, LONG = 20.0, 1e6  # s
+
+
+def _near_symmetry() -> Iterator[Circumstance]:
+    """Return bodies with two equal moments, three, and nearly so."""
+    for difference in _DIFFERENCES:
+        near = 1.0 - difference
+        size = f"{difference:.0e}" if difference else "equal"
+        for name, moments, time in (
+            ("small-pair", (1.5, 1.0, near), _SHORT),
+            ("large-pair", (1.0, near, 0.6), _SHORT),
+            ("large-pair-long", (1.0, near, 0.6), LONG),
+            # It turns the slower, the nearer it is to a sphere: the same angle in all.
+            ("sphere", (1.0, near, 1.0 - 2.0 * difference), _SHORT / (difference or 1.0)),
+        ):
+            scene = Scene(f"near symmetry, {name}, {size}", SYMMETRIC_START, moments=moments)
+            yield _stepped(f"{name}-{size}", scene, time)
+
+
+_SHAPED = (0.3, 1.0, -0.6)
+_RADIANS = 20.0
+# Every moment about every axis, and both senses of the order.
+_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
+_NEEDLE, _PLATE = (1.0, 1.0 - 2.0**-41, 1e-12), (5.0, 3.0, 2.0)
+_BODIES: dict[str, Triple] = {
+    # In the ratio 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, and as far from symmetry as a body may be.
+    "needle": (1.0, 1.0, 1e-12),
+    "uneven-needle": _NEEDLE,
+    "coin": (1.0, 1e12, 1e12),
+    "uneven-coin": (1.0, 1e12, 1e12 - 0.5),
+    # I1 = I2 + I3, exactly.
+    "plate": _PLATE,
+    "round-plate": (2.0, 1.0, 1.0),
+    "strip": (1.0 + 2.0**-40, 1.0, 2.0**-40),
+    "broad-strip": (1e12 + 1.0, 1e12, 1.0),
+    # One moment exceeds the sum of the others.
+    "impossible": (200.0, 10.0, 20.0),
+    "impossible-equal": (1.0, 1.0, 1e3),
+    "impossible-three": (1e3, 1.0, 1e-3),
+}
+
+
+def _shapes() -> Iterator[Circumstance]:
+    """Return needles, coins, flat plates, and moments that no body has."""
+    for name, moments in _BODIES.items():
+        for axes in _ORDERS:
+            first, second, third = (moments[axis] for axis in axes)
+            order = "".join(str(axis + 1) for axis in axes)
+            scene = Scene(f"{name} {order}", _SHAPED, moments=(first, second, third))
+            a, b, c = map(math.sqrt, map(abs, scene.euler_coefficients))
+            # The fastest of the small motions about the three axes (rad/s).
+            rates = zip((b * c, c * a, a * b), scene.omega, strict=True)
+            time = _RADIANS / max(w * abs(own) for w, own in rates)
+            yield _stepped(f"{name}-{order}", scene, time)
+    # With its torques, which no closed form takes.
+    yield Circumstance("case-6", case_scene(6), 1.0)
+
+
+ORDINARY = Scene("scales", (0.5, 1.0, -0.7), moments=(40.0, 30.0, 20.0))
+ORDINARY_TIME = 15.0  # s
+_TENS = (-300, -250, -200, -160, -150, -100, -50, 0, 50, 100, 150, 200, 300)
+TWOS = (-996, -500, -100, 100, 498, 996)
+
+
+def _scales() -> Iterator[Circumstance]:
+    """Return one motion at angular velocities from 1e-300 to 1e300 rad/s."""
+    scene = in_steps(ORDINARY, ORDINARY_TIME)
+    named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
+    named += [(f"2^{power}", math.ldexp(1.0, power)) for power in TWOS]
+    for name, factor in named:
+        yield Circumstance(name, replace(scaled(scene, factor), name=name), ORDINARY_TIME / factor)
+
+
+POINTED: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
+
+
+def _attitude() -> Iterator[Circumstance]:
+    """Return bodies with an attitude: near the separatrix, near symmetry, of extreme shape."""
+    for name, scene, time in _separatrix():
+        yield Circumstance(f"separatrix-{name}", replace(scene, attitude=POINTED), time)
+    bodies: list[tuple[str, str, Triple, Triple]] = []
+    for k in range(1, 17, 3):
+        for sign in (1.0, -1.0):
+            moments = (3.0, 3.0 * (1.0 + sign * 10.0**-k), 2.0)
+            bodies.append((f"symmetry-{sign * 10.0**-k:.0e}", "", moments, _SHAPED))
+    for name, moments, omega in (
+        ("symmetric", (3.0, 3.0, 2.0), _SHAPED),
+        ("sphere", (3.0, 3.0, 3.0), _SHAPED),
+        ("steady", (3.0, 2.5, 2.0), (0.0, -1.0, 0.0)),
+        ("rest", (3.0, 2.5, 2.0), (0.0, 0.0, 0.0)),
+        ("needle", _NEEDLE, _SHAPED),
+        ("plate", _PLATE, _SHAPED),
+    ):
+        bodies.append((name, name, moments, omega))
+    for circumstance, name, moments, omega in bodies:
+        scene = Scene(name, omega, moments=moments, attitude=POINTED)
+        yield _stepped(circumstance, scene, _SHORT)
+
+
+EXTREMES: dict[str, Callable[[], Iterator[Circumstance]]] = {
+    "separatrix": _separatrix,
+    "near-symmetry": _near_symmetry,
+    "shapes": _shapes,
+    "scales": _scales,
+    "attitude": _attitude,
+}
+"""The extreme scenes of each trial."""

@@ -1,0 +1,249 @@
+"""Random scenes by kind: makers that turn a generator into a scene, each with a name."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+
+from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
+from pyharness.scenes.rescaled import scaled
+from pyharness.scenes.rotated import turned
+
+
+def _body(source: Random) -> list[float]:
+    """Return moments that a body can have, in rising order."""
+    low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
+    return [low, middle, source.uniform(middle, low + middle)]
+
+
+def _plain(source: Random) -> Scene:
+    """Return a body that exists, turning at a few radians a second."""
+    moments = _body(source)
+    source.shuffle(moments)
+    return _scene(source, _vector(source, 5.0), _triple(moments))
+
+
+def _near_symmetric(source: Random) -> Scene:
+    moment = source.uniform(1.0, 50.0)
+    apart = 1.0 + source.choice((-1.0, 1.0)) * 10.0 ** -source.uniform(1.0, 16.0)
+    moments = [moment, moment * apart, moment * source.uniform(0.1, 1.9)]
+    source.shuffle(moments)
+    return _scene(source, _vector(source, 5.0), _triple(moments))
+
+
+def _near_separatrix(source: Random) -> Scene:
+    moments = _body(source)
+    spin = source.choice((-1.0, 1.0)) * source.uniform(0.5, 5.0)
+    omega = _disturbed(source, spin, 10.0 ** -source.uniform(1.0, 12.0))
+    axes = source.sample(range(3), 3)
+    return _scene(source, _at(omega, axes), _at(moments, axes), torque=False)
+
+
+def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
+    """Return a spin about the middle axis, and a little about every axis."""
+    return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
+
+
+def _violent(source: Random) -> Scene:
+    scene = _plain(source)
+    size = _largest(scene) * 10.0 ** source.uniform(1.0, 4.0)
+    constant, rate = _vector(source, size), _vector(source, size)
+    law = TorqueLaw(constant, rate, [_wave(source, size, 10.0 ** source.uniform(0.0, 4.0))])
+    return replace(scene, torque=law, step_size=1e-2 / size**0.5, steps=50)
+
+
+def _from_rest(source: Random) -> Scene:
+    """Return a body at rest under torque of any kind, about one axis or about all."""
+    scene = _plain(source)
+    size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
+    axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
+    law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
+
+    def kept(values: Triple) -> Triple:
+        return _triple([x if k in axes else 0.0 for k, x in enumerate(values)])
+
+    return turned(replace(scene, omega=(0.0, 0.0, 0.0), torque=law), kept, body=False)
+
+
+def _slow_waves(source: Random) -> Scene:
+    """Return waves that turn by as little as 1e-14 radians, half of them from rest."""
+    scene = _plain(source)
+    size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
+    law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))
+    start = 0.0 if source.random() < 0.5 else 10.0 ** -source.uniform(0.0, 6.0)
+    return replace(scene, omega=_times(start, scene.omega), torque=law)
+
+
+def _many_speeds(source: Random) -> Scene:
+    """Return up to six waves from 1e-6 to 600 rad/s beside each other."""
+    scene = _plain(source)
+    some: list[list[Wave]] = [[], []]
+    for _ in range(source.randint(2, 6)):
+        amplitude = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.5)
+        frequency = 10.0 ** source.uniform(-6.0, 2.8)
+        some[source.randrange(2)].append(_wave(source, amplitude, frequency))
+    sines, cosines = some
+    if source.random() < 0.2:
+        # One frequency in a sine and in a cosine, which methods may take together.
+        cosines = sines
+    start = source.choice((0.0, 0.01, 1.0))
+    law = TorqueLaw(sines=sines, cosines=cosines)
+    return replace(scene, omega=_times(start, scene.omega), torque=law)
+
+
+def _far_scale(source: Random) -> Scene:
+    """Return a scene with other units of time and mass: omega from 1e-135 to 1e135."""
+    exponent = source.choice((-1, 1)) * source.randint(20, 450)
+    scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
+    if abs(exponent) > 300:
+        # The rate of a torque goes with the cube.
+        scene = replace(_plain(source), torque=TorqueLaw())
+    found = scaled(scene, 2.0**exponent)
+    mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
+    return replace(turned(found, lambda each: _times(mass, each), body=True), omega=found.omega)
+
+
+def _sensitive(source: Random) -> Scene:
+    """Return a spin beside the middle axis that multiplies a difference up to 1e6 times."""
+    low, middle, high = body = _body(source)
+    spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
+    rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
+    faint = abs(spin) * 10.0 ** -source.uniform(1.0, 8.0)
+    omega = _disturbed(source, spin, faint)
+    law = TorqueLaw()
+    if source.random() < 0.6:
+        size = low * faint * max(rate, 0.1)
+        law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
+    axes = source.sample(range(3), 3)
+    steps = source.randint(10, 60)
+    step_size = min(50.0, source.uniform(1.0, 14.0) / max(rate, 1e-3)) / steps
+    moments = _at(body, axes)
+    return Scene("", _at(omega, axes), moments, torque=law, step_size=step_size, steps=steps)
+
+
+def _long(source: Random) -> Scene:
+    """Return a motion of up to a few hundred radians."""
+    scene = _plain(source)
+    return replace(scene, step_size=10.0 ** source.uniform(0.5, 1.3) / scene.steps)
+
+
+def _no_body(source: Random) -> Scene:
+    """Return coefficients of any sign, which no body has."""
+    return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
+
+
+def _extreme(source: Random) -> Scene:
+    """Return numbers from one end of binary64 to the other, which mostly overflow."""
+
+    def any_size() -> float:
+        if source.random() < 0.1:
+            return source.choice((0.0, -0.0))
+        return float(source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-300.0, 300.0))
+
+    law, omega, sizes = ([any_size() for _ in range(3)] for _ in range(3))
+    moments = [abs(x) or 1.0 for x in sizes]
+    torque = TorqueLaw(law) if source.random() < 0.5 else TorqueLaw()
+    step_size = 10.0 ** source.uniform(-100.0, 2.0)
+    return Scene("", omega, moments, torque=torque, step_size=step_size, steps=20)
+
+
+def _unsorted_body(source: Random) -> Triple:
+    """Return moments that a body can have, in no order."""
+    low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
+    return source.uniform(abs(low - middle), low + middle), low, middle
+
+
+def _pointing(source: Random) -> Scene:
+    """Return a body without torque that starts at any attitude."""
+    moments, omega = _unsorted_body(source), _vector(source, 3.0)
+    w, x, y, z = (source.gauss(0, 1) for _ in range(4))
+    return Scene("", omega, moments=moments, attitude=(w, x, y, z))
+
+
+def _driven(source: Random) -> Scene:
+    """Return a body under a constant torque, a ramp and one wave."""
+    moments = _unsorted_body(source)
+    constant, rate, sine = (_vector(source, size) for size in (20.0, 5.0, 20.0))
+    law = TorqueLaw(constant, rate, ((sine, source.uniform(0.1, 20.0)),))
+    return Scene("", _vector(source, 3.0), moments=moments, torque=law)
+
+
+NASTY: dict[str, Callable[[Random], Scene]] = {
+    "near-symmetric": _near_symmetric,
+    "near-separatrix": _near_separatrix,
+    "violent torque": _violent,
+    "from rest": _from_rest,
+    "slow waves": _slow_waves,
+    "many speeds": _many_speeds,
+    "far scale": _far_scale,
+    "sensitive": _sensitive,
+    "long": _long,
+    "coefficients": _no_body,
+    "extreme": _extreme,
+}
+"""Scenes in which numerical methods have trouble, each in its way."""
+
+KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
+"""Every kind of random scene by name."""
+
+
+def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
+    """Return a torque of about `size`: 1 constant, 2 rate, 4 a sine, 8 a cosine, or a sum."""
+    low, high = map(math.log10, frequencies)
+    constant, rate = _vector(source, size), _vector(source, size)
+    sine, cosine = (_wave(source, size, 10.0 ** source.uniform(low, high)) for _ in range(2))
+    return TorqueLaw(
+        constant if kinds & 1 else (0.0, 0.0, 0.0),
+        rate if kinds & 2 else (0.0, 0.0, 0.0),
+        [sine] if kinds & 4 else [],
+        [cosine] if kinds & 8 else [],
+    )
+
+
+def _scene(
+    source: Random,
+    omega: Triple,
+    moments: Triple | None,
+    coefficients: Triple | None = None,
+    torque: bool = True,
+) -> Scene:
+    """Return a scene with one of the kinds of torque that there are, or none."""
+    size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
+
+    def wave(most: float) -> list[Wave]:
+        return [_wave(source, size, source.uniform(0.1, most))]
+
+    laws: tuple[Callable[[], TorqueLaw], ...] = (
+        TorqueLaw,
+        lambda: TorqueLaw(_vector(source, size)),
+        lambda: TorqueLaw(_vector(source, size), _vector(source, size)),
+        lambda: TorqueLaw(sines=wave(30.0), cosines=wave(300.0)),
+    )
+    law = laws[source.randrange(4) if torque else 0]()
+    step_size, steps = 10.0 ** source.uniform(-3.0, -1.3), source.randint(10, 60)
+    return Scene("plain", omega, moments, coefficients, law, step_size, steps)
+
+
+def _largest(scene: Scene) -> float:
+    return max(scene.moments or (1.0,))
+
+
+def _vector(source: Random, size: float) -> Triple:
+    return _triple([source.uniform(-size, size) for _ in range(3)])
+
+
+def _wave(source: Random, size: float, frequency: float) -> Wave:
+    return _vector(source, size), frequency
+
+
+def _times(factor: float, values: Triple) -> Triple:
+    return _triple([factor * x for x in values])
+
+
+def _at(values: list[float], axes: list[int]) -> Triple:
+    return _triple([values[k] for k in axes])
+
+
+def _triple(values: list[float]) -> Triple:
+    first, second, third = values
+    return first, second, third

@@ -1,0 +1,74 @@
+"""Random scenes, listings and steps that can be had again: a seed and a number say which."""
+
+import datetime
+from dataclasses import dataclass, replace
+from random import Random
+
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
+from pyharness.model.scene import Scene
+from pyharness.scenes.kinds import KINDS, NASTY
+
+COARSEST = 1e-3
+# Drawn last: a number of a seed stands for what it stood for before these had a flag.
+_LATER = ("three-masses",)
+_LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What one number of a seed stands for."""
+
+    scene: Scene  # half of them nasty; its name says in what way
+    listing: Listing  # of any program, with any defects and readings
+    lipschitz: float  # constant of the stop test (1/s)
+    may_stop: bool
+    digits: float  # 0 for the coarsest tolerance of a method, 1 for its own finest
+    backward: bool  # whether a method is asked for negative times
+    stages: int  # of Gauss collocation
+
+    @property
+    def time(self) -> float:
+        """The last time that a method is asked for (s)."""
+        return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
+
+    def tolerance(self, finest: float) -> float:
+        """Return the tolerance for a method that claims to meet `finest`."""
+        return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
+
+
+def weekly_seed(day: datetime.date | None = None) -> str:
+    """Return the week, as in 2026-W47: a seed that changes every Monday."""
+    year, week, _ = (day or datetime.date.today()).isocalendar()
+    return f"{year}-W{week:02d}"
+
+
+def draw(seed: str, number: int) -> Draw:
+    """Return what `number` of `seed` stands for; the same with every version of Python."""
+    # A generator of its own for each number, so that one can be repeated without the others.
+    source = Random(f"{seed}/{number}")
+    scene = KINDS["plain"](source)
+    if number % 2 == 1:
+        name = source.choice(list(NASTY))
+        scene = replace(NASTY[name](source), name=name)
+    program = source.choice(PROGRAMS)
+    early = [name for name in switches(program) if name not in _LATER]
+    defects, readings = (
+        frozenset(name for name in names if source.random() < share)
+        for names, share in ((early, 0.5), (names_of("reading", program), 0.3))
+    )
+    found = Draw(
+        scene=scene,
+        listing=Listing(program, defects, readings),
+        lipschitz=source.choice(_LIPSCHITZ),
+        may_stop=source.random() < 0.5,
+        digits=source.random(),
+        backward=source.random() < 0.5,
+        stages=source.randint(1, 8),
+    )
+    later = [name for name in _LATER if name in switches(program) and source.random() < 0.5]
+    return replace(found, listing=Listing(program, defects.union(later), readings))
+
+
+def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
+    """Return the scene of a kind of `KINDS` that a seed stands for."""
+    return replace(KINDS[kind](Random(seed)), name=name)

@@ -1,1 +1,0 @@
-"""Numerical stability tried to breaking, each trial with a bound derived beforehand."""

@@ -1,1 +1,0 @@
-"""Bits between languages, error against the truth, and what changed since recorded."""

@@ -1,0 +1,427 @@
+"""`verify`: what it checks, that each check can fail, and what a user sees then."""
+
+import datetime
+import json
+import math
+import re
+import shlex
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from pyharness.checks import cells as verify_programs
+from pyharness.checks.check import Name, selected
+from pyharness.checks.golden import mathematics, read_record, recorded, update
+from pyharness.checks.judge import Answer, Tried
+from pyharness.checks.kinds import KINDS, verify
+from pyharness.checks.orders import judged_order
+from pyharness.checks.plants import self_test
+from pyharness.checks.plants.planted_twins import plant_in_twin
+from pyharness.checks.plants.plants import PLANTS, Plant
+from pyharness.checks.random_methods import may_refuse, truth_of
+from pyharness.checks.selection import DRAWS, RECORD, Selection
+from pyharness.cli.main import main
+from pyharness.compare.orders import Order, State
+from pyharness.methods import problem
+from pyharness.methods.registry import METHODS
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.model.scene import Scene, TorqueLaw
+from pyharness.model.trajectory import Trajectory
+from pyharness.original import compiled
+from pyharness.original.cells import all_cells, cell_name
+from pyharness.original.programs import PROGRAM_REGISTRY, Program
+from pyharness.scenes.random_scenes import draw, weekly_seed
+
+BY_NAME = {plant.name: plant for plant in PLANTS}
+
+
+def test_every_cell_has_a_name_of_its_own() -> None:
+    names = {cell_name(listing, case) for listing, case in all_cells()}
+    assert len(names) == (16 * 2 + 8 + 128 * 2) * 8
+
+
+def test_checks_have_names_of_their_own_and_all_pass() -> None:
+    """A part of everything; all of it is what `verify` is run for."""
+    checks = list(verify(Selection(seed="fixed", draws=12, thin=True)))
+    assert [check.id for check in checks if not check.passed] == []
+    assert len({check.id for check in checks}) == len(checks)
+    assert {check.suite for check in checks} == set(KINDS)
+
+
+_STOP_TEST = {
+    "_distances(slope[4], slope[1])": "_distances(slope[3], slope[1])",
+    "_distances(point[3], first_point)": "_distances(point[2], first_point)",
+    "_distances(result, base)": "_distances(result, point[3])",
+    "found[3:] + found[:3]": "found",
+    "found = [*zip(STOP_VARIABLES[:last]": "found = [*zip(STOP_VARIABLES[last - 1 :: -1]",
+    "last = 6 if velocity_counts else 3": "last = 3",
+    "_norm(change_k[:last])": "0.9999999999 * _norm(change_k[:last])",
+    "> by * lipschitz": "> 1.0000001 * by * lipschitz",
+    "total = total + each * each": "total = total + abs(each)",
+    "Stop(step + 1, *found)": "Stop(step, *found)",
+}
+_OMEGA = {
+    "m[1] + b * u[0]": "m[1] + 1.000000001 * b * u[0]",
+    "m[0] + a * u[1]": "1.000000001 * m[0] + a * u[1]",
+}
+_OMEGA_RUNGE_KUTTA = {
+    "r2 + b * u[2]": "r2 + 1.000000001 * b * u[2]",
+    "[r1 + a": "[1.000000001 * r1 + a",
+}
+_VELOCITY = {
+    "acceleration[1] + v[2]": "1.000000001 * acceleration[1] + v[2]",
+    "- v[1] * u[0]": "+ v[1] * u[0]",
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "program", "file", "fault"),
+    [
+        (kind, program, file, fault)
+        for kind, program, file, faults in (
+            ("stops", "runge-kutta", "runge_kutta.py", _STOP_TEST),
+            ("schemes/two-term", "two-term", "equations.py", _OMEGA | _VELOCITY),
+            ("schemes/four-term", "four-term", "equations.py", _OMEGA | _VELOCITY),
+            ("schemes/runge-kutta", "runge-kutta", "runge_kutta.py", _OMEGA_RUNGE_KUTTA),
+            ("schemes/runge-kutta", "runge-kutta", "equations.py", _VELOCITY),
+        )
+        for fault in faults.items()
+    ],
+)
+def test_fault_in_both_languages_is_seen(
+    kind: str, program: str, file: str, fault: tuple[str, str], tmp_path: Path
+) -> None:
+    """Far below what an order shows."""
+    faulty = plant_in_twin(program, file, *fault, tmp_path)
+    with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
+        checks = verify(Selection(only=[f"{kind}/case-{case}" for case in (1, 3, 5, 6, 7)]))
+        assert not all(check.passed for check in checks)
+
+
+def test_limit_is_not_passed_by_nan() -> None:
+    passed = [
+        Name("").bounded(*pair).passed for pair in ((math.nan, math.inf), (2.0, 1.0), (1.0, 1.0))
+    ]
+    assert passed == [False, False, True]
+
+
+def test_selection_is_by_whole_parts() -> None:
+    assert selected("cells/two-term/case-3", ["cells/two-term"])
+    assert not selected("cells/two-term/case-30", ["cells/two-term/case-3"])
+    assert selected("cells", [])
+
+
+def test_json_is_as_agreed(capsys: pytest.CaptureFixture[str]) -> None:
+    only = "cells/two-term/case-3,orders/rk4"
+    assert main(["verify", "--format", "json", "--only", only]) == 0
+    record = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert (record["schema"], record["passed"], record["seed"]) == (1, True, weekly_seed())
+    assert {"id", "passed", "value", "limit", "replay"} <= set(record["checks"][0])
+    assert len(record["checks"]) == 32 + 7
+
+
+def test_failure_is_told_with_the_command_that_repeats_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    only = ["verify", "--only", "cells/two-term/case-3"]
+    with BY_NAME["ulp-in-fortran"].planted():
+        assert main([*only, "--format", "junit"]) == 1
+        suite = ElementTree.fromstring(capsys.readouterr().out.encode())
+        assert suite.get("tests") == suite.get("failures") == "32"
+        failure = suite.findtext("testcase/failure") or ""
+        assert "python -m pyharness verify --only cells/" in failure
+        assert main(only) == 1
+        lines = capsys.readouterr().out.splitlines()
+        assert all(len(line) <= 100 for line in lines if not line.startswith("  python"))
+        place = next(i for i, line in enumerate(lines) if line.startswith("FAILED"))
+        assert "omega" in lines[place]
+        command = shlex.split(lines[place + 1])
+        assert command[:3] == ["python", "-m", "pyharness"]
+        assert main(command[3:]) == 1
+        assert lines[place] in capsys.readouterr().out
+    assert main(command[3:]) == 0
+    assert "1 check, all well" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("listed", "planted", "code"), [(0, 0, 0), (0, 1, 1), (1, 1, 0), (1, 0, 1)]
+)
+def test_divergence_unlisted_or_no_longer_needed_fails(
+    listed: bool, planted: bool, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = "two-term/case-3/corrected"
+    entry = {"id": "tried", "kind": "cross-language", "cell": cell}
+    table = {"divergence": [*facts("divergences")["divergence"], *[entry] * listed]}
+    plant = BY_NAME["ulp-in-fortran"].planted if planted else nullcontext
+    with patch.object(verify_programs, "facts", lambda name: table), plant():
+        assert main(["verify", "--only", f"cells/{cell}"]) == code
+    assert ("no longer occurs" in capsys.readouterr().out) == (listed and not planted)
+
+
+def test_random_draws_can_be_had_again() -> None:
+    assert draw("a", 3) == draw("a", 3)
+    assert draw("a", 3) != draw("a", 4)
+    assert draw("a", 3) != draw("b", 3)
+    # As they were drawn when this was written: a replay must outlive the version of Python.
+    assert draw("2026-W47", 0).scene.omega[0].hex() == "-0x1.5f01c99996168p+0"
+
+
+def test_half_of_the_draws_are_nasty_in_every_way() -> None:
+    names = [draw("c", number).scene.name for number in range(200)]
+    assert names[::2] == ["plain"] * 100
+    assert set(names[1::2]) == {
+        "near-symmetric", "near-separatrix", "violent torque", "from rest", "slow waves",
+        "many speeds", "far scale", "sensitive", "long", "coefficients", "extreme",
+    }  # fmt: skip
+
+
+def test_seed_changes_weekly_and_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    monday = datetime.date(2026, 11, 16)
+    week = [weekly_seed(monday + datetime.timedelta(days)) for days in range(8)]
+    assert week == ["2026-W47"] * 7 + ["2026-W48"]
+    assert main(["verify", "--only", "random/3/program"]) == 0
+    assert f"seed of the random draws: {weekly_seed()}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("seed", "draws"), [("a b", 3), ("", 3), ("$(x)", DRAWS + 1)])
+def test_replay_of_a_draw_is_read_by_the_shell_as_it_was_given(seed: str, draws: int) -> None:
+    chosen = Selection(only=[f"random/{draws - 1}/program"], seed=seed, draws=draws)
+    [check] = verify(chosen)
+    words = shlex.split(check.replay)
+    assert words[words.index("--seed") + 1] == seed
+    assert main(words[3:]) == 0
+
+
+_produced = cache(update)
+
+
+def test_record_is_what_is_produced() -> None:
+    files, news = _produced(RECORD)
+    if {file["mathematics"] for file in read_record(RECORD).values()} == {mathematics()}:
+        exact = [line for line in news if any(f"--program {name}" in line for name in PROGRAMS)]
+        assert exact == []
+    assert sum(map(len, files.values())) < 200_000
+    assert all(line.startswith("moved: ") for line in news)
+
+
+def _written(folder: Path) -> Path:
+    for name, content in _produced(RECORD)[0].items():
+        (folder / name).write_bytes(content)
+    return folder / "two-term.toml"
+
+
+def test_record_that_was_changed_fails_and_is_mended(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One unit in the last place of one number, the digest of what is not shown, a lost entry."""
+    path = _written(tmp_path)
+    good = path.read_text()
+    only = ["verify", "--only", "golden/two-term", "--record", str(tmp_path)]
+    assert main(only) == 0
+    value = next(row[3] for row in read_record(tmp_path)["two-term"]["trajectory"][5]["rows"][1:])
+    moved = float.hex(math.nextafter(float.fromhex(value), math.inf))
+    digest = read_record(tmp_path)["two-term"]["trajectory"][3]["digest"]
+    for text, told in (
+        (good.replace(value, moved, 1), "omega by 1 ulp"),
+        (good.replace(digest, "0" * 32, 1), "between the rows that are shown"),
+        (good.replace("--case 3 ", "--case 8 "), "no longer produced"),
+        (good.rpartition("[[trajectory]]")[0], "is not recorded"),
+    ):
+        path.write_text(text)
+        capsys.readouterr()
+        assert main(only) == 1
+        output = capsys.readouterr().out
+        assert told in " ".join(output.split())
+        assert f"--record {tmp_path}" in output
+    last = good.rpartition("[[trajectory]]")[2]
+    surplus = "[[trajectory]]" + re.sub(r"--case \d", "--case 8", last)
+    path.write_text(good.replace(value, moved, 1) + "\n" + surplus)
+    capsys.readouterr()
+    assert main(["verify", "--update", "--record", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert "omega by 1 ulp" in told
+    assert "gone: " in told
+    assert path.read_text() == good
+
+
+@pytest.mark.parametrize("damage", ["junk=", "x = 1\n", "trajectory = 3\n", "\xff", ""])
+def test_record_that_is_none_is_told_in_one_line_and_mended(
+    damage: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a conflict of a merge leaves, for instance; and files of what is gone are removed."""
+    path = _written(tmp_path)
+    good = path.read_text()
+    path.write_bytes(damage.encode("latin-1"))
+    assert main(["verify", "--only", "golden", "--record", str(tmp_path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert re.search(r"two-term.toml': (is no record|schema is missing)", captured.err)
+    (tmp_path / "rk9.toml").write_text(good)
+    due = [each for each in recorded() if each.source == "two-term"]
+    with patch("pyharness.checks.golden.recorded", return_value=due):
+        assert main(["verify", "--update", "--record", str(tmp_path)]) == 0
+    assert path.read_text() == good
+    assert not (tmp_path / "rk9.toml").exists()
+
+
+def test_no_record_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with patch("pyharness.cli.verbs.verify.RECORD", tmp_path / "none"):
+        assert main(["verify", "--only", "golden,orders/rk4/case-5"]) == 0
+    assert "no golden record here" in capsys.readouterr().out
+    assert main(["verify", "--record", str(tmp_path / "none")]) == 2
+    assert "is not a folder" in capsys.readouterr().err
+
+
+# One in the languages, one in a prepared solver: all are what `verify --self-test` is run for.
+@pytest.mark.parametrize("name", ["sign-in-both", "stale-solver"])
+def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
+    chosen = Selection(seed="fixed", draws=12, thin=True, only=BY_NAME[name].kinds)
+    with BY_NAME[name].planted():
+        caught = self_test._caught(BY_NAME[name], chosen)
+    assert caught.passed
+    assert not caught.example.startswith("golden")
+
+
+def test_plant_that_nothing_catches_is_a_failure(capsys: pytest.CaptureFixture[str]) -> None:
+    harmless = Plant("harmless", "no fault at all", nullcontext, ("cells",))
+    with patch.object(self_test, "PLANTS", (harmless,)):
+        assert main(["verify", "--self-test"]) == 1
+    output = capsys.readouterr().out
+    assert "FAILED harmless" in output
+    assert "1 plants and a control: 1 not as it should be" in output
+
+
+def test_every_kind_but_the_record_has_a_plant() -> None:
+    assert {kind for plant in PLANTS for kind in plant.kinds} == set(KINDS) - {"golden"}
+
+
+def test_plants_leave_nothing_behind() -> None:
+    before = [dict(METHODS), dict(PROGRAM_REGISTRY), compiled.run, problem.normalized]
+    for plant in PLANTS:
+        with plant.planted():
+            pass
+    assert [dict(METHODS), dict(PROGRAM_REGISTRY), compiled.run, problem.normalized] == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--only", "cell"], "did you mean 'cells'?"),
+        (["--only", "cells/nothing"], "no such check"),
+        (["--draws", "-1"], "--draws"),
+        (["--draws", "many"], "whole number"),
+        (["--format", "csv"], "table, json, junit"),
+        (["--update", "--only", "golden"], "--only has no meaning with --update"),
+        (
+            ["--update", "--self-test", "--record", "new"],
+            "--self-test has no meaning with --update",
+        ),
+        (["--external", "x.toml", "--seed", "3"], "--seed has no meaning with --external"),
+        (["--external", "x.toml", "--only", "cells"], "with --external"),
+        (["--only", "random", "--draws", "0"], "no such check"),
+        (["--only", "stops", "--seed", "x"], "--seed has no meaning with --only stops"),
+        (["--only", "cells,stops", "--draws", "0"], "--draws has no meaning with --only cells"),
+        (["--only", "stops", "--record", "."], "--record has no meaning with --only stops"),
+        (["--self-test", "--draws", "3"], "--draws has no meaning with --self-test"),
+        (["--external", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert told in captured.err
+
+
+def _shorter(run: Trajectory) -> Trajectory:
+    velocity = None if run.velocity is None else run.velocity[:-1]
+    return replace(run, omega=run.omega[:-1], velocity=velocity)
+
+
+def _renamed(run: Trajectory) -> Trajectory:
+    return run if run.stop is None else replace(run, stop=replace(run.stop, variable="V3"))
+
+
+def _later(run: Trajectory) -> Trajectory:
+    return run if run.stop is None else replace(run, stop=replace(run.stop, step=run.stop.step + 1))
+
+
+def _off(run: Trajectory) -> Trajectory:
+    factors = np.ones_like(run.omega)
+    factors[-1, 1] += 1e-9
+    return replace(run, omega=run.omega * factors)
+
+
+@pytest.mark.parametrize(
+    ("change", "only", "note"),
+    [
+        (_shorter, "schemes", "complete, or no velocity"),
+        (_shorter, "stops", "complete, or no velocity"),
+        (partial(replace, velocity=None), "schemes", "complete, or no velocity"),
+        (_renamed, "stops/case-3", "due Stop("),
+        (_later, "stops/case-3", "due Stop("),
+        (_off, "schemes/runge-kutta/case-3", "most at step 100, U2"),
+        (lambda run: replace(run, evaluations=run.evaluations - 1), "cells/two-term/case-3", "due"),
+        (lambda run: replace(run, evaluations=run.evaluations + 1), "cells/two-term/case-3", "due"),
+    ],
+)
+def test_what_is_not_as_due_in_both_languages_is_named(
+    change: Callable[[Trajectory], Trajectory], only: str, note: str
+) -> None:
+    run = Program.run
+
+    def altered(self: Program, *rest: Any, **named: Any) -> Trajectory:
+        return change(run(self, *rest, **named))
+
+    with patch.object(Program, "run", altered):
+        checks = list(verify(Selection(only=[only])))
+    assert checks
+    assert all(not check.passed and note in check.note for check in checks)
+
+
+@pytest.mark.parametrize("state", ["misses", "unsettled", "singular", "sensitive", "unbounded"])
+def test_order_of_a_case_that_can_not_be_told_fails(state: State) -> None:
+    assert not judged_order(Name("orders"), Order(4, state, None, 0.01)).passed
+
+
+@pytest.mark.parametrize(
+    ("method", "tolerance", "why", "growth", "may"),
+    [
+        ("auto", 1e-6, "", 1e6, False),
+        ("closed-form", 1e-6, "", 1e6, False),
+        ("taylor", 1e-6, "", 1e6, True),
+        ("radau", 1e-12, "gave up; allow more work", 2.0, True),
+        ("radau", 1e-6, "gave up; allow more work", 2.0, False),
+        ("radau", 1e-12, "gave up", 2.0, False),
+        ("dop853", 1e-12, "can't meet it", 2.0, False),
+        ("taylor", 1e-12, "gave up; allow more work", 2.0, False),
+        ("quick", 1e-6, "gave up", 2.0, True),
+    ],
+)
+def test_in_a_plain_scene_only_few_may_refuse(
+    method: str, tolerance: float, why: str, growth: float, may: bool
+) -> None:
+    drawn = draw("x", 0)
+    truth = replace(truth_of(drawn), flow=replace(truth_of(drawn).flow, amplification=growth))
+    tried = Tried(method, tolerance, drawn.scene, Answer)
+    assert may_refuse(tried, truth, why) == may
+
+
+def test_error_is_relative_to_the_largest_omega_on_the_way() -> None:
+    law = TorqueLaw((-1.0, 0.0, 0.0))
+    slowing = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
+    drawn: Any = SimpleNamespace(scene=slowing, time=1.0)
+    assert truth_of(drawn).flow.largest == pytest.approx(1.0)

@@ -1,0 +1,118 @@
+"""The port in JavaScript: bits in random scenes, planted faults, sine and cosine."""
+
+import json
+import math
+import random
+import shlex
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mpmath import mp
+
+from pyharness import run_program
+from pyharness.checks.port import differences, port
+from pyharness.checks.port_process import PortProcess
+from pyharness.checks.port_protocol import ENDINGS, read_answer, request
+from pyharness.model.listing import PROGRAMS, corrected, original
+from pyharness.model.scene import Scene, TorqueLaw, Wave
+from pyharness.scenes.random_scenes import draw
+from tests.ports import WEB, node, sample
+
+
+def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
+    """Orders of operations that no cell shows, velocity tested before omega among them."""
+    seen = set()
+    with PortProcess(node(WEB)) as process:
+        for number in range(200):
+            drawn = draw("port", number)
+            if drawn.scene.torque.sines or drawn.scene.torque.cosines:
+                continue
+            options = drawn.lipschitz, drawn.may_stop
+            line = process.ask(request(drawn.scene, drawn.listing, *options))
+            answer = read_answer(line, drawn.scene.steps)
+            twin = run_program(drawn.scene, drawn.listing, "python", *options)
+            assert differences(twin, answer) == [], number
+            seen.add((drawn.listing.program, twin.ended))
+    assert {ended for program, ended in seen if program == "runge-kutta"} == set(ENDINGS)
+    assert {program for program, _ in seen} == set(PROGRAMS)
+
+
+@pytest.mark.parametrize("waves", ["sines", "cosines"])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_torque_of_waves_alone_acts(program: str, waves: str) -> None:
+    """No case has a torque of cosines alone, and the random scenes above have none of either."""
+    wave: Wave = ((0.3, -0.2, 0.5), 1.7)
+    law = TorqueLaw(**{waves: [wave]})  # type: ignore[arg-type]
+    scene = Scene("waves", (0.1, 0.2, 0.3), moments=(3, 2, 4), torque=law, step_size=0.1, steps=20)
+    for listing in (original(program), corrected(program)):
+        twin = run_program(scene, listing, "python", may_stop=False)
+        with PortProcess(node(WEB)) as process:
+            line = process.ask(request(scene, listing, may_stop=False))
+        found = read_answer(line, scene.steps)
+        idle = run_program(replace(scene, torque=TorqueLaw()), listing, "python", may_stop=False)
+        assert abs(twin.omega - idle.omega).max() > 0.01
+        # Here a sine may have another last bit than the twin's.
+        assert abs(found.rows[:, 1:4] - twin.omega).max() < 1e-13
+
+
+# File, what stands there, the fault, and in which of the programs it shows.
+FAULTS = {
+    "the control": ("equations.js", "m[0] + a *", "m[0] + a *", ""),
+    "a sign": ("equations.js", "m[2] + c * u[0]", "m[2] - c * u[0]", "two-term four-term"),
+    "another order": (
+        "runge-kutta.js", "2 * (slope[2][i] + slope[3][i])", "2 * slope[2][i] + 2 * slope[3][i]",
+        "runge-kutta",
+    ),
+    "the points of the stop test": (
+        "runge-kutta.js", "distances(result, base)", "distances(result, firstPoint)",
+        "runge-kutta",
+    ),
+    "a defect forgotten": ("two-term.js", '"c1-for-c"', '"no-such"', "two-term"),
+    "a point of collocation": ("four-term.js", "dt * 0.6", "dt * 0.60000001", "four-term"),
+    "a multiplier": (
+        "linear-solver.js", "a[i][j] / a[j][j]", "a[i][j] * (1 / a[j][j])", "four-term",
+    ),
+    "IER": ("linear-solver.js", "b)), 0]", "b)), 1]", "two-term four-term"),
+    "sine": (
+        "circular.js", "turned(x, 0)", "turned(x, 0) * 1.001", "two-term four-term runge-kutta",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_in_the_javascript_is_found(fault: str, tmp_path: Path) -> None:
+    name, here, planted, shows = FAULTS[fault]
+    web = Path(shutil.copytree(WEB, tmp_path / "web"))
+    path = web / "programs" / name
+    text = path.read_text()
+    assert text.count(here) == 1
+    path.write_text(text.replace(here, planted))
+    failed = [check for check in port(node(web), sample()) if not check.passed]
+    assert all("step" in check.note or "stop" in check.note for check in failed)
+    assert {check.id.split("/")[1] for check in failed} == set(shows.split())
+
+
+def test_sine_and_cosine_of_the_javascript_are_the_nearest_floats() -> None:
+    engine = shlex.split(node(WEB))[0]
+    source = random.Random(1982)
+    angles = [source.uniform(-1.0, 1.0) * 10.0 ** source.uniform(-9.0, 8.0) for _ in range(20_000)]
+    # Close to a multiple of a quarter turn, where digits cancel.
+    angles += [n * (math.pi / 2) for n in range(-500, 500)]
+    angles += [0.0, -0.0, 1e-300, 2.0**-27, 29.2, 112.60000000000004, 170.00000000000006]
+    script = (
+        f"import {{ sine, cosine }} from {json.dumps(str(WEB / 'programs/circular.js'))};"
+        'import { readFileSync } from "node:fs";'
+        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map((x) => [sine(x), cosine(x)])));"
+    )
+    done = subprocess.run(
+        [engine, "--input-type=module", "--eval", script],
+        input=json.dumps(angles), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    found = json.loads(done.stdout)
+    assert len(found) == len(angles)
+    with mp.workprec(300):
+        wanted = [[float(mp.sin(x)), float(mp.cos(x))] for x in map(mp.mpf, angles)]
+    assert found == wanted

@@ -1,0 +1,164 @@
+"""Motions of any scale: the same digits in other units, by rows and by a prepared solver."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
+from pyharness.methods.registry import METHODS
+from pyharness.model.errors import InputError
+from pyharness.scenes.rescaled import factor_near_one, scaled
+
+_METHODS = ("auto", "taylor", "quick", "gauss-2", "gauss-8", "rk4", "improved-euler", "taylor-3")
+_LAW = TorqueLaw(
+    (10.0, -20.0, 15.0), (1.0, 0.0, -2.0), (((3.0, 0.0, 1.0), 4.0),), (((0.0, 2.0, 0.0), 5.0),)
+)
+
+
+def _tolerance(method: str) -> float:
+    return max(1e-6, METHODS[method].finest)
+
+
+@pytest.mark.parametrize("power", [-990, -600, -310, 310, 600, 990])
+@pytest.mark.parametrize("method", _METHODS)
+def test_same_bits_in_other_units(method: str, power: int) -> None:
+    scene, time, factor = case_scene(4), 3.0, math.ldexp(1.0, power)
+    fast = scaled(scene, factor)
+    start = np.array(scene.omega)
+    plain, solver = prepare(scene, method, 1e-6), prepare(fast, method, 1e-6)
+    wanted = plain(start, time).copy()
+    found = solver(factor * start, time / factor)
+    np.testing.assert_array_equal(found / factor, wanted)
+    assert (solver.status, solver.steps) == ("complete", plain.steps)
+    if method == "quick":
+        return
+    by_rows = solve(fast, [0.5 * time / factor, time / factor], method, _tolerance(method))
+    rows = solve(scene, [0.5 * time, time], method, _tolerance(method))
+    np.testing.assert_array_equal(by_rows.omega / factor, rows.omega)
+    np.testing.assert_array_equal(by_rows.time, [0.5 * time / factor, time / factor])
+
+
+@pytest.mark.parametrize("method", _METHODS)
+def test_torques_are_scaled_too(method: str) -> None:
+    scene = Scene("", (0.5, 1.0, -0.7), moments=(40.0, 30.0, 20.0), torque=_LAW)
+    wanted = prepare(scene, method, 1e-6)(np.array(scene.omega), 2.0).copy()
+    for power in (-330, 330):
+        factor = math.ldexp(1.0, power)
+        fast = scaled(scene, factor)
+        assert factor_near_one(fast, 2.0 / factor) != 1.0
+        found = prepare(fast, method, 1e-6)(np.array(fast.omega), 2.0 / factor)
+        np.testing.assert_array_equal(found / factor, wanted)
+
+
+def test_ordinary_scenes_are_left_alone() -> None:
+    for case in range(1, 8):
+        assert factor_near_one(case_scene(case), 1.0) == 1.0
+    # What the torque gives counts: such a start is soon an ordinary motion.
+    for case, first, time in ((5, 1e-200, 1.0), (4, 0.0, 1.0), (4, 1e200, 1e200)):
+        scene = replace(case_scene(case), omega=(first, 0.0, 0.0))
+        assert factor_near_one(scene, time) == 1.0
+
+
+def test_a_result_beyond_the_range_of_numbers_is_an_overflow() -> None:
+    """Axis 3 gets more than 1.8e308 rad/s, out of energy that the others have."""
+    scene = Scene("", (1e307, 1.6e308, 1e308), moments=(3.0, 2.0, 0.5))
+    times = [1e-309 * k for k in range(1, 100)]
+    run = solve(scene, times, "taylor", 1e-12)
+    assert run.ended == "overflow"
+    assert 0 < len(run.omega) < len(times)
+    assert np.isfinite(run.omega).all()
+    solver = prepare(scene, "taylor", 1e-12)
+    ends = [
+        (bool(np.isfinite(solver(np.array(scene.omega), t)).all()), solver.status) for t in times
+    ]
+    assert set(ends) == {(True, "complete"), (False, "overflow")}
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk45", "radau", "lsoda"])
+def test_solve_ivp_says_overflow_where_omega_leaves_the_range(method: str) -> None:
+    law = TorqueLaw((1e10, 2e10, -1e10))
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law)
+    assert solve(scene, [1e300], method, 1e-6).ended == "overflow"
+
+
+@pytest.mark.parametrize("method", ["lsoda", "dop853", "rk45", "radau"])
+def test_solve_ivp_in_spans_whose_square_is_no_number(method: str) -> None:
+    """LSODA squares the span: in one below 1e-150 s it stood still."""
+    for size in (1e-120, 1e-150, 1e-160, 1e-200, 1e-300):
+        scene = replace(case_scene(3), omega=(size, size, size))
+        np.testing.assert_allclose(solve(scene, [1.0], method, 1e-9).omega / size, 1.0, rtol=1e-9)
+    power = 2.0**530
+    slow = Scene("", (0.3, 1.0, 1.0), coefficients=(1.0, -1.0, -0.51))
+    fast = replace(slow, coefficients=(power, -power, -0.51 * power))
+    found = solve(fast, [-10.0 / power, -20.0 / power], method, 1e-6)
+    wanted = solve(slow, [-10.0, -20.0], "taylor", 1e-12)
+    np.testing.assert_allclose(found.omega, wanted.omega, rtol=0.0, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        *((name, f"{name} gave up at t = ") for name in ("lsoda", "dop853", "rk45", "radau")),
+        ("gauss-2", "gauss-2 gave up at t = 0 s"),
+        ("taylor", "taylor gave up before t = 0.75 s after 1 step;"),
+        ("auto", "closed-form: at t = 0.75 s the phase is beyond"),
+        ("rk4", "steps of 1e-12 s are too many"),
+    ],
+)
+def test_a_refusal_tells_the_time_in_the_seconds_of_the_scene(
+    method: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pyharness.methods.scipy_ivp._MOST_EVALUATIONS", 10_000)
+    monkeypatch.setattr("pyharness.methods.gauss._MOST_EVALUATIONS", 10_000)
+    scene = replace(case_scene(3), omega=(1e100, 1e100, 1e100), step_size=1e-12)
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        solve(scene, [0.75] if method != "rk4" else [1e4], method, _tolerance(method))
+    message = str(caught.value)
+    if words.endswith("t = "):
+        time = float(message.partition("t = ")[2].split()[0])
+        assert 0.0 < time < 1e-90
+
+
+def test_longer_motions_get_finer_steps_of_solve_ivp() -> None:
+    """Errors of steps add up: thirty times as long, and still within the tolerance."""
+    scene = Scene("", (1e-2, 1.0, 0.3), moments=(6.0, 5.0, 2.0))
+    moments = np.array(scene.moments)
+    for method in ("lsoda", "dop853"):
+        run = solve(scene, [250.0], method, 1e-6)
+        for weights in (moments, moments * moments):
+            drift = weights @ (run.omega[-1] ** 2 - np.array(scene.omega) ** 2)
+            assert abs(drift) < 2e-6 * (weights @ np.abs(run.omega[-1]))
+
+
+@pytest.mark.parametrize("method", [*(m for m in _METHODS if m != "quick"), "sphere"])
+@pytest.mark.parametrize(
+    ("law", "time", "wanted"),
+    [
+        (TorqueLaw((1e-281, 2e-281, 0.0)), 1e-24, 1e-305),
+        (TorqueLaw((1e-290, 2e-290, 0.0)), 1e-15, 1e-305),
+        (TorqueLaw(rate=(1e20, 2e20, 0.0)), 1e-60, 5e-101),
+        (TorqueLaw(cosines=(((1e-281, 0.0, 0.0), 1.0),)), 1e-24, 1e-305),
+    ],
+)
+def test_a_scale_that_loses_time_or_torque_is_not_taken(
+    method: str, law: TorqueLaw, time: float, wanted: float
+) -> None:
+    """In other units the time would be 0, or the torque infinite."""
+    moments = (1.0, 1.0, 1.0) if method == "sphere" else (1.0, 2.0, 2.5)
+    scene = Scene("", (0.0, 0.0, 0.0), moments, torque=law, step_size=0.1 * time, steps=10)
+    name = "auto" if method == "sphere" else method
+    solver = prepare(scene, name, 1e-6)
+    found = solver(np.zeros(3), time)
+    assert solver.status == "complete"
+    assert found[0] == pytest.approx(wanted, rel=1e-6, abs=0.0)
+    rows = solve(scene, [time], name, _tolerance(name))
+    assert rows.omega[0, 0] == pytest.approx(wanted, rel=1e-6, abs=0.0)
+
+
+def test_torque_counts_by_what_it_gives_a_body() -> None:
+    law = TorqueLaw((1e-50, 0.0, 0.0))
+    scene = Scene("heavy", (0.0, 0.0, 0.0), moments=(1e50, 1e50, 1e50), torque=law)
+    assert factor_near_one(scene, 1.0) > 2.0**300

@@ -22,6 +22,7 @@ module taylor
   ! One march does for errors so large, in tolerances, and for differences that grow so much: else
   ! errors may cancel in the one that is carried. Another one may err less by a factor.
   real(dp), parameter :: TRUSTED = 0.25_dp
+  real(dp), parameter :: DOUBTED = 256.0_dp ! growth at which an estimate is trusted half as much
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
   real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: CHOOSING = 1e15_dp ! growth with which rounding is no small difference
@@ -128,7 +129,8 @@ contains
       if (outcome%status /= COMPLETE) exit
       if (outcome%finest .and. (precise .or. growth <= planned)) exit
       precise = growth > planned
-      error = max(outcome%error, outcome%least)
+      ! A few steps make most of the error where differences grow: theirs may be wrong by chance.
+      error = max(outcome%error, outcome%least)*(1.0_dp + min(growth, PLANNED_GROWTH)/DOUBTED)
       ! Or the way is too long to measure it again.
       if (precise .and. outcome%precise_steps > most - spent) exit
       if (precise .and. ROUNDING*growth > UNSURE*tolerance) then

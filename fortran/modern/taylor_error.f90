@@ -196,10 +196,11 @@ contains
     end do
   end subroutine turn_axes
 
-  pure subroutine growths_of(precise, lanes, blocks, growth, largest)
+  pure subroutine growths_of(precise, several, lanes, blocks, growth, largest)
     !! Largest norms of derivatives by omega where a block began: of omega at the end, and of omega
-    !! anywhere on the way.
-    logical, intent(in) :: precise
+    !! at the end of any block. The latter takes the square of the number of blocks: without
+    !! `several` times, or where little grows, it has the first and the last block alone.
+    logical, intent(in) :: precise, several
     real(dp), intent(in) :: lanes(4, 3)
     type(blocks_t), intent(in) :: blocks
     real(dp), intent(out) :: growth, largest
@@ -213,15 +214,27 @@ contains
       growth = max(growth, norm(derivative))
     end do
     largest = growth
-    if (.not. precise .or. growth < WORTH_A_LOOK) return
+    if (several) largest = max(largest, growth_from(1, blocks))
+    if (.not. precise .or. largest < WORTH_A_LOOK) return
     do m = 1, blocks%closed
-      derivative = UNIT
-      do n = m, blocks%closed
-        derivative = composed(blocks%derivatives(:, :, n), derivative)
-        largest = max(largest, norm(derivative))
-      end do
+      largest = max(largest, growth_from(m, blocks))
     end do
   end subroutine growths_of
+
+  pure real(dp) function growth_from(first, blocks)
+    !! Largest norm of the derivative of omega at the end of a block by omega where `first` began.
+    integer, intent(in) :: first
+    type(blocks_t), intent(in) :: blocks
+    real(dp) :: derivative(3, 3)
+    integer :: n
+
+    growth_from = 1.0_dp
+    derivative = UNIT
+    do n = first, blocks%closed
+      derivative = composed(blocks%derivatives(:, :, n), derivative)
+      growth_from = max(growth_from, norm(derivative))
+    end do
+  end function growth_from
 
   pure real(dp) function norm(a)
     !! Of a matrix of determinant 1: about its largest singular value, and 1 of a rotation.

@@ -245,7 +245,7 @@ contains
         if (found%steps < half_way) next_look = min(next_look, half_way)
       end if
     end do
-    call growths_of(precise, s%lanes, blocks, found%growth, found%largest)
+    call growths_of(precise, n_times > 1, s%lanes, blocks, found%growth, found%largest)
     found%precise_steps = coupling*now%scale*abs(times(n_times))/A_PRECISE_STEP
     found%scale = now%scale
     found%error = now%worst

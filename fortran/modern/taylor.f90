@@ -123,9 +123,8 @@ contains
                  outcome)
       spent = spent + real(outcome%steps, dp)
       ! Rounding chose the way where a difference grew so much; at its end is another motion.
-      ! Rows before the last may be where differences are largest.
       growth = outcome%growth
-      if (outcome%largest > CHOOSING .or. n_times > 1) growth = outcome%largest
+      if (outcome%largest > CHOOSING) growth = outcome%largest
       if (outcome%status /= COMPLETE) exit
       if (outcome%finest .and. (precise .or. growth <= planned)) exit
       precise = growth > planned

@@ -21,6 +21,7 @@ module taylor_error
   ! Since each block's beginning, to be merged by pairs where there is no room for more.
   type, public :: blocks_t
     real(dp) :: derivatives(3, 3, MOST_BLOCKS) !! of omega at a block's end by that at its beginning
+    logical :: has_row(MOST_BLOCKS) !! of the output, before the last
     integer :: steps        !! in the open one
     integer :: closed
     integer :: steps_a_block
@@ -41,6 +42,7 @@ contains
     lanes(2:, :) = UNIT
     blocks%steps = 0
     blocks%closed = 0
+    blocks%has_row(1) = .false.
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
@@ -150,15 +152,18 @@ contains
     rise(3) = factors(3)*(w(1)*error(2) + w(2)*error(1))
   end function rise
 
-  pure subroutine count_step(precise, lanes, blocks)
+  pure subroutine count_step(precise, with_row, lanes, blocks)
     !! One more step: where its block is full, the derivative is put aside and begun anew; if need
     !! be along axes that turn with it, so that no rounding of what has grown is taken for growth.
     logical, intent(in) :: precise
+    logical, intent(in) :: with_row !! the step has a row of the output before the last
     real(dp), intent(inout) :: lanes(4, 3)
     type(blocks_t), intent(inout) :: blocks
+    real(dp) :: merged(3, 3)
     integer :: n
 
     blocks%steps = blocks%steps + 1
+    blocks%has_row(blocks%closed + 1) = blocks%has_row(blocks%closed + 1) .or. with_row
     if (blocks%steps < blocks%steps_a_block) return
     blocks%steps = 0
     blocks%closed = blocks%closed + 1
@@ -168,12 +173,18 @@ contains
     else
       lanes(2:, :) = UNIT
     end if
-    if (blocks%closed < MOST_BLOCKS) return
+    if (blocks%closed < MOST_BLOCKS) then
+      blocks%has_row(blocks%closed + 1) = .false.
+      return
+    end if
     do n = 1, MOST_BLOCKS/2
-      blocks%derivatives(:, :, n) = composed(blocks%derivatives(:, :, 2*n), &
-                                             blocks%derivatives(:, :, 2*n - 1))
+      merged = composed(blocks%derivatives(:, :, 2*n), blocks%derivatives(:, :, 2*n - 1))
+      where (.not. abs(merged) <= LARGEST) merged = LARGEST
+      blocks%derivatives(:, :, n) = merged
+      blocks%has_row(n) = blocks%has_row(2*n - 1) .or. blocks%has_row(2*n)
     end do
     blocks%closed = MOST_BLOCKS/2
+    blocks%has_row(blocks%closed + 1) = .false.
     blocks%steps_a_block = 2*blocks%steps_a_block
   end subroutine count_step
 
@@ -196,45 +207,42 @@ contains
     end do
   end subroutine turn_axes
 
-  pure subroutine growths_of(precise, several, lanes, blocks, growth, largest)
-    !! Largest norms of derivatives by omega where a block began: of omega at the end, and of omega
-    !! at the end of any block. The latter takes the square of the number of blocks: without
-    !! `several` times, or where little grows, it has the first and the last block alone.
-    logical, intent(in) :: precise, several
+  pure subroutine growths_of(precise, lanes, blocks, growth, largest)
+    !! Largest norms of derivatives by omega where a block began: of omega where there are rows, and
+    !! of omega anywhere on the way.
+    logical, intent(in) :: precise
     real(dp), intent(in) :: lanes(4, 3)
     type(blocks_t), intent(in) :: blocks
     real(dp), intent(out) :: growth, largest
-    real(dp) :: derivative(3, 3)
-    integer :: m, n
+    integer :: n
 
-    derivative = lanes(2:, :)
-    growth = norm(derivative)
-    do n = blocks%closed, 1, -1
-      derivative = composed(derivative, blocks%derivatives(:, :, n))
-      growth = max(growth, norm(derivative))
+    growth = growth_until(blocks%closed, lanes(2:, :), blocks)
+    do n = 1, blocks%closed
+      if (blocks%has_row(n)) growth = max(growth, growth_until(n, UNIT, blocks))
     end do
     largest = growth
-    if (several) largest = max(largest, growth_from(1, blocks))
-    if (.not. precise .or. largest < WORTH_A_LOOK) return
-    do m = 1, blocks%closed
-      largest = max(largest, growth_from(m, blocks))
+    if (.not. precise .or. growth < WORTH_A_LOOK) return
+    do n = 1, blocks%closed
+      largest = max(largest, growth_until(n, UNIT, blocks))
     end do
   end subroutine growths_of
 
-  pure real(dp) function growth_from(first, blocks)
-    !! Largest norm of the derivative of omega at the end of a block by omega where `first` began.
-    integer, intent(in) :: first
+  pure real(dp) function growth_until(last, behind, blocks)
+    !! Largest norm of the derivative by omega where a block began, from the first to the last.
+    integer, intent(in) :: last
+    real(dp), intent(in) :: behind(3, 3) !! derivative by omega at the end of the last block
     type(blocks_t), intent(in) :: blocks
     real(dp) :: derivative(3, 3)
     integer :: n
 
-    growth_from = 1.0_dp
-    derivative = UNIT
-    do n = first, blocks%closed
-      derivative = composed(blocks%derivatives(:, :, n), derivative)
-      growth_from = max(growth_from, norm(derivative))
+    derivative = behind
+    growth_until = norm(derivative)
+    do n = last, 1, -1
+      if (growth_until >= LARGEST) exit
+      derivative = composed(derivative, blocks%derivatives(:, :, n))
+      growth_until = max(growth_until, norm(derivative))
     end do
-  end function growth_from
+  end function growth_until
 
   pure real(dp) function norm(a)
     !! Of a matrix of determinant 1: about its largest singular value, and 1 of a rotation.
@@ -255,13 +263,10 @@ contains
     !! Of two derivatives, which are rows of where each axis leads: that of b's motion, then a's.
     real(dp), intent(in) :: a(3, 3), b(3, 3)
     real(dp) :: composed(3, 3)
-    integer :: i, j
+    integer :: j
 
     do j = 1, 3
-      do i = 1, 3
-        composed(i, j) = b(i, 1)*a(1, j) + b(i, 2)*a(2, j) + b(i, 3)*a(3, j)
-        if (.not. abs(composed(i, j)) <= LARGEST) composed(i, j) = LARGEST
-      end do
+      composed(:, j) = b(:, 1)*a(1, j) + b(:, 2)*a(2, j) + b(:, 3)*a(3, j)
     end do
   end function composed
 

@@ -83,6 +83,7 @@ contains
     integer(int64) :: part    ! 65536 over the order
     integer :: order
     integer :: lasting        ! steps that turn the waves
+    integer :: n_before       ! rows before this step
     integer :: i, tries
     integer(int64) :: next_look  ! steps
     integer(int64) :: half_way   ! of the steps allowed
@@ -195,10 +196,11 @@ contains
         call turn_error(s, order, from_rest, error, s%lanes(1, :) + left(:3), &
                         attitude)
       end if
+      n_before = found%n_rows
       call add_rows(s, order, h, at_end, error, left(:3), times, tolerance, now, attitude, rows, &
                     n_attitudes, attitudes, found)
       if (found%status /= COMPLETE) exit
-      call count_step(precise, s%lanes, blocks)
+      call count_step(precise, found%n_rows > n_before, s%lanes, blocks)
       if (blocks%steps == 0) then
         ! Not at every step, which would take time.
         now%peak = max(now%peak, maxval(abs(error)))
@@ -245,7 +247,7 @@ contains
         if (found%steps < half_way) next_look = min(next_look, half_way)
       end if
     end do
-    call growths_of(precise, n_times > 1, s%lanes, blocks, found%growth, found%largest)
+    call growths_of(precise, s%lanes, blocks, found%growth, found%largest)
     found%precise_steps = coupling*now%scale*abs(times(n_times))/A_PRECISE_STEP
     found%scale = now%scale
     found%error = now%worst

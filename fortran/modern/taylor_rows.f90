@@ -34,7 +34,7 @@ module taylor_rows
     integer(int64) :: steps
     real(dp) :: error    ! largest of a row, relative, before it was taken off
     real(dp) :: least    ! what the error may be where it is estimated to be less, relative
-    real(dp) :: growth   ! of a small difference until the end
+    real(dp) :: growth   ! of a small difference until any row
     real(dp) :: largest  ! and until any time on the way
     real(dp) :: ahead    ! steps to the end, as far as known; where it gave up
     real(dp) :: precise_steps ! to the end, at the least, of a march that is precise

@@ -106,7 +106,8 @@ contains
     real(dp) :: growth
     real(dp) :: error    ! of this march, as far as it can be known, relative
     real(dp) :: blurred  ! by rounding at the end, relative
-    logical :: precise  ! this march, for a growth known too coarsely
+    logical :: again    ! the growth is known too coarsely
+    logical :: precise  ! this march knows it well
 
     asked = tolerance
     planned = PLANNED_GROWTH
@@ -127,15 +128,16 @@ contains
       if (outcome%largest > CHOOSING) growth = outcome%largest
       if (outcome%status /= COMPLETE) exit
       if (outcome%finest .and. (precise .or. growth <= planned)) exit
-      precise = growth > planned
+      again = growth > planned
+      precise = precise .or. again
       ! A few steps make most of the error where differences grow: theirs may be wrong by chance.
       error = max(outcome%error, outcome%least)*(1.0_dp + min(growth, PLANNED_GROWTH)/DOUBTED)
       ! Or the way is too long to measure it again.
       if (precise .and. outcome%precise_steps > most - spent) exit
-      if (precise .and. ROUNDING*growth > UNSURE*tolerance) then
+      if (again .and. ROUNDING*growth > UNSURE*tolerance) then
         ! Before that is said: long steps may make much of a motion near the separatrix.
         asked = 0.0_dp
-      else if (precise .or. error > TRUSTED*tolerance) then
+      else if (again .or. error > TRUSTED*tolerance) then
         asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*max(error, ROUNDING**2)), &
                           PLANNED_GROWTH/growth)
         planned = max(planned, 2.0_dp*growth)

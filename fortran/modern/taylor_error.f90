@@ -9,7 +9,7 @@ module taylor_error
 
   integer, parameter :: STEPS_IN_BLOCK = 8
   integer, parameter :: STEPS_IN_FINE_BLOCK = 2
-  integer, parameter :: MOST_BLOCKS = 256 ! even
+  integer, parameter :: MOST_BLOCKS = 512 ! even
   real(dp), parameter :: RIDGE = 1.001_dp   ! so that one pole, or none, does for the pair
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! lane
@@ -255,8 +255,9 @@ contains
         norm = norm + a(i, j)*a(i, j)
       end do
     end do
+    ! Of what is no number too, which a maximum would pass over.
+    if (.not. norm <= LARGEST*LARGEST) norm = LARGEST*LARGEST
     norm = sqrt(max(1.0_dp, norm))
-    if (.not. norm <= LARGEST) norm = LARGEST
   end function norm
 
   pure function composed(a, b)

@@ -4,7 +4,7 @@ import platform
 
 import numpy as np
 
-from pyharness import _build
+from pyharness import _build  # noqa: PLC2701
 
 LEVELS = ("plain", "avx2", "avx512")
 BEST = len(LEVELS) - 1

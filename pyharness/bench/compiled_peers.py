@@ -28,12 +28,13 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
     formula: Formula = RK4
     if method != "rk4":
-        from scipy.integrate._ivp import dop853_coefficients as table
+        # SciPy has them nowhere else.
+        from scipy.integrate._ivp import dop853_coefficients as table  # noqa: PLC2701
 
         count = table.N_STAGES
         stages = [table.A[i, :i].tolist() for i in range(count)]
         formula = stages, table.B.tolist(), table.C[:count].tolist()
-    kernel = numba.njit(fastmath=False)(_compiled(_steps_source(scene, formula)))
+    kernel = numba.njit(fastmath=False)(compiled_function(steps_source(scene, formula)))
     omega0, omega = np.array(scene.omega), np.empty(3)
 
     def make(horizon: float, setting: float) -> Ready:
@@ -54,8 +55,12 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
     import numbalsoda as package
 
     solver = getattr(package, name)
-    function = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=False)))
-    counting = numba.cfunc(package.lsoda_sig)(_compiled(_callback_source(scene, counted=True)))
+    function = numba.cfunc(package.lsoda_sig)(
+        compiled_function(_callback_source(scene, counted=False))
+    )
+    counting = numba.cfunc(package.lsoda_sig)(
+        compiled_function(_callback_source(scene, counted=True))
+    )
     start, size = np.array(state_of(scene)), max(map(abs, scene.omega)) or 1.0
     # It takes one for all unknowns.
     size = size if scene.attitude is None else min(1.0, size)
@@ -79,7 +84,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
     return make
 
 
-def _compiled(source: str) -> Any:
+def compiled_function(source: str) -> Any:
     """Return the function of a source, in plain Python."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
@@ -135,7 +140,7 @@ def end_of(state: Array, evaluations: int | None = None) -> End:
     return End(found[:3], evaluations=evaluations, attitude=attitude)
 
 
-def _steps_source(scene: Scene, formula: Formula) -> str:
+def steps_source(scene: Scene, formula: Formula) -> str:
     """Return a function of equal Runge-Kutta steps without a loop over stages or components."""
     stages, weights, nodes = formula
     lines = [

@@ -53,7 +53,7 @@ def bench_picture(finding: Finding, data: Table) -> Picture:
         _frame(left, load, "microseconds per solve")
         _frame(right, load, "right-hand sides per solve")
         if any(count for _, _, count, _ in rows):
-            _slopes(right)
+            draw_slopes(right)
     handles: dict[str, Any] = {}
     for each in axes.flat:
         found, labels = each.get_legend_handles_labels()
@@ -104,7 +104,7 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
     axes.set_title(f"Case {load.label}: {load.scene.name}, T = {load.horizon:g} s", fontsize=9)
 
 
-def _slopes(axes: "Axes") -> None:
+def draw_slopes(axes: "Axes") -> None:
     """Draw how the error of an order falls: a fan in the upper right, where no method belongs."""
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3

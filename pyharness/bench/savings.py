@@ -45,22 +45,22 @@ def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
     for case in (2, 3, 4):
         scene = case_scene(case)
         one, other = (_solver(scene, name, t_end, tolerance) for name in ("taylor", "closed-form"))
-        found.append(_saving("integration", f"Case {case}: closed form", one, other))
+        found.append(measured_saving("integration", f"Case {case}: closed form", one, other))
     one, other = (
         _solver(scene, "taylor", t_end, tolerance) for scene in (_as_if_varying(constant), constant)
     )
-    found.append(_saving("torque of time", "Case 5: constant torque", one, other))
+    found.append(measured_saving("torque of time", "Case 5: constant torque", one, other))
     one, other = (partial(rows.trajectory, constant.omega, each) for each in (times, times[-1:]))
-    found.append(_saving("dense output", "Case 5: 100 rows", one, other))
+    found.append(measured_saving("dense output", "Case 5: 100 rows", one, other))
     for program in PROGRAMS:
         one = partial(compiled.run, replace(constant, steps=1000), corrected(program))
         found.append(
-            _saving("velocity", f"{program}, 1000 steps", one, partial(one, velocity=False))
+            measured_saving("velocity", f"{program}, 1000 steps", one, partial(one, velocity=False))
         )
     code = "import pyharness.methods.prepared"
     for part, module in (("SciPy", "scipy.integrate"), ("reference", "pyharness.truth.reference")):
         one, other = partial(_python, f"{code}, {module}"), partial(_python, code)
-        found.append(_saving(part, f"a process that imports {module}", one, other))
+        found.append(measured_saving(part, f"a process that imports {module}", one, other))
     return found
 
 
@@ -77,7 +77,8 @@ def _python(code: str) -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def _saving(
+def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
+    """Return the times of a call with a part and without it."""
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

@@ -109,7 +109,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
     # The first has to import what solves.
     solve_points(sweep, spread(sweep, 1))
     for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
-        where = _together(sweep, spread(sweep, count))
+        where = places_of_a_chunk(sweep, spread(sweep, count))
         begin = time.perf_counter()
         solve_points(sweep, where)
         took = time.perf_counter() - begin
@@ -120,7 +120,7 @@ def seconds_per_scene(sweep: Sweep) -> float:
     return seconds
 
 
-def _together(sweep: Sweep, where: list[Indices]) -> list[Indices]:
+def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Move a sample to a few of the places that scenes of one batch share, as a chunk has many."""
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found = []

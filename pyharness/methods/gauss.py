@@ -13,6 +13,7 @@ from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, SENSITIVE, extension
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
+from pyharness.scenes.rescaled import omega_by_torque
 
 # Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
 # as much as half of one.
@@ -39,7 +40,7 @@ def gauss(stages: int) -> Integrator:
         if times[-1] == 0.0:
             return trajectory_of(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
         scale = max(map(abs, scene.omega))
-        start = max(scale, _driven(given[1:], times[-1]))
+        start = max(scale, omega_by_torque(scene, times[-1]))
         lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
         lengths = lengths[lengths > 0.0]
         step, spent, reached = _first_step(scene, float(lengths.min())), 0, 0.0
@@ -149,13 +150,3 @@ def _first_step(scene: Scene, shortest: float) -> float:
         if any(amplitude):
             rate = max(rate, abs(frequency))
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))
-
-
-def _driven(torque: tuple[Array, ...], time: float) -> float:
-    """Return the largest omega that torque alone gives until `time` (rad/s), or infinity."""
-    constant, rate, sines, cosines = torque
-    with np.errstate(over="ignore", invalid="ignore"):
-        push = np.abs(constant) + np.abs(rate * time)
-        push += np.abs(sines[:3]).sum(axis=1) + np.abs(cosines[:3]).sum(axis=1)
-        driven = float(push.max()) * abs(time)
-    return driven if math.isfinite(driven) else math.inf

@@ -20,6 +20,7 @@ from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
+from pyharness.scenes.rescaled import omega_by_torque
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
@@ -248,6 +249,10 @@ class _Run:
                     "torques"
                 ) from None
 
+    def _driven(self) -> float:
+        driven = omega_by_torque(self.scene, self.end)
+        return driven if math.isfinite(driven) else 1.0
+
     def _counted(self, time: float, omega: Sequence[float]) -> list[float]:
         self.evaluations += 1
         if self.evaluations > self.most:
@@ -271,7 +276,7 @@ class _Run:
         Where omega leaves every bound, what start or torque alone would give is the scale, and
         nothing is known of the rest.
         """
-        scale = max(map(abs, self.scene.omega)) or _driven(self.scene, self.end)
+        scale = max(map(abs, self.scene.omega)) or self._driven()
         if scale == 0.0:
             return _Ahead(0.0, 0.0, 1.0)
         for _ in range(_MOST_GUESSES):
@@ -283,7 +288,7 @@ class _Run:
             scale = largest
         if coarse.status != 0:
             # It leaves every bound, or loses its phase: no tolerance is met to the end.
-            return _Ahead(max(scale, _driven(self.scene, self.end)), 0.0, 1.0)
+            return _Ahead(max(scale, self._driven()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
         times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))
@@ -297,21 +302,6 @@ class _Run:
         with np.errstate(all="ignore"):
             flow = propagators(self.scene, times * self.unit, omega)
         return _Ahead(largest, radians, growth(np.nan_to_num(flow)), turned)
-
-
-def _driven(scene: Scene, time: float) -> float:
-    """Return the largest omega that torque alone may give a body at rest until `time`."""
-    law, span = scene.torque, abs(time)
-    found = 0.0
-    for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
-        total = abs(law.constant[axis]) * span + 0.5 * abs(law.rate[axis]) * span * span
-        for amplitude, frequency in law.sines:
-            f = abs(frequency)
-            total += abs(amplitude[axis]) * span * min(0.5 * f * span, 2.0 / max(f * span, 1.0))
-        for amplitude, frequency in law.cosines:
-            total += abs(amplitude[axis]) * span * min(1.0, 1.0 / max(abs(frequency) * span, 1.0))
-        found = max(found, total / moment)
-    return found if math.isfinite(found) else 1.0
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:

@@ -56,25 +56,38 @@ def factor_near_one(scene: Scene, time: float) -> float:
     """Return the power of 2 by which a scene is scaled; 1 for every ordinary one."""
     if is_ordinary(scene):
         return 1.0
-    largest = max(map(abs, scene.omega))
-    law = scene.torque
-    moments = scene.moments or (1.0, 1.0, 1.0)
-    if law.in_space:
-        # Any axis of the body may come to lie along it.
-        moments = (min(moments),) * 3
-    for axis, moment in enumerate(moments):
-        # A slow sine never comes to its amplitude.
-        waves = sum(abs(a[axis]) * min(1.0, abs(f * time)) for a, f in law.sines)
-        waves += sum(abs(a[axis]) for a, _ in law.cosines)
-        push = abs(law.constant[axis]) + abs(law.rate[axis] * time) + waves
-        # What the torque gives it counts like what it has.
-        largest = max(largest, push / moment * abs(time))
+    # What the torque gives it counts like what it has.
+    largest = max(max(map(abs, scene.omega)), omega_by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
     # A step short of the ends of the exponents, where the factor itself would not be a number.
     exponent = max(-1000, min(1000, math.frexp(largest)[1]))
     factor = math.ldexp(1.0, -exponent)
     return factor if _fits(scene, time, factor) else 1.0
+
+
+def omega_by_torque(scene: Scene, time: float) -> float:
+    """Return a bound of the omega (rad/s) that torque alone gives a body at rest until `time` (s).
+
+    Gyroscopic torques are left out. Infinity where the bound is beyond binary64.
+    """
+    law, span = scene.torque, abs(time)
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    if law.in_space:
+        # Any axis of the body may come to lie along the torque.
+        moments = (min(moments),) * 3
+    largest = 0.0
+    for axis, moment in enumerate(moments):
+        impulse = abs(law.constant[axis]) * span + 0.5 * abs(law.rate[axis]) * span * span
+        for amplitude, frequency in law.sines:
+            f = abs(frequency)
+            impulse += abs(amplitude[axis]) * span * min(0.5 * f * span, 2.0 / max(f * span, 1.0))
+        for amplitude, frequency in law.cosines:
+            f = abs(frequency)
+            impulse += abs(amplitude[axis]) * span * min(1.0, 1.0 / max(f * span, 1.0))
+        omega = impulse / moment
+        largest = max(largest, omega if math.isfinite(omega) else math.inf)
+    return largest
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:

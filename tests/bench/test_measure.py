@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pyharness.bench import measure as bench
-from pyharness.bench.compiled_peers import RK4, _compiled, _steps_source
+from pyharness.bench.compiled_peers import RK4, compiled_function, steps_source
 from pyharness.bench.contenders import Maker, SceneContender, own
 from pyharness.bench.measure import (
     Finding,
@@ -26,7 +26,7 @@ from pyharness.bench.measure import (
     workloads,
 )
 from pyharness.bench.peers import peers
-from pyharness.bench.pictures import _slopes
+from pyharness.bench.pictures import draw_slopes
 from pyharness.bench.report import bench_report, ratio
 from pyharness.bench.scores import Score, groups, means, scores, yardstick
 from pyharness.cli.main import main
@@ -279,7 +279,7 @@ LAWS.append(
 def test_source_written_for_numba_is_runge_kutta_of_the_scene(scene: Scene) -> None:
     from pyharness.methods.prepared import prepare
 
-    function = _compiled(_steps_source(scene, RK4))
+    function = compiled_function(steps_source(scene, RK4))
     omega0, omega = np.array(scene.omega), np.empty(3)
     function(omega0, 1.0, 100, omega)
     ours = prepare(scene, "rk4")(omega0, 1.0)
@@ -384,7 +384,7 @@ def test_slopes_stand_where_no_curve_does(order: int) -> None:
     axes.loglog(count[error > 1e-15], error[error > 1e-15])
     axes.set_xlim(20.0, 2e6)
     axes.set_ylim(1e-17, 1.0)
-    _slopes(axes)
+    draw_slopes(axes)
     axes.figure.draw_without_rendering()
     curve = axes.transData.transform(axes.lines[0].get_xydata())
     for label in axes.texts:

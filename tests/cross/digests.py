@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import tests.conftest  # noqa: F401  (guards the kernels where traps are asked for)
-from pyharness import _build, _kernels
+from pyharness import _build, _kernels  # noqa: PLC2701
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory

@@ -12,7 +12,7 @@ from docs.atlas.collocation import tenfold
 from docs.atlas.maps import place_of
 from docs.atlas.stops import case_scenes, foretold
 from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.forecast import _together
+from pyharness.ensembles.forecast import places_of_a_chunk
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep import Sweep, spread
 from pyharness.ensembles.sweep_file import read_sweep
@@ -114,7 +114,7 @@ def test_torque_along_the_middle_axis_holds_nobody(tmp_path: Path) -> None:
 
 def test_sample_of_the_estimate_shares_what_loads_share() -> None:
     sweep = read_sweep(ATLAS / "stops.toml")
-    places = _together(sweep, spread(sweep, 256))
+    places = places_of_a_chunk(sweep, spread(sweep, 256))
     steps = sorted({*places[2].tolist()})
     assert (len(steps), steps[0], steps[-1]) == (5, 0, 600)
     assert len({*places[3].tolist()}) > 100

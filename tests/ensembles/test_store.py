@@ -81,7 +81,7 @@ def opened_after(sweep: Any, path: Path) -> Any:
 def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from zarr.storage import _local
+    from zarr.storage import _local  # noqa: PLC2701
 
     sweep = read_sweep(written(tmp_path, PROGRAM.replace("chunk = 20", "chunk = 4")))
     run_sweep(sweep, str(tmp_path / "whole"))

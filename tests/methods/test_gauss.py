@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
-from pyharness.methods.gauss import _driven
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
@@ -213,11 +212,6 @@ def test_step_that_divides_the_time_but_for_rounding_is_not_cut_once_more(parts:
     for whole, count in ((0.35, 4), (0.301, 4), (0.3, 3)):
         found = _end(scene, [whole], 3, 0.1)
         np.testing.assert_array_equal(found, _end(scene, [whole], 3, whole / count))
-
-
-def test_torque_drives_the_axis_that_it_acts_on() -> None:
-    none = np.empty((4, 0))
-    assert _driven((np.array([0.0, 0.0, 3.0]), np.zeros(3), none, none), -2.0) == 6.0
 
 
 def test_waves_count_among_right_hand_sides_before_any_is_taken() -> None:

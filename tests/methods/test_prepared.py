@@ -26,7 +26,7 @@ import pyharness.methods.solve as solving
 import pyharness.methods.solver as solver_module
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.bench.growth import growth
-from pyharness.bench.savings import _saving
+from pyharness.bench.savings import measured_saving
 from pyharness.cli.main import main
 from pyharness.methods.plan import EITHER, Plan, plan
 from pyharness.methods.problem import closed_form
@@ -454,7 +454,7 @@ def test_examples_in_the_docstrings_run() -> None:
 
 
 def test_plan_savings_are_measured() -> None:
-    saving = _saving("part", "where", lambda: sum(range(20000)), lambda: None)
+    saving = measured_saving("part", "where", lambda: sum(range(20000)), lambda: None)
     assert saving.with_it > saving.without > 0.0
     assert saving.ratio == saving.with_it / saving.without
 

@@ -10,7 +10,7 @@ import pytest
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError
-from pyharness.scenes.rescaled import factor_near_one, scaled
+from pyharness.scenes.rescaled import factor_near_one, omega_by_torque, scaled
 
 _METHODS = ("auto", "taylor", "quick", "gauss-2", "gauss-8", "rk4", "improved-euler", "taylor-3")
 _LAW = TorqueLaw(
@@ -162,3 +162,36 @@ def test_torque_counts_by_what_it_gives_a_body() -> None:
     law = TorqueLaw((1e-50, 0.0, 0.0))
     scene = Scene("heavy", (0.0, 0.0, 0.0), moments=(1e50, 1e50, 1e50), torque=law)
     assert factor_near_one(scene, 1.0) > 2.0**300
+
+
+@pytest.mark.parametrize("time", [0.01, -1.3, 40.0])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_bound_of_what_torque_gives_holds_on_a_sphere(axis: int, time: float) -> None:
+    """Without gyroscopic torques omega is the integral of the torque over the moment."""
+    sphere = Scene("", (0.0, 0.0, 0.0), moments=(4.0, 4.0, 4.0))
+    for law in (
+        TorqueLaw((3.0, -2.0, 1.0)),
+        TorqueLaw(rate=(1.0, -2.0, 0.5)),
+        TorqueLaw(sines=(((2.0, 1.0, -3.0), 0.01),)),
+        TorqueLaw(sines=(((2.0, 1.0, -3.0), 7.0),)),
+        TorqueLaw(cosines=(((1.0, -3.0, 2.0), 5.0),)),
+    ):
+        # Of one axis alone: the bound is of the largest.
+        kept = np.eye(3)[axis]
+        part = replace(
+            law, constant=tuple(kept * law.constant), rate=tuple(kept * law.rate),
+            sines=tuple((tuple(kept * a), f) for a, f in law.sines),
+            cosines=tuple((tuple(kept * a), f) for a, f in law.cosines),
+        )  # fmt: skip
+        times = (time * np.linspace(0.0, 1.0, 400)[1:]).tolist()
+        reached = np.abs(solve(replace(sphere, torque=part), times).omega).max()
+        bound = omega_by_torque(replace(sphere, torque=part), time)
+        assert reached <= (1.0 + 1e-12) * bound <= 2.6 * reached
+
+
+def test_bound_of_what_torque_gives_is_of_the_smallest_moment_for_a_torque_in_space() -> None:
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=TorqueLaw((6.0, 0.0, 0.0)))
+    assert omega_by_torque(scene, -2.0) == 3.0
+    in_space = replace(scene, torque=replace(scene.torque, frame="space"))
+    assert omega_by_torque(in_space, -2.0) == 6.0
+    assert omega_by_torque(replace(scene, moments=(1e-300, 3.0, 2.0)), 1e10) == math.inf

@@ -60,6 +60,6 @@ def known_solution(
     if status != COMPLETE:
         return trajectory_of(times, rows, n_rows, status, len(times), 0, attitudes=attitudes)
     noise = torque_noise(scene, scene.omega, times[-1])
-    error, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, times[-1], noise)
+    error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     status = SENSITIVE if is_sensitive(growth, tolerance, noise) else COMPLETE
     return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth, attitudes)

@@ -93,7 +93,7 @@ class LastCall:
         scene = self.plan.scene
         if self.plan.closed_form and not steps:
             noise = torque_noise(scene, omega0, t_end)
-            error, growth = closed_form_estimate(scene.euler_coefficients, omega0, t_end, noise)
+            error, growth = closed_form_estimate(scene, omega0, t_end, noise)
         elif self.plan.method in GAUSS:
             growth = motion_growth(replace(scene, omega=omega0), t_end)
             noise = torque_noise(scene, omega0, t_end, abs(t_end) / scene.step_size)

@@ -7,6 +7,7 @@ import numpy as np
 
 from pyharness.methods.problem import closed_form, known, normalized
 from pyharness.model.extension import extension
+from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING
 from pyharness.scenes.rescaled import factor_near_one, scaled
@@ -53,20 +54,25 @@ def torque_noise(
 
 
 def closed_form_estimate(
-    coefficients: Triple, omega0: Triple, t_end: float, noise: float = 0.0
+    scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
     """Return error and growth of a closed form, started with omega0 (rad/s), at `t_end` (s).
 
-    Coefficients that are all zero are a sphere's, whose differences stay as they are. The error is
-    relative to the largest omega on the way; both are None where there is no closed form. `noise`
-    is that of the torque, in roundings of omega.
+    The error of omega is relative to the largest omega on the way; with an attitude that of the
+    angle (rad) is in it. Both are None where there is no closed form. `noise` is that of the
+    torque, in roundings of omega.
     """
     growth: float | None = 1.0
-    if any(coefficients):
-        growth = known(extension().torque_free_growth(coefficients, omega0, t_end))
+    # A sphere's perturbations stay as they are.
+    if any(scene.euler_coefficients):
+        growth = known(extension().torque_free_growth(scene.euler_coefficients, omega0, t_end))
     if growth is None:
         return None, None
-    return ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR, growth
+    error = ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR
+    if isinstance(scene, PrincipalScene) and scene.attitude is not None:
+        # Its start was rounded about principal axes, which the angle sees all the way.
+        error += ROUNDING * max(map(abs, omega0)) * abs(t_end)
+    return error, growth
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:
@@ -76,7 +82,7 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
     from a closed form where there is one, else from the Taylor series; None where neither tells.
     """
     if closed_form(scene):
-        _, growth = closed_form_estimate(scene.euler_coefficients, scene.omega, t_end)
+        _, growth = closed_form_estimate(scene, scene.omega, t_end)
         if growth is not None:
             return growth
     factor = factor_near_one(scene, t_end)

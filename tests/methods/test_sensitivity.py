@@ -61,7 +61,7 @@ def test_growth_has_no_unit(power: int) -> None:
 def test_growth_is_one_where_nothing_grows_and_unknown_where_no_method_tells() -> None:
     assert motion_growth(BESIDE, 0.0) == motion_growth(AT_REST, 5.0) == 1.0
     assert motion_growth(SPHERE, 1e6) == 1.0
-    assert closed_form_estimate((1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 0.5) == (None, None)
+    assert closed_form_estimate(RUNAWAY, (1.0, 1.0, 1.0), 0.5) == (None, None)
     # Without bound before the end.
     assert motion_growth(RUNAWAY, 2.0) is None
 

@@ -162,7 +162,7 @@ def test_page_and_records_after_the_stop_are_looked_at(
 def test_without_a_compiler_verify_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for room in ("verify.decks", "cli.verbs.verify"):
+    for room in ("checks.decks", "cli.verbs.verify"):
         monkeypatch.setattr(f"pyharness.{room}.compiler", lambda: None)
     assert list(decks(Selection(only=["decks"]))) == []
     assert main(["verify", "--only", "decks"]) == 2

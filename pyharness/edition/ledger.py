@@ -10,7 +10,7 @@ from pyharness.history.ablation import effects_of, entries
 from pyharness.history.apparatus_report import FIELDS, entry_report
 from pyharness.history.claims.evidence import evidence
 from pyharness.history.claims.evidence_report import evidence_report
-from pyharness.history.claims.ledger import Judgement, claims, judge
+from pyharness.history.claims.ledger import Judgement, claims, judgement
 from pyharness.history.claims.report import claims_report, explanation, kinds_table
 from pyharness.history.claims.sentences import Sentence, sentences
 from pyharness.model.facts import facts
@@ -32,7 +32,7 @@ class Told(NamedTuple):
 
 def judgements() -> list[Judgement]:
     """Judge every claim."""
-    return [judge(entry) for entry in claims()]
+    return [judgement(entry["id"]) for entry in claims()]
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:

@@ -99,10 +99,14 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     torque = np.array(scene.normalized_torque(0.0))
     state = np.array(scene.omega)
     rows = np.full((scene.steps, 3), np.nan)
+    length = matrix = None
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
             # Where the residual is weighted; the step is assembled at h all the same.
+            before = length
             length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
+            if before is None or length != before:
+                matrix = _matrix(weighting, length)
             c = np.zeros((TERMS, 3))
             for correction in (False, True):
                 base = np.zeros(3) if mistake == "base-left-out" and correction else state
@@ -110,7 +114,8 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
                 rates = _rates(estimate, coefficients)
                 if mistake != "torque-omitted":
                     rates[0] += torque
-                c = _solved(weighting, length, rates, mistake, correction)
+                right = np.array([_weighted(weighting, length, column) for column in rates.T])
+                c = _solved(matrix, right, mistake, correction)
                 if not all(map(is_finite, c.ravel().tolist())):
                     return rows
             state = state + np.array([h, h * h]) @ c
@@ -128,10 +133,14 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
     return np.column_stack([np.pad(each, (0, longest - len(each))) for each in columns])
 
 
-def _solved(weighting: str, length: float, rates: Array, mistake: str, second: bool) -> Array:
-    """Return c1, c2 of all components: the weighted residuals over (0, length) vanish."""
-    matrix = np.array([_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]).T
-    right = np.array([_weighted(weighting, length, column) for column in rates.T])
+def _matrix(weighting: str, length: float) -> Array:
+    """Return the weighted integrals of the derivatives of t and t**2 over (0, length)."""
+    columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
+    return np.array(columns).T
+
+
+def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
+    """Return c1, c2 of all components, with which the weighted residuals vanish."""
     if mistake == "transposed":
         matrix = matrix.T
     if mistake == "matrix-used-up" and second:

@@ -14,7 +14,14 @@ from pyharness import InputError
 from pyharness.cli.main import main
 from pyharness.history.claims import methods, theory, verdicts
 from pyharness.history.claims.laboratory import LITERALS, Assumptions, Laboratory, by_literals
-from pyharness.history.claims.ledger import Judgement, assignments, claim, claims, judge, outcome
+from pyharness.history.claims.ledger import (
+    Judgement,
+    assignments,
+    claim,
+    claims,
+    judgement,
+    outcome,
+)
 from pyharness.history.claims.report import KINDS, explanation, kinds_table
 from pyharness.history.claims.verdicts import (
     FALSE,
@@ -41,7 +48,7 @@ THESIS = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
 @pytest.fixture(scope="module")
 def judged() -> dict[str, Judgement]:
     """Every claim, judged once."""
-    return {each["id"]: judge(each) for each in claims()}
+    return {each["id"]: judgement(each["id"]) for each in claims()}
 
 
 def _verdict(identity: str, *fixed: str, is_original: bool = True) -> str:
@@ -378,7 +385,7 @@ def test_a_verdict_that_turns_on_either_side_does_not_survive(
         return SimpleNamespace(verdict=verdict)
 
     monkeypatch.setattr("pyharness.history.claims.ledger.outcome", other)
-    survivals = judge(claim("abstract-superior")).survivals
+    survivals = judgement("abstract-superior").survivals
     assert survivals
     assert not any(each.survives for each in survivals)
 

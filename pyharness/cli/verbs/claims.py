@@ -3,7 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.claims.ledger import assignments, claim, claims, judge
+from pyharness.history.claims.ledger import assignments, claim, claims, judgement
 from pyharness.history.claims.report import assignments_report, claims_report, explanation
 from pyharness.model.errors import InputError
 from pyharness.original.programs import BINARY64, WORD_NAMES
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     judgements = []
     for number, entry in enumerate(chosen, 1):
         shared.progress(f"{number} of {len(chosen)}: {entry['id']}")
-        judgements.append(judge(entry, options.word or BINARY64))
+        judgements.append(judgement(entry["id"], options.word or BINARY64))
     one = options.explain is not None
     shared.show(explanation(judgements[0]) if one else claims_report(judgements), options)
     return 0

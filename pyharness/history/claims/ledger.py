@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from pyharness.history.claims import methods, theory, verdicts
@@ -80,6 +81,12 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
     return Judgement(entry, programs, methods, tuple(survivals))
 
 
+@cache
+def judgement(identity: str, word: str = BINARY64) -> Judgement:
+    """Return what `judge` says of the entry of that name; it is computed once in a process."""
+    return judge(claim(identity), word)
+
+
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Run the test of a claim in one laboratory."""
     (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
@@ -104,6 +111,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
             yield name, Assumptions(readings=frozenset([name.removeprefix("reading ")]))
 
 
+@cache
 def assignments() -> list[Assignment]:
     """Return, for every case whose start is not given and every start, what holds.
 

@@ -59,7 +59,7 @@ def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
 
 @pytest.mark.parametrize("identity", JUDGED)
 def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
-    few = STARTS[:13] if identity.startswith("v3") else STARTS
+    few = STARTS[:10] if identity.startswith("v3") else STARTS[:18]
     solved = _solved(few, original("two-term"))
     found = getattr(over_starts, identity)(solved)
     assert found.dtype == np.int8

@@ -20,8 +20,8 @@ ROUNDING = 2.0**-53
 def test_no_bit_depends_on_other_bodies(method: str, level: int) -> None:
     settings = {"method": method, "tolerance": 10.0 ** -min(9, METHODS[method]), "effort": 1e-4}
     for by_moments in (True, False):
-        drawn = mixed(300, 5, by_moments)
-        assert differing(drawn, 1, alone=20, **settings) == {}
+        drawn = mixed(150, 5, by_moments)
+        assert differing(drawn, 1, alone=10, **settings) == {}
 
 
 @pytest.mark.parametrize("tolerance", [1e-14, 1e-6])

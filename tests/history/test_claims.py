@@ -19,6 +19,7 @@ from pyharness.history.claims.ledger import (
     assignments,
     claim,
     claims,
+    judge,
     judgement,
     outcome,
 )
@@ -385,7 +386,7 @@ def test_a_verdict_that_turns_on_either_side_does_not_survive(
         return SimpleNamespace(verdict=verdict)
 
     monkeypatch.setattr("pyharness.history.claims.ledger.outcome", other)
-    survivals = judgement("abstract-superior").survivals
+    survivals = judge(claim("abstract-superior")).survivals
     assert survivals
     assert not any(each.survives for each in survivals)
 

@@ -111,7 +111,6 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
             yield name, Assumptions(readings=frozenset([name.removeprefix("reading ")]))
 
 
-@cache
 def assignments() -> list[Assignment]:
     """Return, for every case whose start is not given and every start, what holds.
 

@@ -1,5 +1,5 @@
-# make compare [CASE=5] [ARGS="--listing corrected"], make test, make wheel, make edition [OUT=DIR]: all
-# set up what they need.
+# make compare [CASE=5] [ARGS="--listing corrected"], make test, make quick, make wheel,
+# make edition [OUT=DIR]: all set up what they need.
 # PYTHON= and FC= choose the interpreter and the Fortran compiler; INSTALL=no forbids apt, dnf, brew.
 
 PYTHON ?= python3
@@ -17,13 +17,16 @@ FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
 # What fypp wrote: the tools for Fortran do not read its input.
 WRITTEN := build/cp*/*_binary*.f90 build/cp*/words.f90
 
-.PHONY: compare test mutate cross-check wheel edition lint format clean FORCE
+.PHONY: compare test quick mutate cross-check wheel edition lint format clean FORCE
 
 compare: .venv/ready
 	@$(BIN)/python -m pyharness compare --case $(CASE) $(ARGS)
 
 test: .venv/ready-to-test
 	@$(BIN)/python -m pytest -q -n auto --dist worksteal $(ARGS)
+
+quick: .venv/ready-to-test
+	@$(BIN)/python -m tests.quick $(ARGS)
 
 mutate: .venv/ready-to-test
 	@$(BIN)/python -m tests.mutations $(ARGS)

@@ -284,14 +284,11 @@ def test_unknown_claim_names_the_nearest(capsys: Capture) -> None:
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_claims_in_every_form(
-    judged: dict[str, Judgement], capsys: Capture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_claims_in_every_form(capsys: Capture) -> None:
     def told(*options: str) -> str:
         assert main(["claims", *options]) == 0
         return capsys.readouterr().out
 
-    monkeypatch.setattr("pyharness.cli.verbs.claims.judge", lambda entry, word: judged[entry["id"]])
     for options in ([], ["--assignments"]):
         assert max(map(len, told(*options).splitlines())) <= 100
     record: dict[str, Any] = json.loads(told("--format", "json"), parse_constant=pytest.fail)

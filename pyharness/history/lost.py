@@ -99,14 +99,14 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     torque = np.array(scene.normalized_torque(0.0))
     state = np.array(scene.omega)
     rows = np.full((scene.steps, 3), np.nan)
-    length = matrix = None
+    weighted_over: float | None = None  # the length that the matrix is of
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
             # Where the residual is weighted; the step is assembled at h all the same.
-            before = length
             length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
-            if before is None or length != before:
+            if weighted_over is None or length != weighted_over:
                 matrix = _matrix(weighting, length)
+                weighted_over = length
             c = np.zeros((TERMS, 3))
             for correction in (False, True):
                 base = np.zeros(3) if mistake == "base-left-out" and correction else state

@@ -67,7 +67,7 @@ def test_no_page_has_an_error_or_is_wider_than_the_screen_whatever_the_font(
 ) -> None:
     """Each page is loaded once, as on a phone, and the screen then changes its width."""
     errors(browser)
-    found = {}
+    found: dict[str, Any] = {}
     for address in addresses(site):
         with screen(browser, WIDTHS[0]):
             browser.get(address)

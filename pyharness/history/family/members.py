@@ -181,12 +181,13 @@ def march(scene: Scene, members: Sequence[Member]) -> Array:
 def _stages(matrix: Array, rates: Array) -> Array:
     """Return `_sums` of a matrix whose last axis is that of the members, three times as fast."""
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
-    total = matrix[:, 0, None] * side_by_side[0]
+    total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)
     for j in range(1, matrix.shape[1]):
         np.multiply(matrix[:, j, None], side_by_side[j], out=product)
         total += product
-    return total.transpose(2, 0, 1)
+    found: Array = total.transpose(2, 0, 1)
+    return found
 
 
 def _sums(factors: Array, rates: Array) -> Array:

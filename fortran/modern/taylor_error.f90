@@ -14,7 +14,8 @@ module taylor_error
   real(dp), parameter :: LEAST = tiny(1.0_dp)
   real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! lane
   real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! growth
-  real(dp), parameter :: LARGEST = 1e100_dp ! beyond it no growth says more
+  ! Beyond it no growth says more; a square of a product of two is still a number.
+  real(dp), parameter :: LARGEST = 1e75_dp
   real(dp), parameter :: UNIT(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
 
@@ -159,7 +160,6 @@ contains
     logical, intent(in) :: with_row !! the step has a row of the output before the last
     real(dp), intent(inout) :: lanes(4, 3)
     type(blocks_t), intent(inout) :: blocks
-    real(dp) :: merged(3, 3)
     integer :: n
 
     blocks%steps = blocks%steps + 1
@@ -167,7 +167,7 @@ contains
     if (blocks%steps < blocks%steps_a_block) return
     blocks%steps = 0
     blocks%closed = blocks%closed + 1
-    blocks%derivatives(:, :, blocks%closed) = lanes(2:, :)
+    blocks%derivatives(:, :, blocks%closed) = bounded(lanes(2:, :))
     if (precise) then
       call turn_axes(blocks%derivatives(:, :, blocks%closed), lanes)
     else
@@ -178,9 +178,8 @@ contains
       return
     end if
     do n = 1, MOST_BLOCKS/2
-      merged = composed(blocks%derivatives(:, :, 2*n), blocks%derivatives(:, :, 2*n - 1))
-      where (.not. abs(merged) <= LARGEST) merged = LARGEST
-      blocks%derivatives(:, :, n) = merged
+      blocks%derivatives(:, :, n) = bounded(composed(blocks%derivatives(:, :, 2*n), &
+                                                     blocks%derivatives(:, :, 2*n - 1)))
       blocks%has_row(n) = blocks%has_row(2*n - 1) .or. blocks%has_row(2*n)
     end do
     blocks%closed = MOST_BLOCKS/2
@@ -214,9 +213,11 @@ contains
     real(dp), intent(in) :: lanes(4, 3)
     type(blocks_t), intent(in) :: blocks
     real(dp), intent(out) :: growth, largest
+    real(dp) :: open_block(3, 3)
     integer :: n
 
-    growth = growth_until(blocks%closed, lanes(2:, :), blocks)
+    open_block = bounded(lanes(2:, :))
+    growth = growth_until(blocks%closed, open_block, blocks)
     do n = 1, blocks%closed
       if (blocks%has_row(n)) growth = max(growth, growth_until(n, UNIT, blocks))
     end do
@@ -255,10 +256,16 @@ contains
         norm = norm + a(i, j)*a(i, j)
       end do
     end do
-    ! Of what is no number too, which a maximum would pass over.
-    if (.not. norm <= LARGEST*LARGEST) norm = LARGEST*LARGEST
-    norm = sqrt(max(1.0_dp, norm))
+    norm = min(LARGEST, sqrt(max(1.0_dp, norm)))
   end function norm
+
+  elemental real(dp) function bounded(x)
+    !! An entry of a derivative; what is no number is as large as any.
+    real(dp), intent(in) :: x
+
+    bounded = LARGEST
+    if (abs(x) <= LARGEST) bounded = x
+  end function bounded
 
   pure function composed(a, b)
     !! Of two derivatives, which are rows of where each axis leads: that of b's motion, then a's.

@@ -86,6 +86,17 @@ def test_march_made_again_knows_it_well() -> None:
     assert 0.8 < min(ratios) <= max(ratios) < 2.0
 
 
+@pytest.mark.parametrize("number", [2359, 2555, 3755])
+def test_growth_of_several_times_is_the_largest_of_any(number: int) -> None:
+    """Beside the middle axis: at the last time an earlier perturbation is smaller again."""
+    of = drawn("20263", number)
+    each = [solve(of.scene, [time], "taylor", of.tolerance).growth or 0.0 for time in of.times]
+    assert max(each) > 20.0 * each[-1]
+    together = solve(of.scene, of.times, "taylor", of.tolerance).growth or 0.0
+    # At the end of the block of steps that the time is in.
+    assert 0.8 * max(each) < together < 2.5 * max(each)
+
+
 def test_is_made_again_where_much_grows_and_hardly_else() -> None:
     calm = []
     for of, found in _draws():

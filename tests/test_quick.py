@@ -1,12 +1,13 @@
 """`make quick`: which tests it chooses, and that it ends in time."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests.quick import ROOT, nearest, sources
+from tests.quick import ROOT, main, nearest, sources
 
 TESTS = {
     "tests/methods/test_taylor.py": "from pyharness import solve",
@@ -34,19 +35,28 @@ def test_a_module_has_the_tests_that_import_it() -> None:
     assert nearest(["fortran/modern/taylor_march.f90"], sources())
 
 
-def test_no_test_begins_when_the_time_is_up(tmp_path: Path) -> None:
-    (tmp_path / "test_a.py").write_text("def test_a(): pass\n")
+@pytest.mark.parametrize(
+    ("seconds", "body", "code", "said"),
+    [
+        (60.0, "pass", 0, "2 tests passed, of 2"),
+        (60.0, "assert False", 1, "1 tests passed, of 2"),
+        (5.0, "time.sleep(90)", 0, "1 tests passed, of 2"),
+    ],
+)
+def test_it_ends_when_the_time_is_up(
+    tmp_path: Path, seconds: float, body: str, code: int, said: str
+) -> None:
     (tmp_path / "test_b.py").write_text("def test_b(): pass\n")
-    code = (
-        "import sys, time, pytest; sys.path.insert(0, sys.argv[1]);"
-        "from tests.quick import Deadline;"
-        "plugin = Deadline(['test_b.py', 'test_a.py'], time.monotonic() + float(sys.argv[2]));"
-        "code = pytest.main(['-q', '-p', 'no:cacheprovider'], plugins=[plugin]);"
-        "print(code, plugin.left)"
-    )
-    for seconds, left in ((60.0, 0), (-1.0, 2)):
-        done = subprocess.run(
-            [sys.executable, "-c", code, str(ROOT), str(seconds)], cwd=tmp_path,
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.stdout.splitlines()[-1].split()[-1] == str(left), done.stdout
+    (tmp_path / "test_a.py").write_text(f"import time\ndef test_a(): {body}\n")
+    command = f"import sys; from tests.quick import run; sys.exit(run(FILES, {seconds}))"
+    done = subprocess.run(
+        [sys.executable, "-c", command.replace("FILES", "['test_b.py', 'test_a.py']")],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, said in done.stdout) == (code, True), done.stdout + done.stderr
+
+
+def test_a_commit_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["no-such-commit"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

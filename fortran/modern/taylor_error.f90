@@ -1,7 +1,7 @@
 module taylor_error
   !! What the steps of a series leave out, and what the motion makes of it: the remainder of each
   !! step, blocks through the linearised motion, and with it the derivative of omega at the end by
-  !! omega on the way, whose largest norm is the growth of a small difference.
+  !! omega at earlier times, whose largest norm is the growth of a perturbation.
   use kinds, only: dp
   use taylor_series, only: series_t
   implicit none(type, external)
@@ -207,8 +207,8 @@ contains
   end subroutine turn_axes
 
   pure subroutine growths_of(precise, lanes, blocks, growth, largest)
-    !! Largest norms of derivatives by omega where a block began: of omega where there are rows, and
-    !! of omega anywhere on the way.
+    !! Largest norms of derivatives by omega where a block began: of omega at the times requested,
+    !! and of omega at the end of any block.
     logical, intent(in) :: precise
     real(dp), intent(in) :: lanes(4, 3)
     type(blocks_t), intent(in) :: blocks

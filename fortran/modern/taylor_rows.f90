@@ -34,8 +34,8 @@ module taylor_rows
     integer(int64) :: steps
     real(dp) :: error    ! largest of a row, relative, before it was taken off
     real(dp) :: least    ! what the error may be where it is estimated to be less, relative
-    real(dp) :: growth   ! of a small difference until any row
-    real(dp) :: largest  ! and until any time on the way
+    real(dp) :: growth   ! of a perturbation until any time requested
+    real(dp) :: largest  ! of a perturbation until any time
     real(dp) :: ahead    ! steps to the end, as far as known; where it gave up
     real(dp) :: precise_steps ! to the end, at the least, of a march that is precise
     logical :: finest    ! no step could err less

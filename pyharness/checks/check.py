@@ -121,7 +121,7 @@ class Sample(Check):
 
     entrance: str = ""  # how the scene was solved
     tolerance: float = math.nan  # the requested one
-    growth: float = math.nan  # largest factor by which a perturbation on the way reaches the end
+    growth: float = math.nan  # error amplification: by how much an earlier perturbation grows
 
 
 @dataclass(frozen=True, eq=False)

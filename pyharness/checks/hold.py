@@ -134,7 +134,7 @@ def _derived(truth: Truth, tried: Tried) -> float | None:
     """Return the limit that follows from what a method promises."""
     made = made_on_the_way(tried, truth)
     if truth.exact and tried.method in FORMS:
-        # It makes no errors on the way: beside its own there is the rounding of A, B and C.
+        # It has no steps to accumulate errors: beside its own there is the rounding of A, B and C.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
         # It claims no error in steps of this size, only that it conserves.

@@ -181,7 +181,7 @@ class Policy:
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
     """Return the error that a policy allows, with the rounding of the flow and of the truth.
 
-    `made` are the errors that a method makes on the way, `growth` the factor granted to them,
+    `made` are the errors that a method makes in its steps, `growth` the factor granted to them,
     `steps` after how many omega is rounded.
     """
     if truth.attitude is not None:

@@ -1,7 +1,8 @@
 """Methods in scenes drawn from a seed, by every entrance, against the second reference.
 
 A tolerance is on the error at the times requested, relative to the largest omega from 0 to the last
-of them, or on the angle. Where perturbations grow K times on the way, rounding alone makes 2e-15 K.
+of them, or on the angle. Where the motion amplifies perturbations K times, rounding alone makes
+2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping

@@ -249,9 +249,10 @@ class _Run:
                     "torques"
                 ) from None
 
-    def _driven(self) -> float:
-        driven = omega_by_torque(self.scene, self.end)
-        return driven if math.isfinite(driven) else 1.0
+    def _scale_by_torque(self) -> float:
+        """Return the largest omega that torque alone can give, 1 where that is no number."""
+        bound = omega_by_torque(self.scene, self.end)
+        return bound if math.isfinite(bound) else 1.0
 
     def _counted(self, time: float, omega: Sequence[float]) -> list[float]:
         self.evaluations += 1
@@ -276,7 +277,7 @@ class _Run:
         Where omega leaves every bound, what start or torque alone would give is the scale, and
         nothing is known of the rest.
         """
-        scale = max(map(abs, self.scene.omega)) or self._driven()
+        scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
             return _Ahead(0.0, 0.0, 1.0)
         for _ in range(_MOST_GUESSES):
@@ -288,7 +289,7 @@ class _Run:
             scale = largest
         if coarse.status != 0:
             # It leaves every bound, or loses its phase: no tolerance is met to the end.
-            return _Ahead(max(scale, self._driven()), 0.0, 1.0)
+            return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
         times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))

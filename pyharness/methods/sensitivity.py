@@ -58,9 +58,9 @@ def closed_form_estimate(
 ) -> tuple[float | None, float | None]:
     """Return error and growth of a closed form, started with omega0 (rad/s), at `t_end` (s).
 
-    The error of omega is relative to the largest omega on the way; with an attitude that of the
-    angle (rad) is in it. Both are None where there is no closed form. `noise` is that of the
-    torque, in roundings of omega.
+    The error of omega is relative to the largest omega until then; with an attitude the error
+    includes that of the angle (rad). Both are None where there is no closed form. `noise` is that
+    of the torque, in roundings of omega.
     """
     growth: float | None = 1.0
     # A sphere's perturbations stay as they are.
@@ -70,7 +70,7 @@ def closed_form_estimate(
         return None, None
     error = ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR
     if isinstance(scene, PrincipalScene) and scene.attitude is not None:
-        # Its start was rounded about principal axes, which the angle sees all the way.
+        # The start was rounded about principal axes: a wrong speed, and so a growing angle.
         error += ROUNDING * max(map(abs, omega0)) * abs(t_end)
     return error, growth
 

@@ -47,7 +47,7 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
 
     found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
     if law in ("constant torque", "ramp"):
-        # What it would add to the start, alone, by the end; on the way the mean of that counts.
+        # The torque alone would add `gain` times the start by the end; the turns follow its mean.
         gain = _log(source, 0.1, 30.0)
         constant = law == "constant torque"
         horizon /= 1.0 + gain / (2.0 if constant else 3.0)

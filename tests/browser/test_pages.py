@@ -1,6 +1,7 @@
 """Every page in a browser: no error, nothing wider than the screen, no barrier."""
 
 import json
+import re
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,20 +18,22 @@ def addresses(site: Path) -> list[str]:
     return [each.as_uri() for each in sorted(site.rglob("*.html"))]
 
 
-# Elements that have text, one for each path of tags, classes and other attributes that a style may
-# ask for: the same colours stand in every row of a table.
-_ONE_OF_EACH = """
-const said = ["class", "style", "hidden", "type", "data-theme", "aria-current", "aria-invalid"];
+STYLES = Path(__file__).parents[2] / "web" / "site"
+# Mark one element with text for each path of tags, classes and whatever else a style may select by:
+# the cells of a column have the same colours in every row.
+_MARK_ONE_OF_EACH = """
+const [attributes, ids] = arguments;
 const paths = new Map([[document.documentElement, ""]]);
 const seen = new Set();
 for (const each of document.querySelectorAll("body, body *")) {
-  const own = said.map((name) => each.getAttribute(name) ?? "").join("|");
+  const own = attributes.map((name) => each.getAttribute(name) ?? "").join("|")
+    + (ids.includes(each.id) ? each.id : "");
   const path = `${paths.get(each.parentElement) ?? ""}>${each.tagName}|${own}`;
   paths.set(each, path);
   const text = [...each.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
   if (text && !seen.has(path) && each.checkVisibility()) {
     seen.add(path);
-    each.dataset.looked = "";
+    each.dataset.sample = "";
   }
 }
 """
@@ -42,13 +45,21 @@ def barriers(browser: Chrome, *only: str) -> list[dict[str, Any]]:
     Contrast is measured of one element of each style: of thousands of cells it takes a minute.
     """
     browser.execute_script(files("axe_core_python").joinpath("axe.min.js").read_text())
-    browser.execute_script(_ONE_OF_EACH)
+    browser.execute_script(_MARK_ONE_OF_EACH, *selected_by())
     found = []
     contrast = "color-contrast"
     if contrast not in only:
         rules = {contrast: {"enabled": False}}
         found = _violations(browser, "document", {"rules": rules})
-    return found + _violations(browser, "{include: [['[data-looked]']]}", {"runOnly": [contrast]})
+    return found + _violations(browser, "{include: [['[data-sample]']]}", {"runOnly": [contrast]})
+
+
+def selected_by() -> tuple[list[str], list[str]]:
+    """Return the attributes and the ids by which the style sheets select elements."""
+    text = "".join(path.read_text() for path in STYLES.glob("*.css"))
+    selectors = re.sub(r"\{[^{}]*\}", "{}", text)
+    attributes = {"class", "style", *re.findall(r"\[([\w-]+)", selectors)} - {"href"}
+    return sorted(attributes), sorted({*re.findall(r"#([\w-]+)", selectors)})
 
 
 def _violations(browser: Chrome, context: str, options: dict[str, Any]) -> list[dict[str, Any]]:
@@ -102,17 +113,27 @@ def test_what_a_font_makes_too_wide_is_found(browser: Chrome, tmp_path: Path, bo
 
 
 def test_no_page_has_a_barrier(browser: Chrome, site: Path) -> None:
-    found = {}
+    errors(browser)
+    found: dict[str, list[Any]] = {}
     for scheme, only in (("light", ()), ("dark", ("color-contrast",))):
         with screen(browser, 1000, scheme):
             for address in addresses(site):
                 browser.get(address)
-                if there := barriers(browser, *only):
+                if there := barriers(browser, *only) or errors(browser):
                     found[f"{address} {scheme}"] = there
     assert found == {}, json.dumps(found, indent=1)
 
 
-def test_one_element_of_each_style_is_looked_at(browser: Chrome, tmp_path: Path) -> None:
+def test_styles_select_by_nothing_that_the_samples_leave_out() -> None:
+    """A position among others would give elements of one path different colours."""
+    attributes, ids = selected_by()
+    assert {"class", "data-theme", "aria-invalid"} <= set(attributes)
+    assert "theme" in ids
+    for path in STYLES.glob("*.css"):
+        assert not re.search("nth-|of-type", path.read_text())
+
+
+def test_contrast_is_measured_of_one_element_of_each_style(browser: Chrome, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     rows = "<tr><td>first<td class=pale>second</tr>" * 20
     page.write_text(
@@ -121,8 +142,8 @@ def test_one_element_of_each_style_is_looked_at(browser: Chrome, tmp_path: Path)
     )
     browser.get(page.as_uri())
     assert [each["rule"] for each in barriers(browser, "color-contrast")] == ["color-contrast"]
-    looked = browser.find_elements(By.CSS_SELECTOR, "[data-looked]")
-    assert [each.text for each in looked] == ["t", "first", "second"]
+    samples = browser.find_elements(By.CSS_SELECTOR, "[data-sample]")
+    assert [each.text for each in samples] == ["t", "first", "second"]
 
 
 def test_what_is_wrong_is_found(browser: Chrome, tmp_path: Path) -> None:

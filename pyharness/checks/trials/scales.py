@@ -83,7 +83,7 @@ def _attempts() -> Iterator[Attempt]:
         if method not in (*SCIPY_METHODS, "closed-form"):
             yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)
     law = TorqueLaw((1e10, 2e10, -1e10))
-    # Of a sphere, which no coupling makes turn ever faster on the way.
+    # A sphere, as no coupling of its axes makes it turn ever faster.
     scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
     for method in ALL:
         yield Attempt(named("scales", method, "beyond", scene=scene), _beyond)

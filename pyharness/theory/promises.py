@@ -1,6 +1,6 @@
-"""What each method promises before it is run: the errors that it makes on the way.
+"""What each method promises before it is run: the errors that its steps make.
 
-Nothing here is fitted. Of a method with a tolerance the errors made on the way add up to the
+Nothing here is fitted. Of a method with a tolerance the errors of its steps add up to the
 tolerance. Of a method with a fixed step they follow from the order: the k-th derivative of a
 solution of w' = a products is at most k! (a W)**k W, W the largest omega (the solution of
 y' = a y**2 has these derivatives, and larger ones than any other), and the method's own series

@@ -4,6 +4,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from multiprocessing import connection, resource_tracker
@@ -18,12 +19,25 @@ def deaf_children() -> Iterator[None]:
     """
     # What is blocked is so in children too. This process of Python's own would be started with the
     # first of them, and unblock it.
-    resource_tracker.ensure_running()
+    _start_tracker()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _start_tracker() -> None:
+    """Start the process that removes semaphores, without its warnings of what was left to it.
+
+    After a Ctrl-C it outlives this process, and would write them below the line that ends it.
+    """
+    warning = "ignore:resource_tracker"
+    sys.warnoptions.append(warning)
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove(warning)
 
 
 def end_with_parent() -> None:

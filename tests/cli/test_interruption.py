@@ -101,6 +101,24 @@ def test_interrupt_that_the_caller_ignores_stays_ignored() -> None:
     assert (found.stdout, found.stderr) == ("code 0\n", "")
 
 
+def test_what_is_left_to_the_resource_tracker_is_removed_without_a_word() -> None:
+    script = (
+        "import os\n"
+        "from multiprocessing import get_context, resource_tracker\n"
+        "from pyharness.ensembles.children import deaf_children\n"
+        "with deaf_children(): lock = get_context('spawn').Lock()\n"
+        "print(lock._semlock.name)\n"
+        "resource_tracker.register('/mp-none-of-this-name', 'semaphore')\n"
+        "os._exit(130)"
+    )
+    # The tracker holds the streams open, so its last word is heard.
+    found = subprocess.run(
+        [sys.executable, "-u", "-c", script], capture_output=True, text=True, check=False
+    )
+    assert (found.returncode, found.stderr) == (130, "")
+    assert not Path(f"/dev/shm/sem.{found.stdout.strip().removeprefix('/')}").exists()
+
+
 def test_commands_interrupted_at_random_moments_end_in_a_line() -> None:
     verbs = ["compare", "verify", "here", "processes", "dask"]
     for each in trials(10, 4.0, 2, signal.SIGINT, verbs):

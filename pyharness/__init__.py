@@ -50,7 +50,7 @@ __all__ = [
 ]
 
 # A name loads its room when it is first asked for: a program that needs one pays for one.
-_ROOMS = {
+_SUBMODULES = {
     "compare.comparison": ("Comparison", "compare_programs"),
     "model.errors": ("InputError", "NotBuiltError"),
     "model.impossible": ("ImpossibleBodyWarning",),
@@ -72,7 +72,7 @@ _ROOMS = {
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
-        for room, names in _ROOMS.items():
+        for room, names in _SUBMODULES.items():
             if name in names:
                 return getattr(import_module(f"pyharness.{room}"), name)
         if name == "__version__":

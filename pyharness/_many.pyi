@@ -11,7 +11,7 @@ class ManyStarts:
         cls,
         kernel: Callable[..., int],
         packed: Array,
-        brief: Array | None,
+        packed_with_gil: Array | None,
         slowly: Callable[..., tuple[Array, NDArray[np.int8]]],
     ) -> ManyStarts: ...
     def __call__(

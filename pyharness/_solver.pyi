@@ -11,7 +11,7 @@ class BoundKernel:
         kernel: Callable[..., tuple[Array, int, int, Array]],
         packed: Array,
         check: Callable[[object, object, object], tuple[Triple, float]],
-        brief: Array | None = None,
+        packed_with_gil: Array | None = None,
     ) -> Self: ...
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array: ...
     @property
@@ -23,7 +23,7 @@ class BoundAttitudeKernel:
         kernel: Callable[..., tuple[Array, int, int, Array]],
         packed: Array,
         check: Callable[[object, object, object], tuple[tuple[float, ...], float]],
-        brief: Array | None,
+        packed_with_gil: Array | None,
         attitude: Quaternion,
     ) -> Self: ...
     def __call__(

@@ -8,7 +8,7 @@ import numpy as np
 from pyharness import Scene, TorqueLaw
 from pyharness.model.scene import Triple, Wave
 from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import turned
+from pyharness.scenes.rotated import rotated
 
 Generator = np.random.Generator
 
@@ -115,7 +115,7 @@ def _other_units(generator: Generator) -> tuple[Scene, float]:
     scene, t_end = plain(generator)
     rate, mass = 10.0 ** generator.uniform(-30, 30), 10.0 ** generator.uniform(-20, 20)
     fast = scaled(scene, rate)
-    heavy = turned(fast, lambda each: triple(mass * np.array(each)), body=True)
+    heavy = rotated(fast, lambda each: triple(mass * np.array(each)), body=True)
     return replace(heavy, omega=fast.omega), t_end / rate
 
 

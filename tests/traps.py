@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.methods.plan import EITHER
+from pyharness.methods.plan import RK4_OR_TAYLOR
 from pyharness.methods.solver import CODES as _CODES
 from pyharness.model.codes import Places
 from pyharness.model.extension import GAVE_UP, OVERFLOW, SENSITIVE
@@ -28,7 +28,7 @@ INVALID = 1
 DIVIDE = 2 if _ON_ARM else 4
 TOO_LARGE = 4 if _ON_ARM else 8
 _TRAPPED = INVALID | DIVIDE | TOO_LARGE
-_TRIES_AGAIN = (_CODES[EITHER], _CODES["quick"])
+_TRIES_AGAIN = (_CODES[RK4_OR_TAYLOR], _CODES["quick"])
 _EXTREME = 1e60  # its fifth power overflows, and that of its inverse vanishes
 # Bodies side by side share the flags of a processor, so that no answer can tell of its own. They
 # have the bits of single runs, and those are guarded; or both sides of a choice are computed, where

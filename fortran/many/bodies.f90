@@ -9,7 +9,7 @@ module bodies
   integer, parameter, public :: i1 = c_int8_t
   integer, parameter, public :: LANES = 64   !! bodies side by side
   integer, parameter, public :: A_GROUP = 8  !! in the widest register: blocks are filled up to it
-  integer(i1), parameter, public :: LEFT = -1_i1 !! status: left to the single kernel
+  integer(i1), parameter, public :: NEEDS_FALLBACK = -1_i1 !! status: for the single kernel
   ! Status before the kernels of lanes: which of them solves the body. A body's own numbers alone
   ! decide it, so that no result depends on the other bodies of a call.
   integer(i1), parameter, public :: FREE = -2_i1    !! without torque: the closed form

@@ -60,7 +60,7 @@ contains
       call turn(b, 2, s%first, b%U, s%half, s%K(:, :, 2), s%second)               ! 800-880
       call turn(b, 2, s%second, b%U, b%DT, s%K(:, :, 3), s%third)                 ! 950-1060
     end if
-    if (e%listing%do_variable) call leave_out(s%K(:, :, 3), s%third)
+    if (e%listing%do_variable) call drop_third_stage(s%K(:, :, 3), s%third)
     call turn_last(b, s%third, s%K(:, :, 4))                                      ! 1120-1140
     if (e%scene%with_velocity) then
       ! along the angular velocities of the stages
@@ -73,7 +73,7 @@ contains
         call move(b, s%first, s%first_v, b%V, s%half, s%K_v(:, :, 2), s%second_v) ! 830-910
         call move(b, s%second, s%second_v, b%V, b%DT, s%K_v(:, :, 3), s%third_v)  ! 980-1090
       end if
-      if (e%listing%do_variable) call leave_out(s%K_v(:, :, 3), s%third_v)
+      if (e%listing%do_variable) call drop_third_stage(s%K_v(:, :, 3), s%third_v)
       call move(b, s%third, s%third_v, b%V, b%DT, s%K_v(:, :, 4), s%second_v)     ! 1150-1170
       call close_step(e, b%DT, s%K_v, s%first_v, s%third_v, b%V, s%V, s%change_u(:, 4:6), &
                       s%change_k(:, 4:6))                                         ! 1210-1230
@@ -82,13 +82,13 @@ contains
                     s%change_k(:, 1:3))                                           ! 1180-1200
   end subroutine step_runge_kutta
 
-  pure subroutine leave_out(K, third)
+  pure subroutine drop_third_stage(K, third)
     !! FORTRAN 77: this stage goes to the place of the fourth, and the third stays zero.
     real(dp), dimension(LANE_COUNT, 3), intent(out) :: K, third
 
     third = 0.0_dp
     K = 0.0_dp
-  end subroutine leave_out
+  end subroutine drop_third_stage
 
   pure subroutine turn(b, point, u, base, step, K, after)
     !! KF, KG, KH at u, and a step from the base.

@@ -2,7 +2,7 @@ module many_bodies
   !! Many bodies in one call: side by side where those kernels are accurate enough, the others one
   !! by one. Which kernel solves a body depends on that body alone.
   use, intrinsic :: iso_c_binding, only: c_loc
-  use bodies, only: bodies_t, FREE, i1, LEFT, RAMPED, STEPPED, WAVED
+  use bodies, only: bodies_t, FREE, i1, NEEDS_FALLBACK, RAMPED, STEPPED, WAVED
   use kinds, only: dp
   use levels, only: many_fixed, many_free, many_taylor
   use many_kinds, only: mark_bodies
@@ -70,7 +70,7 @@ contains
     if (bodies%n == 0) return
     n_waves = 0
     if (size(attitude0) > 0) then
-      status = LEFT
+      status = NEEDS_FALLBACK
     else
       call mark_bodies(bodies, code, status, n_waves)
     end if
@@ -78,7 +78,7 @@ contains
     if (raised == 0) call solve_marked(bodies, STEPPED, 0, code, omega, status, raised)
     if (raised == 0) call solve_marked(bodies, RAMPED, 0, code, omega, status, raised)
     if (raised == 0) call solve_marked(bodies, WAVED, n_waves, code, omega, status, raised)
-    if (raised /= 0 .or. .not. any(status == LEFT)) then
+    if (raised /= 0 .or. .not. any(status == NEEDS_FALLBACK)) then
       continue
     else if (size(attitude0) > 0) then
       call solve_left_with_attitude(bodies, code, effort_, attitude0, omega, attitude, status, &

@@ -5,7 +5,7 @@ module many_fixed
   !! left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
@@ -35,7 +35,8 @@ contains
 
   subroutine many_fixed_solve(bodies_at, method, n, omega, status, interrupted) &
     bind(c, name="solve_many_fixed_level")
-    !! Angular velocity at its time of each body that is marked; status is then COMPLETE or LEFT.
+    !! Angular velocity at its time of each body that is marked; status is then COMPLETE, or
+    !! NEEDS_FALLBACK for the single kernel.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     integer(c_int), intent(in), value :: method           !! IMPROVED_EULER, TAYLOR_3 or RK4
     integer(c_int), intent(in), value :: n                !! bodies
@@ -75,7 +76,7 @@ contains
       call scale_back(m, last, s, w)
       call put_back(block, w, omega)
       do i = 1, block%there
-        status(block%at(i)) = merge(int(COMPLETE, i1), LEFT, &
+        status(block%at(i)) = merge(int(COMPLETE, i1), NEEDS_FALLBACK, &
                                     abs(w(i, 1)) + abs(w(i, 2)) + abs(w(i, 3)) <= huge(h))
       end do
     end do

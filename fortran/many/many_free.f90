@@ -4,7 +4,7 @@ module many_free
   !! end of a range, are left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
   use many_columns, only: block_t, columns_of, equations_of, next_block, odd_axes, put_back, &
@@ -53,7 +53,8 @@ module many_free
 contains
 
   subroutine many_free_solve(bodies_at, n, omega, status) bind(c, name="solve_many_free_level")
-    !! Angular velocity at its time of each body that is marked; status is then COMPLETE or LEFT.
+    !! Angular velocity at its time of each body that is marked; status is then COMPLETE, or
+    !! NEEDS_FALLBACK for the single kernel.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     integer(c_int), intent(in), value :: n                !! bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
@@ -91,7 +92,8 @@ contains
       call turn_back(m, o%odd, w)
       call put_back(block, w, omega)
       do i = 1, block%there
-        status(block%at(i)) = merge(int(COMPLETE, i1), LEFT, o%error(i) <= bodies%tolerance &
+        status(block%at(i)) = merge(int(COMPLETE, i1), NEEDS_FALLBACK, &
+                                    o%error(i) <= bodies%tolerance &
                                     .and. .not. o%unsure(i) > 0.0_dp)
       end do
     end do

@@ -1,8 +1,8 @@
 module many_kinds
   !! What solves each of many bodies: its own numbers alone decide, so that no result depends on the
   !! other bodies of a call.
-  use bodies, only: acts, bodies_t, coefficients_of, FREE, has_torque, i1, LEFT, MOST_WAVES, &
-                    of_body, RAMPED, STEPPED, WAVED
+  use bodies, only: acts, bodies_t, coefficients_of, FREE, has_torque, i1, MOST_WAVES, &
+                    NEEDS_FALLBACK, of_body, RAMPED, STEPPED, WAVED
   use kinds, only: dp
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, IMPROVED_EULER, RK4, SPHERE, TAYLOR
   implicit none(type, external)
@@ -25,7 +25,7 @@ contains
       status = FREE
     else if (.not. (code == TAYLOR .or. code == CLOSED_FORM_OR_TAYLOR &
                     .or. (code >= IMPROVED_EULER .and. code <= RK4))) then
-      status = LEFT
+      status = NEEDS_FALLBACK
     else if (shares_torque(bodies) .and. code /= CLOSED_FORM_OR_TAYLOR) then
       status = mark_of(bodies, 1, code, n_waves)
     else if (shares_torque(bodies) .and. .not. feels_torque(bodies, 1)) then
@@ -80,16 +80,16 @@ contains
     if (code == CLOSED_FORM_OR_TAYLOR) then
       mark_of = FREE
       if (.not. feels_torque(bodies, i)) return
-      mark_of = LEFT
+      mark_of = NEEDS_FALLBACK
       if (is_sphere(coefficients_of(bodies, i))) return
     end if
     own_waves = waves_on(bodies, i)
     if (code >= IMPROVED_EULER .and. code <= RK4) then
       mark_of = STEPPED
-      if (has_torque(bodies%rate(:, of_body(size(bodies%rate, 2), i)))) mark_of = LEFT
-      if (own_waves > 0) mark_of = LEFT
+      if (has_torque(bodies%rate(:, of_body(size(bodies%rate, 2), i)))) mark_of = NEEDS_FALLBACK
+      if (own_waves > 0) mark_of = NEEDS_FALLBACK
     else if (own_waves > MOST_WAVES) then
-      mark_of = LEFT
+      mark_of = NEEDS_FALLBACK
     else if (own_waves > 0) then
       mark_of = WAVED
       n_waves = max(n_waves, own_waves)

@@ -1,7 +1,7 @@
 module many_left
   !! Bodies that no kernel of lanes solves: one after the other, by the single kernel.
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: acts, bodies_t, coefficients_of, i1, LEFT, of_body
+  use bodies, only: acts, bodies_t, coefficients_of, i1, NEEDS_FALLBACK, of_body
   use kinds, only: dp
   use many_kinds, only: is_sphere, single_code
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, SPHERE, TAYLOR
@@ -42,7 +42,7 @@ contains
 
     raised = 0
     do i = 1, bodies%n
-      if (status(i) /= LEFT) cycle
+      if (status(i) /= NEEDS_FALLBACK) cycle
       time = bodies%times(of_body(size(bodies%times), i))
       if (size(packed) > 0) then
         call solve_prepared(packed, size(packed), bodies%omega0(:, i), time, omega(:, i), ended, &

@@ -5,7 +5,7 @@ module many_slots
   use many_columns, only: block_t, columns_of, equations_of, next_block, times_of
   use problem, only: problem_t
   use series, only: MOST_ORDER
-  use taylor_plan, only: add_wave_rates, share_and_step, steady_rates
+  use taylor_plan, only: add_wave_rates, tolerance_and_step, steady_rates
   use torque_noise, only: torque_noise_of
   implicit none(type, external)
   private
@@ -37,7 +37,7 @@ module many_slots
     real(dp), dimension(SLOTS) :: t, rest     !! s
     real(dp), dimension(SLOTS) :: h           !! the step before, s
     real(dp), dimension(SLOTS) :: scale       !! largest omega so far, rad/s
-    real(dp), dimension(SLOTS) :: share       !! that the last terms may have of it
+    real(dp), dimension(SLOTS) :: local_tolerance !! largest last terms, relative to it
     real(dp), dimension(SLOTS) :: spin        !! of small differences, 1/s
     real(dp), dimension(SLOTS) :: going       !! above 0 where a body has a way to go
     real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! what waves add to the terms, rad/s
@@ -46,7 +46,7 @@ module many_slots
   type, public :: ready_t
     !! Bodies before their first step.
     real(dp), dimension(LANES, 3) :: w, a, constant, rate
-    real(dp), dimension(LANES) :: rest, h, scale, share, spin
+    real(dp), dimension(LANES) :: rest, h, scale, local_tolerance, spin
     real(dp), dimension(LANES) :: fits
     integer :: taken
     type(block_t) :: block
@@ -73,7 +73,7 @@ contains
     s%rest = 0.0_dp
     s%h = 1.0_dp
     s%scale = 1.0_dp
-    s%share = 1.0_dp
+    s%local_tolerance = 1.0_dp
     s%spin = 1.0_dp
     s%going = 0.0_dp
   end subroutine fill
@@ -156,9 +156,9 @@ contains
       end do
     end if
     do i = 1, LANES
-      call share_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
-                          r%rest(i), r%share(i), r%h(i))
-      r%share(i) = merge(MORE_WITH_WAVES, MORE, bodies%n_waves > 0)*r%share(i)
+      call tolerance_and_step(coupling(i), r%scale(i), gain(i), rate(i), turned(i), tolerance, &
+                              r%rest(i), r%local_tolerance(i), r%h(i))
+      r%local_tolerance(i) = merge(MORE_WITH_WAVES, MORE, bodies%n_waves > 0)*r%local_tolerance(i)
       push = sqrt(abs(r%a(i, 1)))
       ramp = sqrt(abs(r%a(i, 2)))
       rate(i) = sqrt(abs(r%a(i, 3)))
@@ -214,7 +214,7 @@ contains
     s%rest(i) = r%rest(j)
     s%h(i) = r%h(j)
     s%scale(i) = r%scale(j)
-    s%share(i) = r%share(j)
+    s%local_tolerance(i) = r%local_tolerance(j)
     s%spin(i) = r%spin(j)
     s%going(i) = 1.0_dp
   end subroutine put_in

@@ -19,7 +19,8 @@ typedef struct {
   PyObject *callable;    /* the kernel as Python has it: keeps its address */
   kernel *address;
   PyArrayObject *packed; /* read-only */
-  PyArrayObject *brief;  /* the same, or NULL: for what takes less time than others' getting a turn */
+  /* The same, or NULL: for calls shorter than releasing the GIL and waiting for it again. */
+  PyArrayObject *packed_with_gil;
   PyObject *slowly;      /* what takes any arguments */
 } many_starts;
 
@@ -73,8 +74,8 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
     const double *numbers = PyArray_DATA(start);
     double *found = PyArray_DATA((PyArrayObject *)omega);
     int8_t *ended = PyArray_DATA((PyArrayObject *)status);
-    if (!(self->brief != NULL && n <= FEW &&
-          enter(self, self->brief, n, numbers, n_times, times, found, ended))) {
+    if (!(self->packed_with_gil != NULL && n <= FEW &&
+          enter(self, self->packed_with_gil, n, numbers, n_times, times, found, ended))) {
       PyThreadState *thread = PyEval_SaveThread();
       enter(self, self->packed, n, numbers, n_times, times, found, ended);
       PyEval_RestoreThread(thread);
@@ -109,9 +110,9 @@ static PyArrayObject *own_packed(PyObject *packed)
 
 static PyObject *new_many(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-  static char *known[] = {"kernel", "packed", "brief", "slowly", NULL};
-  PyObject *callable, *packed, *brief, *slowly;
-  if (!PyArg_ParseTupleAndKeywords(args, names, "OOOO", known, &callable, &packed, &brief,
+  static char *known[] = {"kernel", "packed", "packed_with_gil", "slowly", NULL};
+  PyObject *callable, *packed, *packed_with_gil, *slowly;
+  if (!PyArg_ParseTupleAndKeywords(args, names, "OOOO", known, &callable, &packed, &packed_with_gil,
                                    &slowly)) {
     return NULL;
   }
@@ -122,7 +123,8 @@ static PyObject *new_many(PyTypeObject *type, PyObject *args, PyObject *names)
   self->slowly = Py_NewRef(slowly);
   self->address = (kernel *)address_of(callable);
   if (!PyErr_Occurred()) self->packed = own_packed(packed);
-  if (!PyErr_Occurred() && brief != Py_None) self->brief = own_packed(brief);
+  if (!PyErr_Occurred() && packed_with_gil != Py_None)
+    self->packed_with_gil = own_packed(packed_with_gil);
   if (PyErr_Occurred()) Py_CLEAR(self);
   return (PyObject *)self;
 }
@@ -147,7 +149,7 @@ static void dealloc(PyObject *object)
   PyObject_GC_UnTrack(object);
   Py_XDECREF(self->callable);
   Py_XDECREF(self->packed);
-  Py_XDECREF(self->brief);
+  Py_XDECREF(self->packed_with_gil);
   Py_XDECREF(self->slowly);
   Py_TYPE(object)->tp_free(object);
 }

@@ -5,7 +5,7 @@ module many_taylor
   !! to be sure of, the body is left to the single kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use bodies, only: A_GROUP, bodies_t, i1, LANES, LEFT, MOST_WAVES
+  use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, MOST_WAVES
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use many_circular, only: sine_cosine_lanes
@@ -38,7 +38,8 @@ contains
 
   subroutine many_taylor_solve(bodies_at, n, omega, status, interrupted) &
     bind(c, name="solve_many_taylor_level")
-    !! Angular velocity at its time of each body that is marked; status is then COMPLETE or LEFT.
+    !! Angular velocity at its time of each body that is marked; status is then COMPLETE, or
+    !! NEEDS_FALLBACK for the single kernel.
     type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
     integer(c_int), intent(in), value :: n                !! bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
@@ -81,7 +82,7 @@ contains
             end if
             j = ready%taken + 1
             ready%taken = j
-            status(ready%block%at(j)) = LEFT
+            status(ready%block%at(j)) = NEEDS_FALLBACK
             if (ready%fits(j) < 0.0_dp) cycle
             call put_in(ready, j, s, i)
             if (n_waves > 0) waves(:, :n_waves, i) = ready_waves(:, :n_waves, j)
@@ -139,7 +140,7 @@ contains
 
     omega = s%w(i, :) + (s%low(i, :) - s%error(i, :))
     scale = max(s%scale(i), abs(omega(1)), abs(omega(2)), abs(omega(3)))
-    status = LEFT
+    status = NEEDS_FALLBACK
     ! A sum, as a NaN may be lost in a maximum.
     if (.not. abs(s%rest(i)) > 0.0_dp .and. sum(abs(omega)) + s%scale(i) <= FAR &
         .and. s%worst(i)*(1.0_dp + s%growth(i)/DOUBTED) <= TRUSTED*tolerance*scale &
@@ -240,7 +241,7 @@ contains
       if (waves) terms(:, k) = terms(:, k) + s%torque(i, :, k)
     end do
     scale = max(s%scale(i), maxval(abs(terms(:, 0))))
-    allowed = s%share(i)*scale
+    allowed = s%local_tolerance(i)*scale
     r = ratio(order, allowed, sum(abs(terms(:, order))) + sum(abs(terms(:, order - 1))))
     next = h*r
     if (abs(next)*s%spin(i) > A_STEP) next = sign(A_STEP/s%spin(i), h)
@@ -261,7 +262,7 @@ contains
     part = total - terms(:, 0)
     s%low(i, :) = (terms(:, 0) - (total - part)) + (change - part)
     s%w(i, :) = total
-    ! As leave_out of taylor_error.f90.
+    ! As estimate_truncation of taylor_error.f90.
     last4 = terms(:, order - 3:order)/max(allowed, LEAST)
     uu = RIDGE*(sum(last4(:, 3)**2) + sum(last4(:, 2)**2))
     vv = RIDGE*(sum(last4(:, 2)**2) + sum(last4(:, 1)**2))
@@ -273,7 +274,7 @@ contains
     q = uv*p - uu*q
     determinant = max((determinant - r) + q, abs(r - q), abs(q), LEAST)
     left = allowed*(((r - q)/determinant)*last4(:, 4) - (q/determinant)*last4(:, 3))
-    ! As carry of taylor_series.f90.
+    ! As propagate_variations of taylor_series.f90.
     mean = terms(:, 0)
     moment = 0.0_dp
     do k = 1, MOMENTS

@@ -35,7 +35,8 @@ typedef struct {
   PyObject *callable;    /* the kernel as Python has it */
   kernel *address;       /* NULL where it is not f2py's: then it is called as Python would */
   PyArrayObject *packed; /* read-only */
-  PyArrayObject *brief;  /* the same, or NULL: for what takes less time than others' getting a turn */
+  /* The same, or NULL: for calls shorter than releasing the GIL and waiting for it again. */
+  PyArrayObject *packed_with_gil;
   PyObject *check;       /* (omega0, t_end, third) -> (a start's floats, float), or its InputError */
   int width;             /* numbers of a start: OMEGA, or MOST */
   double attitude[ATTITUDE]; /* at time 0, where a call gives none */
@@ -372,7 +373,7 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   if (self->address != NULL) {
     PyThreadState *thread = PyThreadState_Get();
     now.status = COMPLETE + 1;
-    if (self->brief != NULL) enter(self, self->brief, start, state, &now);
+    if (self->packed_with_gil != NULL) enter(self, self->packed_with_gil, start, state, &now);
     if (now.status != COMPLETE) {
       PyEval_SaveThread();
       enter(self, self->packed, start, state, &now);
@@ -418,11 +419,11 @@ static PyArrayObject *own_packed(PyObject *packed)
 
 static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-  static char *known[] = {"kernel", "packed", "check", "brief", "attitude", NULL};
-  PyObject *callable, *packed, *check, *brief = Py_None;
+  static char *known[] = {"kernel", "packed", "check", "packed_with_gil", "attitude", NULL};
+  PyObject *callable, *packed, *check, *packed_with_gil = Py_None;
   double q[ATTITUDE] = {0.0};
   if (!PyArg_ParseTupleAndKeywords(args, names, "OOO|O(dddd)", known, &callable, &packed, &check,
-                                   &brief, q, q + 1, q + 2, q + 3)) {
+                                   &packed_with_gil, q, q + 1, q + 2, q + 3)) {
     return NULL;
   }
   bound_kernel *self = (bound_kernel *)type->tp_alloc(type, 0);
@@ -444,9 +445,9 @@ static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
   }
   self->packed = own_packed(packed);
   if (self->packed == NULL) goto failed;
-  if (brief != Py_None) {
-    self->brief = own_packed(brief);
-    if (self->brief == NULL) goto failed;
+  if (packed_with_gil != Py_None) {
+    self->packed_with_gil = own_packed(packed_with_gil);
+    if (self->packed_with_gil == NULL) goto failed;
   }
   return (PyObject *)self;
 failed:
@@ -472,7 +473,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
   bound_kernel *self = (bound_kernel *)object;
   Py_VISIT(self->callable);
   Py_VISIT(self->packed);
-  Py_VISIT(self->brief);
+  Py_VISIT(self->packed_with_gil);
   Py_VISIT(self->check);
   return 0;
 }
@@ -483,7 +484,7 @@ static void dealloc(PyObject *object)
   PyObject_GC_UnTrack(object);
   Py_XDECREF(self->callable);
   Py_XDECREF(self->packed);
-  Py_XDECREF(self->brief);
+  Py_XDECREF(self->packed_with_gil);
   Py_XDECREF(self->check);
   PyMem_Free(self->endings);
   Py_TYPE(object)->tp_free(object);

@@ -8,8 +8,8 @@ module space_torque
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: problem_t
-  use space_torque_plan, only: LEAST_SHARE, order_for, plan
-  use space_torque_series, only: expand, fitting, inside, LONGER, series_t, torque_terms
+  use space_torque_plan, only: LEAST_LOCAL_TOLERANCE, order_for, plan
+  use space_torque_series, only: evaluate, expand, fitting, LONGER, series_t, torque_terms
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW, SENSITIVE
   use torque_noise, only: torque_noise_of, wave_rounding_of
   use two_words, only: two_sum
@@ -70,8 +70,8 @@ contains
     real(dp), intent(out) :: found(3)       !! error; growth, unknown; steps of all integrations
     real(dp), allocatable :: before(:, :), before_q(:, :)
     type(outcome_t) :: last, now ! the march before, and this one
-    real(dp) :: share         ! part of the scale that the last terms of this march may have
-    real(dp) :: share_before, next
+    real(dp) :: local_tolerance  ! of this integration: largest last terms, relative to the scale
+    real(dp) :: local_tolerance_before, next
     real(dp) :: h             ! first guess of a step, s
     real(dp) :: cost, most, spent
     real(dp) :: error
@@ -96,7 +96,7 @@ contains
     allocate (before(3, n_times), stat=failed)
     if (failed == 0) allocate (before_q(4, n_times), stat=failed)
     if (failed /= 0) return
-    call plan(problem, ratios, omega, tolerance, times(n_times), share, h)
+    call plan(problem, ratios, omega, tolerance, times(n_times), local_tolerance, h)
     cost = 1.0_dp + A_WAVE*real(problem%n_sines + problem%n_cosines, dp)
     most = effort*(MOST_STEPS/cost)
     spent = 0.0_dp
@@ -105,8 +105,8 @@ contains
     do
       is_perturbed = mod(count, 2) == 0
       ! Integrations with the same local tolerance differ by their order.
-      call march(problem, ratios, omega, is_perturbed, share, &
-                 order_for(share) + 2*mod(count, 2), h, most - spent, &
+      call march(problem, ratios, omega, is_perturbed, local_tolerance, &
+                 order_for(local_tolerance) + 2*mod(count, 2), h, most - spent, &
                  1 + int(BETWEEN_LOOKS/cost, int64), times, rows, attitudes, now)
       count = count + 1
       spent = spent + real(now%steps, dp)
@@ -119,15 +119,15 @@ contains
         end if
         if (error <= merge(1.0_dp, TRUSTED, count > 2)*tolerance &
             .and. last%status == now%status) exit
-        if (share_before <= LEAST_SHARE) exit
+        if (local_tolerance_before <= LEAST_LOCAL_TOLERANCE) exit
       end if
-      next = FINER*share
-      if (count > 1) next = min(next, SAFETY*share_before*(tolerance/error))
+      next = FINER*local_tolerance
+      if (count > 1) next = min(next, SAFETY*local_tolerance_before*(tolerance/error))
       last = now
       before(:, :) = rows
       before_q(:, :) = attitudes(:, 1:)
-      share_before = share
-      share = max(LEAST_SHARE, next)
+      local_tolerance_before = local_tolerance
+      local_tolerance = max(LEAST_LOCAL_TOLERANCE, next)
     end do
     if (is_perturbed .and. count > 1 .and. now%status /= GAVE_UP &
         .and. now%status /= INTERRUPTED) then
@@ -165,13 +165,13 @@ contains
     end if
   end subroutine space_torque_solve
 
-  subroutine march(problem, ratios, omega, is_perturbed, share, order, guess, most_steps, stride, &
-                   times, rows, attitudes, found)
+  subroutine march(problem, ratios, omega, is_perturbed, local_tolerance, order, guess, &
+                   most_steps, stride, times, rows, attitudes, found)
     !! Once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: ratios(3), omega(3)
     logical, intent(in) :: is_perturbed
-    real(dp), intent(in) :: share           !! part of the scale that the last terms may have
+    real(dp), intent(in) :: local_tolerance !! largest last terms, relative to the scale
     integer, intent(in) :: order
     real(dp), intent(in) :: guess           !! of the first step, s
     real(dp), intent(in) :: most_steps
@@ -208,7 +208,7 @@ contains
       call expand(problem, ratios, h, order, s)
       ! What a body at rest is about to reach.
       if (found%steps == 0) found%scale = maxval(abs(s%w(:, :4)))
-      factor = fitting(s, order, share, found%scale)
+      factor = fitting(s, order, local_tolerance, found%scale)
       if (.not. factor > 0.0_dp) then
         ! The terms are no numbers.
         tries = tries + 1
@@ -237,7 +237,7 @@ contains
       end do
       call add_rows(s, order, t, t_low, h, at_end, y_low, times, rows, attitudes, found)
       if (found%status /= COMPLETE) return
-      change = inside(s, order, 1.0_dp)
+      change = evaluate(s, order, 1.0_dp)
       found%steps = found%steps + 1
       if (is_perturbed) then
         k = 1 + int(mod(found%steps, 3_int64))
@@ -300,7 +300,7 @@ contains
     if (at_end) last = last - 1
     do n = found%n_rows + 1, last
       if (abs(times(n) - t) > abs(h)) return
-      change = y_low + inside(s, order, ((times(n) - t) - t_low)/h)
+      change = y_low + evaluate(s, order, ((times(n) - t) - t_low)/h)
       rows(:, n) = s%w(:, 0) + change(:3)
       if (.not. maxval(abs(rows(:, n))) <= huge(h)) then
         found%status = OVERFLOW

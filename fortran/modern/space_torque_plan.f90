@@ -7,19 +7,19 @@ module space_torque_plan
   private
 
   integer, parameter :: LEAST_ORDER = 8
-  real(dp), parameter, public :: LEAST_SHARE = 1e-18_dp ! below rounding
+  real(dp), parameter, public :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
 
   public :: order_for, plan
 
 contains
 
-  pure subroutine plan(problem, ratios, omega, tolerance, time, share, h)
+  pure subroutine plan(problem, ratios, omega, tolerance, time, local_tolerance, h)
     !! The first local tolerance, and a guess of the first step, from the rates of the problem.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: ratios(3), omega(3)
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: time    !! to go, s
-    real(dp), intent(out) :: share
+    real(dp), intent(out) :: local_tolerance
     real(dp), intent(out) :: h      !! s
     real(dp) :: coupling, scale, push, gain, fastest, way
     integer :: n
@@ -42,7 +42,8 @@ contains
     ! An error of omega turns the body all the way. With these weights the first march errs by less
     ! than the tolerance in all but a few of random scenes, by a hundredth in the median.
     way = coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain)
-    share = max(LEAST_SHARE, tolerance/(0.8_dp + 0.1_dp*way + way*(way/140.0_dp)))
+    local_tolerance = max(LEAST_LOCAL_TOLERANCE, &
+                          tolerance/(0.8_dp + 0.1_dp*way + way*(way/140.0_dp)))
   end subroutine plan
 
   pure subroutine add_wave(wave, time, push, gain, fastest)
@@ -59,11 +60,11 @@ contains
     fastest = max(fastest, abs(wave(4)))
   end subroutine add_wave
 
-  pure integer function order_for(share)
+  pure integer function order_for(local_tolerance)
     !! With the least work for the digits that are asked for (Jorba and Zou 2005).
-    real(dp), intent(in) :: share
+    real(dp), intent(in) :: local_tolerance
 
-    order_for = max(LEAST_ORDER, min(MOST_ORDER - 2, 1 + ceiling(-0.5_dp*log(share))))
+    order_for = max(LEAST_ORDER, min(MOST_ORDER - 2, 1 + ceiling(-0.5_dp*log(local_tolerance))))
   end function order_for
 
 end module space_torque_plan

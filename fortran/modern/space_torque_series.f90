@@ -18,7 +18,7 @@ module space_torque_series
     real(dp) :: turned(4, 0:MOST_ORDER) ! (0, torque) q, 1/s2
   end type series_t
 
-  public :: expand, fitting, inside, torque_terms
+  public :: evaluate, expand, fitting, torque_terms
 
 contains
 
@@ -118,11 +118,12 @@ contains
     total(4) = total(4) + (n(3)*q(1) + n(1)*q(3) - n(2)*q(2))
   end subroutine add_product
 
-  pure real(dp) function fitting(s, order, share, scale)
-    !! Factor on the step with which the last terms have their share; 0 where they are no numbers.
+  pure real(dp) function fitting(s, order, local_tolerance, scale)
+    !! Factor on the step with which the last terms are as large as allowed; 0 where they are no
+    !! numbers.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
-    real(dp), intent(in) :: share
+    real(dp), intent(in) :: local_tolerance
     real(dp), intent(in) :: scale   !! largest omega, rad/s
     real(dp) :: size
     integer :: k
@@ -134,11 +135,11 @@ contains
         fitting = 0.0_dp
         return
       end if
-      if (size > 0.0_dp) fitting = min(fitting, exp((log(share) - log(size))/k))
+      if (size > 0.0_dp) fitting = min(fitting, exp((log(local_tolerance) - log(size))/k))
     end do
   end function fitting
 
-  pure function inside(s, order, part) result(change)
+  pure function evaluate(s, order, part) result(change)
     !! Change of omega and q from the beginning of the step to a part of it.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
@@ -151,6 +152,6 @@ contains
       change(:3) = part*(change(:3) + s%w(:, k))
       change(4:) = part*(change(4:) + s%q(:, k))
     end do
-  end function inside
+  end function evaluate
 
 end module space_torque_series

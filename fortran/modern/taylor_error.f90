@@ -28,8 +28,8 @@ module taylor_error
     integer :: steps_a_block
   end type blocks_t
 
-  public :: begin, count_step, growths_of, leave_out, leave_out_from_rest, likely_remainder, &
-            rise, take_thirds
+  public :: begin, count_step, estimate_truncation, estimate_truncation_from_rest, growths_of, &
+            likely_remainder, rise, take_thirds
 
 contains
 
@@ -47,7 +47,7 @@ contains
     blocks%steps_a_block = merge(STEPS_IN_FINE_BLOCK, STEPS_IN_BLOCK, precise)
   end subroutine begin
 
-  pure subroutine leave_out(s, order, unit, left)
+  pure subroutine estimate_truncation(s, order, unit, left)
     !! Sum of the terms of omega that a step leaves out, as if one pair of poles made its last four:
     !! v(k + 1) = a v(k) - b v(k - 1), by least squares; the error has it from here on.
     type(series_t), intent(inout) :: s
@@ -80,9 +80,9 @@ contains
       s%lanes(i, 2) = s%lanes(i, 2) - FIRST(i)*left(2)
       s%lanes(i, 3) = s%lanes(i, 3) - FIRST(i)*left(3)
     end do
-  end subroutine leave_out
+  end subroutine estimate_truncation
 
-  pure subroutine leave_out_from_rest(s, order, unit, left)
+  pure subroutine estimate_truncation_from_rest(s, order, unit, left)
     !! The same where a body begins at rest.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
@@ -92,7 +92,7 @@ contains
     s%lanes(1, :) = s%lanes(1, :) + left(:3)
     call take_thirds(order, s%terms, unit, left)
     s%lanes(1, :) = s%lanes(1, :) - left(:3)
-  end subroutine leave_out_from_rest
+  end subroutine estimate_truncation_from_rest
 
   pure subroutine fit_poles(uu, vv, uv, ux, vx, a, b)
     !! The pair of poles of v(k + 1) = a v(k) - b v(k - 1), for the sum of all terms beyond x, the

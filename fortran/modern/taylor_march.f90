@@ -5,15 +5,15 @@ module taylor_march
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: problem_t
-  use series, only: LEAST_SHARE, SLACK
+  use series, only: LEAST_LOCAL_TOLERANCE, SLACK
   use statuses, only: COMPLETE, GAVE_UP, INTERRUPTED, OVERFLOW
   use taylor_attitude, only: attitude_t, begin_attitude, expand_both, turn_error, turn_on
-  use taylor_error, only: begin, blocks_t, count_step, growths_of, leave_out, &
-                          leave_out_from_rest, likely_remainder
+  use taylor_error, only: begin, blocks_t, count_step, estimate_truncation, &
+                          estimate_truncation_from_rest, growths_of, likely_remainder
   use taylor_plan, only: plan
   use taylor_rows, only: add_last_row, add_rows, outcome_t, state_t
-  use taylor_series, only: carry, carry_precisely, expand, fitting, following, rescale, series_t, &
-                           size_of
+  use taylor_series, only: expand, fitting, predict_step, propagate_precisely, &
+                           propagate_variations, rescale, series_t, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t
   use two_words, only: two_sum
   implicit none(type, external)
@@ -51,7 +51,7 @@ contains
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
     real(dp), intent(in) :: asked                       !! tolerance of this march
     real(dp), intent(in) :: tolerance                   !! of the error at `times`, relative
-    logical, intent(in) :: precise                      !! carry differences as exactly as can be
+    logical, intent(in) :: precise                      !! propagate variations as exactly as can be
     real(dp), intent(in) :: most_steps
     integer(int64), intent(in) :: stride                !! steps between looks at the user
     integer, intent(in) :: n_times
@@ -71,7 +71,7 @@ contains
     real(dp) :: h             ! step, s
     real(dp) :: rest          ! time to go, s
     real(dp) :: next          ! the step after this one, s
-    real(dp) :: share         ! part of the scale that the last terms may have
+    real(dp) :: local_tolerance  ! part of the scale that the last terms may have
     real(dp) :: allowed       ! the same in rad/s
     real(dp) :: last          ! size of the last two terms, rad/s
     real(dp) :: longest       ! turn of a wave
@@ -101,13 +101,13 @@ contains
     end if
     now = state_t([omega, 0.0_dp], 0.0_dp, 0.0_dp, 0.0_dp, &
                   max(abs(omega(1)), abs(omega(2)), abs(omega(3))), 0.0_dp, 0.0_dp, 0)
-    call plan(problem, now%scale, asked, rest, with_attitude, order, share, h)
-    found%finest = share <= LEAST_SHARE
+    call plan(problem, now%scale, asked, rest, with_attitude, order, local_tolerance, h)
+    found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
     part = 65536/order
     coupling = coupling_of(problem%coefficients)
     farthest = merge(A_PRECISE_STEP, A_STEP, precise)
-    lasting = steps_by_turns(share)
-    if (size(waves) > 0) longest = longest_turn(order, share)
+    lasting = steps_by_turns(local_tolerance)
+    if (size(waves) > 0) longest = longest_turn(order, local_tolerance)
     s%torque = 0.0_dp
     coefficients = [problem%coefficients, 0.0_dp]
     constant = [problem%constant, 0.0_dp]
@@ -124,7 +124,7 @@ contains
       now%scale = max(now%scale, abs(now%w(1)), abs(now%w(2)), abs(now%w(3)))
       call shorten_to(farthest, coupling*now%scale, h)
       call fit_to_end(h, rest, at_end)
-      allowed = share*now%scale
+      allowed = local_tolerance*now%scale
       ! Four at once: what was stored one by one could not be loaded together without a wait.
       do i = 1, 4
         s%terms(i, 0) = now%w(i)
@@ -143,16 +143,16 @@ contains
         call expand(order, s)
       end if
       if (found%steps == 0) then
-        call following(h, s, order, part, allowed, decay, next)
+        call predict_step(h, s, order, part, allowed, decay, next)
         ! What a body at rest is about to reach.
         now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
-        allowed = share*now%scale
+        allowed = local_tolerance*now%scale
         if (with_attitude) s%weight = now%scale
       end if
       last = size_of(s, order)
       ! From rest a torque that grows with time makes every third term only.
       if (found%steps == 0) last = last + size_of(s, order - 2)
-      call following(h, s, order, part, allowed, decay, next)
+      call predict_step(h, s, order, part, allowed, decay, next)
       if ((.not. last <= SLACK*allowed) .or. (found%steps == 0 .and. tries == 0)) then
         ! The first step is a guess, and a later one may be too long: the terms need only a factor.
         tries = tries + 1
@@ -181,14 +181,15 @@ contains
       end if
       error = s%lanes(1, :)
       if (precise) then
-        call carry_precisely(s)
+        call propagate_precisely(s)
       else
-        call carry(s)
+        call propagate_variations(s)
       end if
-      call leave_out(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+      call estimate_truncation(s, order, 1.0_dp/max(allowed, tiny(h)), left)
       if (found%steps < FEW_STEPS) then
         from_rest = found%steps == 0 .and. .not. maxval(abs(omega)) > 0.0_dp
-        if (from_rest) call leave_out_from_rest(s, order, 1.0_dp/max(allowed, tiny(h)), left)
+        if (from_rest) &
+          call estimate_truncation_from_rest(s, order, 1.0_dp/max(allowed, tiny(h)), left)
         found%least = max(found%least, likely_remainder(order, s%terms)/max(now%scale, tiny(h)))
       end if
       if (with_attitude) then

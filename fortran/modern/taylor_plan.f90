@@ -1,20 +1,20 @@
 module taylor_plan
-  !! What a Taylor series is begun with: the order from the digits that are asked for, the share of
-  !! the error that a step may have, the first step from the rates of the problem.
+  !! The order of a Taylor series, from the tolerance; its local tolerance, the largest error of a
+  !! step relative to the scale; and its first step, from the rates of the problem.
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: problem_t
-  use series, only: LEAST_ORDER, LEAST_SHARE, MOST_ORDER
+  use series, only: LEAST_LOCAL_TOLERANCE, LEAST_ORDER, MOST_ORDER
   implicit none(type, external)
   private
 
   real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
 
-  public :: add_wave_rates, plan, share_and_step, steady_rates
+  public :: add_wave_rates, plan, tolerance_and_step, steady_rates
 
 contains
 
-  pure subroutine plan(problem, scale, tolerance, time, with_attitude, order, share, h)
+  pure subroutine plan(problem, scale, tolerance, time, with_attitude, order, local_tolerance, h)
     !! Order from the tolerance, the first step from the rates of the problem.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
@@ -22,7 +22,7 @@ contains
     real(dp), intent(in) :: time            !! to go, s
     logical, intent(in) :: with_attitude    !! which turns though omega may not
     integer, intent(out) :: order
-    real(dp), intent(out) :: share          !! part of the scale that the last terms may have
+    real(dp), intent(out) :: local_tolerance !! part of the scale that the last terms may have
     real(dp), intent(out) :: h              !! s
     real(dp) :: coupling
     real(dp) :: push                        ! largest torque over moment, 1/s2
@@ -45,12 +45,13 @@ contains
       call add_wave_rates(problem%cosines(:, n), .false., coupling, time, gain, rate, turned)
     end do
     if (with_attitude) then
-      call share_and_step(max(coupling, 1.0_dp), scale, gain, rate, turned, tolerance, time, &
-                          share, h)
+      call tolerance_and_step(max(coupling, 1.0_dp), scale, gain, rate, turned, tolerance, time, &
+                              local_tolerance, h)
     else
-      call share_and_step(coupling, scale, gain, rate, turned, tolerance, time, share, h)
+      call tolerance_and_step(coupling, scale, gain, rate, turned, tolerance, time, &
+                              local_tolerance, h)
     end if
-    order = order_for(share)
+    order = order_for(local_tolerance)
   end subroutine plan
 
   elemental subroutine steady_rates(coupling, scale, push, ramp, time, gain, rate)
@@ -71,21 +72,21 @@ contains
     end if
   end subroutine steady_rates
 
-  elemental subroutine share_and_step(coupling, scale, gain, rate, turned, tolerance, time, &
-                                      share, h)
+  elemental subroutine tolerance_and_step(coupling, scale, gain, rate, turned, tolerance, time, &
+                                          local_tolerance, h)
     !! An error turns into one of phase and grows with it, and the phase of all later ones with
     !! that; the weights are from random scenes. Waves ask for more steps, which may all err alike.
     real(dp), intent(in) :: coupling, scale, gain, rate, turned, tolerance, time
-    real(dp), intent(out) :: share          !! part of the scale that the last terms may have
+    real(dp), intent(out) :: local_tolerance !! part of the scale that the last terms may have
     real(dp), intent(out) :: h              !! the first step, s
     real(dp) :: way                         ! about the body's, rad
 
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
     way = coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain)
-    share = tolerance/(8.0_dp + way + way*(way/14.0_dp) + ALIKE*turned)
-    share = max(share, LEAST_SHARE)
-  end subroutine share_and_step
+    local_tolerance = tolerance/(8.0_dp + way + way*(way/14.0_dp) + ALIKE*turned)
+    local_tolerance = max(local_tolerance, LEAST_LOCAL_TOLERANCE)
+  end subroutine tolerance_and_step
 
   pure subroutine add_wave_rates(wave, is_sine, coupling, time, gain, rate, turned)
     !! What a wave of torque adds to the speed that may be gained, and to the rate of change.
@@ -108,12 +109,12 @@ contains
     end if
   end subroutine add_wave_rates
 
-  pure integer function order_for(share)
+  pure integer function order_for(local_tolerance)
     !! Even order with the least work, a line through measured ones.
-    real(dp), intent(in) :: share
+    real(dp), intent(in) :: local_tolerance
     integer(int64) :: bits  ! of accuracy
 
-    bits = 1023 - ishft(transfer(share, bits), -52)
+    bits = 1023 - ishft(transfer(local_tolerance, bits), -52)
     order_for = max(LEAST_ORDER, min(MOST_ORDER, 8 + 2*int((16*bits + 100)/100)))
   end function order_for
 

@@ -7,7 +7,7 @@ module taylor_rows
   use statuses, only: INTERRUPTED, OVERFLOW
   use taylor_attitude, only: add_attitude_row, attitude_t
   use taylor_error, only: rise
-  use taylor_series, only: inside, series_t
+  use taylor_series, only: evaluate, series_t
   implicit none(type, external)
   private
 
@@ -81,7 +81,7 @@ contains
       if (abs(times(found%n_rows + 1) - now%t) > abs(h)) exit
       part = ((times(found%n_rows + 1) - now%t) - now%t_low)/h
       to_go = 1.0_dp - part
-      change = inside(order, s%terms, part)
+      change = evaluate(order, s%terms, part)
       call add_row(now%w(:3), now%w_low(:3) + change(:3), &
                    (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
                    + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
@@ -91,7 +91,7 @@ contains
         return
       end if
       if (n_attitudes > 0) then
-        call add_attitude_row(attitude%q_low + inside(order, s%turns, part), order, part, &
+        call add_attitude_row(attitude%q_low + evaluate(order, s%turns, part), order, part, &
                               min(LINEAR, tolerance), attitude, &
                               attitudes(:, found%n_rows + 1))
       end if

@@ -35,7 +35,8 @@ module taylor_series
   real(dp), parameter :: MOMENTS(MOST_MOMENTS) = &
                          [(real(k_, dp)/real(2*(k_ + 1)*(k_ + 2), dp), k_=1, MOST_MOMENTS)]
 
-  public :: carry, carry_precisely, expand, fitting, following, inside, rescale, size_of
+  public :: evaluate, expand, fitting, predict_step, propagate_precisely, propagate_variations, &
+            rescale, size_of
 
 contains
 
@@ -59,7 +60,7 @@ contains
   end subroutine expand
   ! end unroll
 
-  pure subroutine carry(s)
+  pure subroutine propagate_variations(s)
     !! Small differences over a step, by Magnus's series to fourth order: the exponential of the
     !! mean of the Jacobian, less its commutator with the first moment about the middle.
     type(series_t), intent(inout) :: s
@@ -100,10 +101,10 @@ contains
         call multiply(o, s%lanes)
       end do
     end if
-  end subroutine carry
+  end subroutine propagate_variations
 
-  ! unroll: carry_precisely
-  pure subroutine carry_precisely(s)
+  ! unroll: propagate_precisely
+  pure subroutine propagate_precisely(s)
     !! The same to higher order: by the linear part of the recurrence of the terms.
     type(series_t), intent(inout) :: s
     real(dp) :: d(4, 3, 0:ORDER_PRECISE)
@@ -129,7 +130,7 @@ contains
     do k = 1, ORDER_PRECISE
       s%lanes = s%lanes + d(:, :, k)
     end do
-  end subroutine carry_precisely
+  end subroutine propagate_precisely
   ! end unroll
 
   ! unroll: multiply
@@ -151,7 +152,7 @@ contains
   end subroutine multiply
   ! end unroll
 
-  pure subroutine following(h, s, order, part, allowed, decay, next)
+  pure subroutine predict_step(h, s, order, part, allowed, decay, next)
     !! The step with which the order would just do, from the terms before the last two and the
     !! decay seen in the step before, so that the processor need not wait for the last terms.
     !! The bits of a positive number, read as an integer, are its logarithm: 6 % suffice here.
@@ -170,7 +171,7 @@ contains
     change = max(-ishft(2_int64, 52), min(ishft(2_int64, 52), shifta(change, 16)*part))
     next = transfer(transfer(h, change) + change, h)
     decay = transfer(size_of(s, order), before) - before
-  end subroutine following
+  end subroutine predict_step
 
   pure real(dp) function size_of(s, k)
     !! Size of the terms k - 1 and k, rad/s.
@@ -234,7 +235,7 @@ contains
     end do
   end subroutine rescale_terms
 
-  pure function inside(order, terms, part) result(change)
+  pure function evaluate(order, terms, part) result(change)
     !! Change of omega, or of an attitude, at a part of the step.
     integer, intent(in) :: order
     real(dp), intent(in) :: terms(4, 0:order)
@@ -246,6 +247,6 @@ contains
     do k = order, 1, -1
       change = (change + terms(:, k))*part
     end do
-  end function inside
+  end function evaluate
 
 end module taylor_series

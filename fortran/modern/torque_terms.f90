@@ -22,7 +22,7 @@ module torque_terms
                                                   0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                   0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [4, 4])
   real(dp), parameter :: SMALL_TURN = 1e-8_dp ! rad; its square no longer counts
-  real(dp), parameter :: PHASE = 0.01_dp      ! of the share that a turn may err
+  real(dp), parameter :: PHASE = 0.01_dp      ! of the error that a step may make in an angle
 
   ! A column of `wave_t` is what a step needs of a wave, side by side.
   type, public :: wave_t
@@ -64,21 +64,21 @@ contains
     end do
   end subroutine waves_of
 
-  pure real(dp) function longest_turn(order, share)
+  pure real(dp) function longest_turn(order, local_tolerance)
     !! Turn of a wave up to which its weights give its sine and cosine, rad.
     integer, intent(in) :: order    !! of the series
-    real(dp), intent(in) :: share   !! that a step may err
+    real(dp), intent(in) :: local_tolerance !! largest relative error of a step
     integer :: n
 
     n = 4*fours_of(order)
-    longest_turn = (PHASE*share*FACTORIALS(n + 1))**(1.0_dp/real(n, dp))
+    longest_turn = (PHASE*local_tolerance*FACTORIALS(n + 1))**(1.0_dp/real(n, dp))
   end function longest_turn
 
-  pure integer function steps_by_turns(share)
+  pure integer function steps_by_turns(local_tolerance)
     !! Steps after which the sines and cosines of waves are made anew.
-    real(dp), intent(in) :: share   !! that a step may err
+    real(dp), intent(in) :: local_tolerance !! largest relative error of a step
 
-    steps_by_turns = merge(1, AFRESH, share < FINE)
+    steps_by_turns = merge(1, AFRESH, local_tolerance < FINE)
   end function steps_by_turns
 
   pure integer function fours_of(order)

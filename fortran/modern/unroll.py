@@ -118,7 +118,7 @@ def fortran_source(text: str, level: str, file: str) -> str:
         "expand": fortran_door("expand", "taylor_terms", level),
         "expand_both": fortran_door("expand_both", "attitude_terms", level),
         "multiply": fortran_multiply(),
-        "carry_precisely": fortran_precise(),
+        "propagate_precisely": fortran_precise(),
         "many_step": many_steps(),
     }
     if level == "plain":
@@ -269,7 +269,7 @@ def fortran_multiply() -> Iterator[str]:
 def fortran_precise() -> Iterator[str]:
     """Yield the linear part of the recurrence, for vectors side by side."""
     names = [f"{name}{k}" for k in range(ORDER_PRECISE + 1) for name in "xyz"]
-    yield "pure subroutine carry_precisely(s)"
+    yield "pure subroutine propagate_precisely(s)"
     yield "  type(series_t), intent(inout) :: s"
     yield from (f"  real(dp) :: {name}" for name in names)
     yield "  integer :: i"
@@ -289,7 +289,7 @@ def fortran_precise() -> Iterator[str]:
         for k in range(1, ORDER_PRECISE + 1):
             yield f"    s%lanes(i, {axis}) = s%lanes(i, {axis}) + {name}{k}"
     yield "  end do"
-    yield "end subroutine carry_precisely"
+    yield "end subroutine propagate_precisely"
 
 
 # ---- C ------------------------------------------------------------------------------------------

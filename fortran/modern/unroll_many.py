@@ -16,7 +16,7 @@ x0 = s%w(i, 1)
 y0 = s%w(i, 2)
 z0 = s%w(i, 3)"""
 LENGTH = """scale = max(s%scale(i), abs(x0), abs(y0), abs(z0))
-allowed = s%share(i)*scale
+allowed = s%local_tolerance(i)*scale
 r = ratio({order}, allowed, last)
 rest = s%rest(i)
 next = h*r
@@ -26,7 +26,7 @@ if (abs(rest) < 2.0_dp*abs(next)) r = 0.5_dp*rest
 if (abs(rest) <= abs(next)) r = rest
 next = r
 r = next/h"""
-# Of the terms left out, as leave_out of taylor_error.f90 has them.
+# Of the terms left out, as estimate_truncation of taylor_error.f90 has them.
 POLES = """uu = RIDGE*((ux*ux + uy*uy + uz*uz) + (vx*vx + vy*vy + vz*vz))
 vv = RIDGE*((vx*vx + vy*vy + vz*vz) + (wx*wx + wy*wy + wz*wz))
 uv = (ux*vx + uy*vy + uz*vz) + (vx*wx + vy*wy + vz*wz)

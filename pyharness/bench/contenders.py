@@ -5,7 +5,13 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
 
-from pyharness.compare.candidates import Candidate, Ready, called, listed, turning
+from pyharness.compare.candidates import (
+    Candidate,
+    Ready,
+    attitude_candidate,
+    prepared_candidate,
+    program_candidate,
+)
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import corrected, original
@@ -52,10 +58,12 @@ def own() -> list[SceneContender]:
         both("taylor", "tolerance", partial(_prepared, "taylor"), TOLERANCES),
         both("closed-form", "none", partial(_prepared, "closed-form"), (0.0,)),
     ]
-    in_steps = {name: (called(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)}
+    in_steps = {
+        name: (prepared_candidate(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)
+    }
     for name, program in PROGRAM_REGISTRY.items():
         for listing in (original(name), corrected(name)):
-            candidate = listed(listing, velocity=False)
+            candidate = program_candidate(listing, velocity=False)
             in_steps[candidate.name] = candidate, program.order
     return found + [
         SceneContender(name, "steps", partial(_in_steps, candidate), order=order)
@@ -71,7 +79,7 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def _prepared(name: str, scene: Scene) -> Maker:
-    candidate = called if scene.attitude is None else turning
+    candidate = prepared_candidate if scene.attitude is None else attitude_candidate
     # A closed form has no setting.
     return lambda horizon, setting: candidate(name, setting or None).ready(scene, horizon)
 

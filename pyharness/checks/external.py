@@ -16,7 +16,7 @@ import numpy as np
 
 from pyharness.checks.check import REFUSED, Check, Name, may_hold, selected
 from pyharness.checks.external_file import UNITS, Problem, Value, problems
-from pyharness.compare.candidates import called, listed, solved
+from pyharness.compare.candidates import method_candidate, prepared_candidate, program_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY
 from pyharness.methods.solve import finest
@@ -106,7 +106,7 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
         found, refusal, tolerance = np.empty((0, 4)), "", 0.0
         try:
             tolerance = max(_TOLERANCES.get(method, 0.0), finest(method, scene, times[-1]))
-            attitude = solved(method, tolerance).rows(scene, times).attitude
+            attitude = method_candidate(method, tolerance).rows(scene, times).attitude
             found = found if attitude is None else attitude
         except InputError as reason:
             refusal = str(reason)
@@ -129,7 +129,7 @@ def _turns(scene: Scene, times: Sequence[float]) -> Array:
     Nothing where that can't be solved.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
-    run = solved("auto", METHODS["auto"].finest).rows
+    run = method_candidate("auto", METHODS["auto"].finest).rows
     try:
         here = run(scene, times)
         others = [run(other, times).attitude for other in perturbed(scene, _STEP_ASIDE)]
@@ -199,20 +199,22 @@ def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
     if method == "closed-form":
         return closed_form(scene) is not None
     if method == "quick":
-        return called(method, _TOLERANCES[method]).end(scene, times[0]).ended != "refused"
+        return (
+            prepared_candidate(method, _TOLERANCES[method]).end(scene, times[0]).ended != "refused"
+        )
     return method not in PROGRAMS or times[0] > 0.0
 
 
 def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Result]:
     tolerance = _TOLERANCES.get(method, 0.0)
     if method == "quick":
-        ends = [called(method, tolerance).end(scene, time) for time in times]
+        ends = [prepared_candidate(method, tolerance).end(scene, time) for time in times]
         if refused := next((end.ended for end in ends if end.is_refused), ""):
             raise InputError(f"{method} {refused}")
         rows = np.array([end.omega for end in ends])
     else:
         tolerance = max(tolerance, finest(method, scene, times[-1]))
-        rows = solved(method, tolerance).rows(scene, times).omega
+        rows = method_candidate(method, tolerance).rows(scene, times).omega
     for omega in rows:
         yield omega, tolerance * _scale(scene, omega)
 
@@ -226,7 +228,7 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
     accuracy = finest_print * UNITS[problem.unit]
-    run = listed(corrected(program), may_stop=False, velocity=False).rows
+    run = program_candidate(corrected(program), may_stop=False, velocity=False).rows
     order = PROGRAM_REGISTRY[program].order
     result, before, steps, ended = None, None, _FEWEST_STEPS, ""
     previous = 0.0
@@ -301,7 +303,7 @@ def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
     the motion does not have.
     """
     moved = np.zeros((len(times), 3))
-    run = solved(method, METHODS[method].finest).rows
+    run = method_candidate(method, METHODS[method].finest).rows
     here = run(scene, times).omega
     for other in perturbed(scene, _STEP_ASIDE):
         there = run(other, times).omega

@@ -20,7 +20,7 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.selection import RECORD, Selection
 from pyharness.compare.agreement import ulps
-from pyharness.compare.candidates import listed, solved
+from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError
@@ -54,8 +54,8 @@ class Recorded:
         """Compute the trajectory."""
         if self.source in PROGRAMS:
             listing = (original if self.name.endswith("original") else corrected)(self.source)
-            return listed(listing).rows(self.scene)
-        return solved(self.source, self.tolerance or 1.0).rows(self.scene)
+            return program_candidate(listing).rows(self.scene)
+        return method_candidate(self.source, self.tolerance or 1.0).rows(self.scene)
 
 
 def recorded() -> Iterator[Recorded]:

@@ -22,7 +22,13 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.stress import LISTINGS, named
 from pyharness.checks.tolerances import affordable
-from pyharness.compare.candidates import Candidate, End, called, solved, unstopped
+from pyharness.compare.candidates import (
+    Candidate,
+    End,
+    method_candidate,
+    prepared_candidate,
+    unstopped,
+)
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
 from pyharness.model.scene import Scene
@@ -108,8 +114,8 @@ def hold(
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
     """Run a method; in the scene's steps where the tolerance is None; InputError on refusal."""
     if name in ("auto", "quick") or tolerance is None:
-        return called(name, tolerance or 1.0).end(scene, time)
-    return solved(name, tolerance).end(scene, time)
+        return prepared_candidate(name, tolerance or 1.0).end(scene, time)
+    return method_candidate(name, tolerance).end(scene, time)
 
 
 def _steps(scene: Scene, time: float) -> int:

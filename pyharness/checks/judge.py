@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pyharness.checks.check import REFUSED, Check, Name
-from pyharness.compare.candidates import Candidate, End, solved
+from pyharness.compare.candidates import Candidate, End, method_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
@@ -74,7 +74,7 @@ class Tried:
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
     """Try a method of the registry at all times."""
-    ask = solved(method, tolerance)
+    ask = method_candidate(method, tolerance)
     return Tried(method, tolerance, scene, lambda: of_rows(ask, scene, times))
 
 

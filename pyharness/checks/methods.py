@@ -14,7 +14,7 @@ from pyharness.checks.judge import AS_STATED, Tried, Truth, by_end, by_rows, jud
 from pyharness.checks.selection import Selection
 from pyharness.checks.tolerances import OF_CASES, of_case
 from pyharness.compare.agreement import ulps
-from pyharness.compare.candidates import called, solved, turning
+from pyharness.compare.candidates import attitude_candidate, method_candidate, prepared_candidate
 from pyharness.methods.plan import FEW_DIGITS
 from pyharness.methods.problem import closed_form, normalized
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
@@ -104,7 +104,7 @@ def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[flo
 
 def call_tried(method: str, tolerance: float, scene: Scene, time: float) -> Tried:
     """Try a prepared solver at one time (s), after a call from which nothing may stay."""
-    prepare = turning if scene.attitude else called
+    prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
 
 
@@ -115,9 +115,9 @@ def _judged(tried: Callable[[], Tried], truth: Callable[[], Truth], name: Name) 
 def _same_steps(scene: Scene, name: Name) -> Check:
     """Hold a prepared solver in the scene's own steps to the bits of the kernel itself."""
     method, time = name.subject, 100.0 * scene.step_size
-    found = called(method, 1.0).end(scene, time).omega
+    found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:
-        wanted = solved(method, 1.0).end(scene, time).omega
+        wanted = method_candidate(method, 1.0).end(scene, time).omega
     else:
         steps = int(method.partition("-")[2]), scene.step_size
         rows, *_ = extension().gauss_solution(*normalized(scene), scene.omega, [time], *steps)

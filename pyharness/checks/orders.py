@@ -12,7 +12,7 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.methods import cases
 from pyharness.checks.selection import Selection
-from pyharness.compare.candidates import listed, solved
+from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.compare.orders import Order, measured_order, order_of
 from pyharness.methods.registry import FIXED_STEP, METHODS
 from pyharness.methods.solve import finest
@@ -53,7 +53,7 @@ def _of_program(scene: Scene, truth: Callable[[], Reference], name: Name) -> Che
 
 def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> Check:
     def run(scene: Scene) -> Array:
-        velocity = listed(corrected(name.subject), may_stop=False).rows(scene).velocity
+        velocity = program_candidate(corrected(name.subject), may_stop=False).rows(scene).velocity
         # None is as good as no rows: nothing settles.
         return np.empty((0, 3)) if velocity is None else velocity
 
@@ -62,7 +62,7 @@ def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> C
 
 
 def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    run = solved(name.subject, 1.0)
+    run = method_candidate(name.subject, 1.0)
     due = METHODS[name.subject].order
     return judged_order(
         name, order_of(scene, lambda each: run.rows(each).omega, due, truth(), pairs=_PAIRS)
@@ -79,6 +79,6 @@ def judged_order(name: Name, found: Order) -> Check:
 def _by_ivp(scene: Scene) -> Reference:
     """Return what `solve_ivp` takes for the truth, good to its tolerance."""
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
-    run = solved(_IVP, tolerance).rows(scene)
+    run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())
     return Reference(run.time, run.omega, None, "solve_ivp", tolerance * largest)

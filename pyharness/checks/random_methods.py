@@ -28,7 +28,7 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.methods import START, call_tried, solve_tried
 from pyharness.checks.selection import Selection
-from pyharness.compare.candidates import called
+from pyharness.compare.candidates import prepared_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import finest
@@ -165,7 +165,7 @@ def _prepared(name: str, drawn: Draw) -> Tried:
     tolerance = drawn.tolerance(REGISTRY[name].finest)
 
     def ask() -> Answer:
-        end = called(name, tolerance, primed=True).end(drawn.scene, drawn.time)
+        end = prepared_candidate(name, tolerance, primed=True).end(drawn.scene, drawn.time)
         # Every end before the last time is as good as a refusal.
         return of_end(name, end) if end.has_result else Answer(refusal=f"{name}: {end.ended}")
 

@@ -73,7 +73,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
         for path, content in contents.items():
             if _is_special(path):
                 write_waiting(path, content)
-        with _Patience() as patience:
+        with _DeferredInterrupt() as patience:
             files = [_File(path) for path in contents if not _is_special(path)]
             try:
                 for file in files:
@@ -97,7 +97,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
         raise InputError(f"{option} '{path}': {error.strerror or error}") from None
 
 
-class _Patience:
+class _DeferredInterrupt:
     """Lets a Ctrl-C wait: one that came in the middle of tidying up would leave things behind."""
 
     def __enter__(self) -> Self:
@@ -214,7 +214,7 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
     """Write all files into a folder, which is made if it is missing; all or nothing."""
     folder = Path(path)
     files = {str(folder / name): content for name, content in contents.items()}
-    with _Patience():
+    with _DeferredInterrupt():
         made = not folder.is_dir()
         try:
             if made:
@@ -292,7 +292,7 @@ def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)
     try:
-        with _Patience() as patience:
+        with _DeferredInterrupt() as patience:
             try:
                 for name, content in contents.items():
                     file = new / name

@@ -70,7 +70,7 @@ class Candidate:
         return ready.read(ready.run())
 
 
-def solved(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
+def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
     """Return a method of the registry, as `solve` runs it; an attitude of the scene is wanted."""
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
@@ -83,7 +83,7 @@ def solved(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
     return Candidate(name, ready, rows)
 
 
-def called(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
+def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
     """Return a prepared solver; `primed` by a call from another start, of which nothing may stay.
 
     A method with a fixed step, and Gauss collocation, go in the scene's steps.
@@ -98,7 +98,7 @@ def called(name: str, tolerance: float | None, primed: bool = False) -> Candidat
     return Candidate(name, ready, _no_rows)
 
 
-def turning(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
+def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
     """Return a prepared solver with attitude; `primed` as in `called`."""
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -119,7 +119,7 @@ def _no_rows(scene: Scene) -> Trajectory:
     raise InputError("a prepared solver gives the end alone")
 
 
-def listed(
+def program_candidate(
     listing: Listing,
     implementation: str = "fortran",
     lipschitz: float = 500.0,
@@ -149,7 +149,7 @@ def listed(
 
 def unstopped(listing: Listing) -> Candidate:
     """Return a compiled program whose stop test ends nothing, for its omega alone."""
-    return listed(listing, may_stop=False, velocity=False)
+    return program_candidate(listing, may_stop=False, velocity=False)
 
 
 def plain(values: Iterable[float]) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
-from pyharness.compare.candidates import listed, solved
+from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.compare.orders import Order, measured_order
 from pyharness.compare.timing import seconds as timed
 from pyharness.methods.from_rows import attitude_from_rows
@@ -184,7 +184,7 @@ def compare_programs(
     programs = []
     for listing in listings:
         candidates = [
-            listed(listing, each, lipschitz, may_stop, effort=effort, word=word)
+            program_candidate(listing, each, lipschitz, may_stop, effort=effort, word=word)
             for each in languages
         ]
         run, *other = (each.rows(scene) for each in candidates)
@@ -255,7 +255,7 @@ def _method(
 ) -> MethodFinding:
     start = time.perf_counter()
     try:
-        trajectory = solved(name, tolerance, effort).rows(scene)
+        trajectory = method_candidate(name, tolerance, effort).rows(scene)
     except InputError as error:
         return MethodFinding(name, tolerance, None, None, math.nan, str(error))
     seconds = time.perf_counter() - start

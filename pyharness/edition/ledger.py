@@ -17,7 +17,7 @@ from pyharness.model.facts import facts
 from pyharness.views import html
 
 
-class Told(NamedTuple):
+class SentenceVerdicts(NamedTuple):
     """A sentence of the thesis with the verdicts of the claims that it makes."""
 
     sentence: Sentence
@@ -91,12 +91,14 @@ def apparatus() -> list[tuple[dict[str, Any], Markup]]:
     return found
 
 
-def thesis(judged: Iterable[Judgement]) -> dict[str, list[Told]]:
+def thesis(judged: Iterable[Judgement]) -> dict[str, list[SentenceVerdicts]]:
     """Return the sentences by the section that they stand in, in the thesis's order."""
     by_name = {each.claim["id"]: each for each in judged}
-    found: dict[str, list[Told]] = {}
+    found: dict[str, list[SentenceVerdicts]] = {}
     for number, each in enumerate(sentences(), 1):
         section = each.where.partition(",")[0]
         judged_by = [by_name[name] for name in each.claims]
-        found.setdefault(section, []).append(Told(each, judged_by, f"sentence-{number}"))
+        found.setdefault(section, []).append(
+            SentenceVerdicts(each, judged_by, f"sentence-{number}")
+        )
     return found

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pyharness.ensembles.fields import CHOICES, NUMBERS, field_names
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.scene_file import check_keys
-from pyharness.model.values import finite, whole
+from pyharness.model.values import finite, integer
 
 Floats = NDArray[np.float64]
 
@@ -162,7 +162,7 @@ def _listed(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
 def _spread(where: str, table: dict[str, Any], field: str, dimension: str) -> Axis:
     if "count" not in table:
         raise InputError(f"{where}: give either values, or from, to and count, or draw and count")
-    count = whole(f"{where} count", table["count"])
+    count = integer(f"{where} count", table["count"])
     if not 1 <= count <= MOST_VALUES:
         shown = str(count) if abs(count) < 10**18 else "of more than 18 digits"
         raise InputError(f"{where}: count {shown}; allowed: 1 to {MOST_VALUES} on one axis")
@@ -190,7 +190,7 @@ def _spread(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
         raise InputError(f"{where}: {how} from {ends[0]:g} to {ends[1]:g}; allowed: above 0")
     if how == "normal" and ends[1] < 0.0:
         raise InputError(f"{where}: deviation {ends[1]:g}; allowed: a number from 0")
-    seed = whole(f"{where} seed", table.get("seed", 0))
+    seed = integer(f"{where} seed", table.get("seed", 0))
     if not 0 <= seed < 2**63:
         raise InputError(f"{where}: seed; allowed: a whole number from 0 to 2^63")
     return _checked(where, Axis(field, dimension, count, how, ends, seed))

@@ -9,7 +9,7 @@ from pyharness.ensembles.axes import Axis
 from pyharness.ensembles.fields import units_of
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.store import Store
-from pyharness.ensembles.sweep import Asked, Sweep
+from pyharness.ensembles.sweep import ReductionSpec, Sweep
 from pyharness.model.errors import unknown
 from pyharness.model.report import Column, Picture, Table
 from pyharness.model.trajectory import Array
@@ -24,7 +24,7 @@ _COLUMNS = 3
 _ORDERS = 3.0  # of magnitude, from which numbers above 0 are shown by their logarithm
 
 
-def chosen_quantity(sweep: Sweep, name: str | None) -> Asked:
+def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
     """Return the reduction to draw: the one named, or the first that is no word."""
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -33,7 +33,7 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> Asked:
     return sweep.reductions[names.index(name)] if name else (numbers or sweep.reductions)[0]
 
 
-def sweep_picture(store: Store, asked: Asked) -> Picture:
+def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Draw a reduction: a map where two dimensions have numbers, else a line or dots."""
     from matplotlib.figure import Figure
 
@@ -80,7 +80,9 @@ def sweep_picture(store: Store, asked: Asked) -> Picture:
 Panel = tuple[str, list[Array], Array]
 
 
-def _panels(store: Store, asked: Asked, axis_of: dict[str, Axis], shown: list[str]) -> list[Panel]:
+def _panels(
+    store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
+) -> list[Panel]:
     """Return what is drawn: in words what stands still, the places along `shown`, the values."""
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.ensembles.sweep import Asked
+from pyharness.ensembles.sweep import ReductionSpec
 from pyharness.methods.batch import Batch
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import ENDS
@@ -256,14 +256,14 @@ REDUCTIONS = {
 }
 
 
-def empty(asked: Asked, n: int) -> Found:
+def empty(asked: ReductionSpec, n: int) -> Found:
     """Return the array of n scenes of which nothing is computed yet."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
-def reduced(asked: Asked, batch: Batch) -> Found:
+def reduced(asked: ReductionSpec, batch: Batch) -> Found:
     """Return what is kept of a batch."""
     given = {**dict(asked.parameters), "function": asked.function}
     # What left the range of numbers stays what it is.

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyharness.ensembles.fields import units_of
-from pyharness.ensembles.forecast import duration, said
+from pyharness.ensembles.forecast import duration, format_estimate
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.run import Outcome
 from pyharness.ensembles.store import Store
-from pyharness.ensembles.sweep import Asked, Sweep
+from pyharness.ensembles.sweep import ReductionSpec, Sweep
 from pyharness.model.report import Column, Report, Table, digits, words
 
 _NUMBER = digits(".6g")
@@ -39,7 +39,7 @@ class Found(NamedTuple):
     units: str
 
 
-def summary(store: Store, asked: Asked) -> tuple[list[Found], Counter[int]]:
+def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
     """Return what a reduction found, component by component; of one with words how many of each."""
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -87,7 +87,7 @@ def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
         flags += [(asked.name, named.get(code, str(code)), n) for code, n in counted.items()]
     text: list[list[Any]] = [[f"{sweep.name}: {_did(outcome)}; store {path}"]]
     if outcome.estimate is not None:
-        text[0].append(f"estimated: {said(outcome.estimate)}")
+        text[0].append(f"estimated: {format_estimate(outcome.estimate)}")
     axes = [_axis_row(sweep, i) for i in range(len(sweep.axes))]
     text.append([Table(_AXES, axes)])
     if found:

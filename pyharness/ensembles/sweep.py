@@ -17,7 +17,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Asked:
+class ReductionSpec:
     """A reduction asked for, under the name of its array.
 
     `function` is where the one of a claim stands, as in ``package.module:name``; else empty.
@@ -43,7 +43,7 @@ class Sweep:
         In the order of the file.
     solver : Solver
         What solves.
-    reductions : tuple of Asked
+    reductions : tuple of ReductionSpec
         What is kept.
     chunk : int
         The most scenes in a chunk.
@@ -55,7 +55,7 @@ class Sweep:
     scene: Scene
     axes: tuple[Axis, ...]
     solver: Solver
-    reductions: tuple[Asked, ...]
+    reductions: tuple[ReductionSpec, ...]
     chunk: int
     text: str
     fingerprint: str

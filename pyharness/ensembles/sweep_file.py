@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pyharness.ensembles.asked import asked_of
 from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import CHOICES, RIVALS
+from pyharness.ensembles.reduction_spec import reduction_spec_of
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import Sweep
 from pyharness.methods.batch import Solver
@@ -29,7 +29,7 @@ from pyharness.model.scene_file import (
     scene_of_file,
     toml_of,
 )
-from pyharness.model.values import finite, number, truth, whole
+from pyharness.model.values import boolean, finite, integer, number
 
 _KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
 _SOLVE = (
@@ -88,8 +88,8 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
     entries = data.get("reductions", ["end", "status"])
     if not isinstance(entries, list) or not entries:
         raise InputError(f"reductions is {kind_of(entries)}; allowed: a list, not empty")
-    reductions = tuple(asked_of(each, claims) for each in entries)
-    chunk = whole("chunk", data.get("chunk", CHUNK))
+    reductions = tuple(reduction_spec_of(each, claims) for each in entries)
+    chunk = integer("chunk", data.get("chunk", CHUNK))
     if not 1 <= chunk <= _MOST_IN_CHUNK:
         raise InputError(f"chunk is {chunk}; allowed: 1 to {_MOST_IN_CHUNK} scenes")
     digest = hashlib.sha256(text.encode() + more).hexdigest()
@@ -157,7 +157,7 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
         listing=given.get("listing", "original"),
         reading=given.get("reading", "adopted"),
         lipschitz=lipschitz,
-        may_stop=truth("[solve] may_stop", given.get("may_stop", True)),
+        may_stop=boolean("[solve] may_stop", given.get("may_stop", True)),
     )
 
 

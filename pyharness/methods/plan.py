@@ -11,7 +11,7 @@ from pyharness.model.scene import Scene, checked_scene
 
 FINEST = REGISTRY["auto"].finest
 # For few digits Runge-Kutta takes fewer operations than a series; which, the kernel decides.
-EITHER = "quick or taylor"
+RK4_OR_TAYLOR = "quick or taylor"
 FEW_DIGITS = 1e-7  # below it never, so that it is not asked
 _WAVES_DIGITS = 1e-9
 
@@ -73,7 +73,7 @@ def plan(
             _WAVES_DIGITS if scene.torque.varies else FEW_DIGITS
         )
         # Runge-Kutta gives the end alone.
-        method = "closed-form" if form else EITHER if few_digits and not rows else "taylor"
+        method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"
         # A disturbance of the middle axis may be too faint for a closed form, not for a series.
         fallback = "taylor" if form else None
     elif method == "closed-form" and form is None:

@@ -50,11 +50,13 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
         elif chosen.closed_form:
             code = Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else Methods.CLOSED_FORM
         kernel = extension().solve_packed_attitude
-        packed, brief = packed_scene(scene, code, tolerance, effort), None
+        packed, packed_with_gil = packed_scene(scene, code, tolerance, effort), None
         if chosen.closed_form:  # without torque, so that it has no wave
-            brief = packed.copy()
-            brief[Places.METHOD] = Methods.CLOSED_FORM
-        solver = super().__new__(cls, kernel, packed, partial(_check, attitude), brief, attitude)
+            packed_with_gil = packed.copy()
+            packed_with_gil[Places.METHOD] = Methods.CLOSED_FORM
+        solver = super().__new__(
+            cls, kernel, packed, partial(_check, attitude), packed_with_gil, attitude
+        )
         solver.plan = chosen
         solver._given = tolerance, asked, effort
         return solver

@@ -10,7 +10,7 @@ from pyharness.model.extension import extension
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING
-from pyharness.scenes.rescaled import factor_near_one, scaled
+from pyharness.scenes.rescaled import rescaling_factor, scaled
 
 # Of the tolerance: rounding times growth beyond it is told of. One third either way is left to the
 # norm of the growth, and to how many differences were followed.
@@ -85,7 +85,7 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
         _, growth = closed_form_estimate(scene, scene.omega, t_end)
         if growth is not None:
             return growth
-    factor = factor_near_one(scene, t_end)
+    factor = rescaling_factor(scene, t_end)
     near_one = scaled(replace(scene, step_size=1.0, steps=1), factor)
     work = np.array([_LITTLE_WORK, 0.0, -1.0, -1.0, 0.0])
     _, n_rows, _, _ = extension().taylor_rows(

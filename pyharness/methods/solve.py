@@ -21,12 +21,12 @@ from pyharness.methods.scipy_ivp import finest_tolerance
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
-from pyharness.model.principal import given_back, principal
+from pyharness.model.principal import in_scene_axes, principal
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, Numbers, number, several
+from pyharness.model.values import Number, Numbers, number, number_list
 from pyharness.model.waves import with_merged_waves
-from pyharness.scenes.rescaled import factor_near_one, is_ordinary, scaled, unscaled
+from pyharness.scenes.rescaled import is_ordinary, rescaling_factor, scaled, unscaled
 
 _ROWS = ("time", "recorded_time", "omega")
 _WORST_FIRST = ("overflow", "sensitive", "complete")
@@ -120,7 +120,7 @@ def solve(
     reported = None if chosen.is_fixed_step else tolerance
     found = replace(found, moments=scene.moments, tolerance=reported)
     if is_full:
-        found = given_back(found, axes)
+        found = in_scene_axes(found, axes)
     return _reversed(found) if turned else found
 
 
@@ -134,7 +134,7 @@ def finest(method: str, scene: Scene, time: float) -> float:
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
         return claimed
-    factor = factor_near_one(scene, time)
+    factor = rescaling_factor(scene, time)
     met = finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
     return max(claimed, met)
 
@@ -164,7 +164,7 @@ def _march(
     if not chosen.is_fixed_step and not is_ordinary(scene):
         # The step plays no part; in other units it might be no number.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
-    factor = 1.0 if chosen.any_scale else factor_near_one(scene, times[-1])
+    factor = 1.0 if chosen.any_scale else rescaling_factor(scene, times[-1])
     if factor == 1.0:
         return chosen.solve(scene, times, tolerance, effort)
     faster = [t / factor for t in times]
@@ -210,7 +210,7 @@ def _ascending(times: object) -> tuple[list[float], bool]:
         times = (times,)
     if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
         times = times.tolist()
-    entries = several("times", times, "allowed: a number, or numbers in order")
+    entries = number_list("times", times, "allowed: a number, or numbers in order")
     most = most_steps()
     values = [number("times", each) for each in itertools.islice(entries, most + 1)]
     if not values:

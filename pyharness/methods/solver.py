@@ -10,7 +10,7 @@ import numpy as np
 from pyharness.methods.last_call import LastCall
 from pyharness.methods.many_starts import many_starts
 from pyharness.methods.packed import packed_scene
-from pyharness.methods.plan import EITHER, Plan
+from pyharness.methods.plan import RK4_OR_TAYLOR, Plan
 from pyharness.model.codes import Methods, Places
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
@@ -37,7 +37,7 @@ else:
 CODES = {
     "closed-form": Methods.CLOSED_FORM,
     "sphere": Methods.SPHERE,
-    EITHER: Methods.QUICK_OR_TAYLOR,
+    RK4_OR_TAYLOR: Methods.QUICK_OR_TAYLOR,
     "taylor": Methods.TAYLOR,
     "improved-euler": Methods.IMPROVED_EULER,
     "taylor-3": Methods.TAYLOR_3,
@@ -45,7 +45,7 @@ CODES = {
     "quick": Methods.QUICK,
     **{f"gauss-{stages}": Methods.GAUSS + stages for stages in range(1, 9)},
 }
-PREPARED = ("auto", *(name for name in CODES if name not in ("sphere", EITHER)))
+PREPARED = ("auto", *(name for name in CODES if name not in ("sphere", RK4_OR_TAYLOR)))
 
 _FEW_WAVES = 16  # that take less time than releasing the GIL does
 
@@ -73,7 +73,7 @@ class Solver(LastCall, BoundKernel):
     """
 
     _packed: Array
-    _brief: Array | None
+    _packed_with_gil: Array | None
 
     # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
     # Python between, which would cost as much as an easy solve.
@@ -81,14 +81,14 @@ class Solver(LastCall, BoundKernel):
         """Pack what does not change; `prepare` is the way to make one."""
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
-        brief = None
+        packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
             # Where there is a fallback, it is no part of that.
-            brief = packed.copy()
-            brief[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
-        solver = super().__new__(cls, kernel, packed, _check, brief)
+            packed_with_gil = packed.copy()
+            packed_with_gil[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
+        solver = super().__new__(cls, kernel, packed, _check, packed_with_gil)
         solver.plan = chosen
-        solver._packed, solver._brief = packed, brief
+        solver._packed, solver._packed_with_gil = packed, packed_with_gil
         solver._given = tolerance, asked, effort
         return solver
 
@@ -105,7 +105,9 @@ class Solver(LastCall, BoundKernel):
         from pyharness._many import ManyStarts
 
         slowly = partial(many_starts, self._packed)
-        return ManyStarts(extension().solve_packed_many, self._packed, self._brief, slowly)
+        return ManyStarts(
+            extension().solve_packed_many, self._packed, self._packed_with_gil, slowly
+        )
 
     @property
     def method(self) -> str:
@@ -113,7 +115,7 @@ class Solver(LastCall, BoundKernel):
         steps = self._counted()
         if not steps:
             return self.plan.method
-        if self.plan.method == EITHER:
+        if self.plan.method == RK4_OR_TAYLOR:
             return "quick" if steps < 0 else "taylor"
         return self.plan.fallback or self.plan.method
 

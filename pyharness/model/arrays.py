@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.trajectory import Array
-from pyharness.model.values import number, whole
+from pyharness.model.values import integer, number
 
 _MOST_THREADS = 1024
 _REAL = "iuf"
@@ -102,7 +102,7 @@ def only_one(given: Mapping[str, object]) -> str:
 
 def threads_of(threads: object) -> int:
     """Return a number of threads; InputError where it is none."""
-    found = whole("threads", threads)
+    found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
     return found

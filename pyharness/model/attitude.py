@@ -10,7 +10,7 @@ import numpy as np
 
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.trajectory import Array
-from pyharness.model.values import finite, several, three
+from pyharness.model.values import finite, number_list, three
 
 Quaternion = tuple[float, float, float, float]
 
@@ -24,7 +24,7 @@ _ROUNDED = 2.0**-51  # such a length can't be mended
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
     """Return four numbers over their length, and that; InputError where they are no attitude."""
     allowed = "allowed: four finite numbers, scalar first, not all 0"
-    given = [finite(where, each) for each in several(where, values, allowed)]
+    given = [finite(where, each) for each in number_list(where, values, allowed)]
     if len(given) != 4:
         raise InputError(f"{where}: {len(given)} numbers; {allowed}")
     largest = max(map(abs, given))

@@ -52,7 +52,7 @@ class Series:
 
     LEAST_ORDER = 12
     MOST_ORDER = 24
-    LEAST_SHARE = 1e-19  # part of omega that a step may leave out, well below rounding
+    LEAST_LOCAL_TOLERANCE = 1e-19  # part of omega that a step may leave out, well below rounding
     SLACK = 16.0  # times that part, before a step does not pass
 
 

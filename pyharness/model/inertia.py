@@ -11,7 +11,7 @@ from pyharness.model.diagonal import diagonalised
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Matrix as Matrix
-from pyharness.model.values import Triple, several, three
+from pyharness.model.values import Triple, number_list, three
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
@@ -54,7 +54,7 @@ class PrincipalFrame:
 def checked_inertia(where: str, values: object) -> Matrix:
     """Return a symmetric matrix with moments above 0; InputError for anything else."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
-    given = [three(where, row) for row in several(where, values, allowed)]
+    given = [three(where, row) for row in number_list(where, values, allowed)]
     if len(given) != 3:
         raise InputError(f"{where}: {len(given)} rows; {allowed}")
     largest = max(abs(x) for row in given for x in row)

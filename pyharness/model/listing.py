@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.facts import facts
-from pyharness.model.values import several
+from pyharness.model.values import number_list
 
 PROGRAMS = ("two-term", "four-term", "runge-kutta")
 _FIELDS = {"defect": "defects", "reading": "readings", "conjecture": "conjectures"}
@@ -195,7 +195,7 @@ def _check_program(program: object) -> None:
 
 def _names(where: str, names: object) -> frozenset[str]:
     allowed = "allowed: a list of names"
-    found = list(names if isinstance(names, Set) else several(where, names, allowed))
+    found = list(names if isinstance(names, Set) else number_list(where, names, allowed))
     for name in found:
         if not isinstance(name, str):
             raise InputError(f"{where}: {kind_of(name)} where a name belongs")

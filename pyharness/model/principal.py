@@ -74,7 +74,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     return bare, frame.axes.copy()
 
 
-def given_back(found: Trajectory, axes: Array) -> Trajectory:
+def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     """Return a trajectory about principal axes about the body's own ones."""
     attitude = found.attitude
     if attitude is not None:

@@ -17,11 +17,11 @@ from pyharness.model.values import (
     Number,
     Numbers,
     finite,
+    integer,
     number,
-    several,
+    number_list,
     three,
     three_floats,
-    whole,
 )
 from pyharness.model.values import Triple as Triple
 
@@ -203,7 +203,7 @@ class Scene:
                 f"[run] step_size is {self.step_size:g}; "
                 "allowed: a finite number above 0, in seconds"
             )
-        self._set("steps", whole("[run] steps", self.steps))
+        self._set("steps", integer("[run] steps", self.steps))
         limit = most_steps()
         if not 1 <= self.steps <= limit:
             raise InputError(
@@ -215,7 +215,7 @@ class Scene:
         self._set("masses", _above_zero("masses", "m", self.masses))
         self._set("forces", three("forces", self.forces))
         if self.case is not None:
-            self._set("case", whole("case", self.case))
+            self._set("case", integer("case", self.case))
         warn_of_impossible(self)
 
     def _set(self, name: str, value: object) -> None:
@@ -351,8 +351,8 @@ def _above_zero(where: str, symbol: str, values: object) -> Triple:
 def _waves(where: str, values: object) -> tuple[Wave, ...]:
     allowed = "allowed: a list of waves, each an amplitude of three numbers and a frequency"
     waves = []
-    for value in several(where, values, allowed):
-        wave = list(itertools.islice(several(where, value, allowed), 3))
+    for value in number_list(where, values, allowed):
+        wave = list(itertools.islice(number_list(where, value, allowed), 3))
         if len(wave) != 2:
             raise InputError(f"{where}: a wave is not two things; {allowed}")
         amplitude, frequency = wave

@@ -12,7 +12,7 @@ from pyharness.model.facts import facts
 from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene, TorqueLaw
 from pyharness.model.schema import SCHEMAS, check_schema
-from pyharness.model.values import whole
+from pyharness.model.values import integer
 
 _LARGEST_FILE = 1_000_000
 _TABLES = {
@@ -31,7 +31,7 @@ def case_numbers() -> list[int]:
 
 def case_scene(number: SupportsIndex) -> Scene:
     """Return the scene of a case of Table 1; InputError where there is no such case."""
-    number = whole("case", number)
+    number = integer("case", number)
     for entry in facts("cases")["case"]:
         if entry["number"] == number:
             deck = facts("cases")["deck"]

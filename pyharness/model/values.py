@@ -69,7 +69,7 @@ def three_floats(where: str, values: object) -> Triple:
     if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
         return values
     allowed = "allowed: three numbers"
-    found = list(itertools.islice(several(where, values, allowed), 4))
+    found = list(itertools.islice(number_list(where, values, allowed), 4))
     if len(found) != 3:
         count = "more than 3" if len(found) > 3 else str(len(found))
         raise InputError(f"{where}: {count} number{'s' * (count != '1')}; {allowed}")
@@ -89,7 +89,7 @@ def _not_finite(where: str, value: float) -> InputError:
     return InputError(f"{where}: {value:g} is not finite; allowed: finite numbers")
 
 
-def several(where: str, values: object, allowed: str) -> Iterable[object]:
+def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
     """Return an iterator over what has an order; InputError for text, a set, a mapping."""
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
@@ -99,7 +99,7 @@ def several(where: str, values: object, allowed: str) -> Iterable[object]:
     raise InputError(f"{where}: {kind_of(values)}; {allowed}")
 
 
-def whole(where: str, value: object) -> int:
+def integer(where: str, value: object) -> int:
     """Return a whole number; InputError, which begins with `where`, for anything else."""
     if not is_no_number(value):
         try:
@@ -109,7 +109,7 @@ def whole(where: str, value: object) -> int:
     raise InputError(f"{where} is {kind_of(value)}; it must be a whole number")
 
 
-def truth(where: str, value: object) -> bool:
+def boolean(where: str, value: object) -> bool:
     """Return True or False; InputError, which begins with `where`, for anything else."""
     if isinstance(value, bool) or kind_of(value) == "true or false":
         return bool(value)

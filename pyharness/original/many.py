@@ -26,7 +26,7 @@ from pyharness.model.listing import PROGRAMS, Listing, checked_listing
 from pyharness.model.pieces import share
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Array
-from pyharness.model.values import Number, several, truth, whole
+from pyharness.model.values import Number, boolean, integer, number_list
 from pyharness.original.compiled import stop_reads_velocity
 from pyharness.original.equations import card_torque
 
@@ -131,7 +131,7 @@ def run_many(
     kind = only_one({"moments": moments, "coefficients": coefficients})
     checked_scene(scene, any_axes=bool(kind))
     checked_listing(listing)
-    may_stop, velocity = truth("may_stop", may_stop), truth("velocity", velocity)
+    may_stop, velocity = boolean("may_stop", may_stop), boolean("velocity", velocity)
     threads = threads_of(threads)
     law = scene.torque
     if not kind:
@@ -252,7 +252,7 @@ def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
     """Return the numbers of the steps that are wanted."""
     if at is None:
         return np.array([steps], dtype=np.int32)
-    found = [whole("at", each) for each in several("at", at, "allowed: a list of steps")]
+    found = [integer("at", each) for each in number_list("at", at, "allowed: a list of steps")]
     for each in found:
         if not 1 <= each <= steps:
             raise InputError(f"at: {each}; allowed: steps from 1 to {steps}")

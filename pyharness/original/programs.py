@@ -9,7 +9,7 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import number, truth
+from pyharness.model.values import boolean, number
 from pyharness.original import compiled
 
 IMPLEMENTATIONS = ("fortran", "python")
@@ -43,7 +43,7 @@ class Program:
         lipschitz = number("lipschitz", lipschitz)
         if not lipschitz >= 0.0:
             raise InputError(f"lipschitz is {lipschitz:g}; allowed: a number from 0")
-        may_stop, velocity = truth("may_stop", may_stop), truth("velocity", velocity)
+        may_stop, velocity = boolean("may_stop", may_stop), boolean("velocity", velocity)
         if listing.program != self.name:
             raise InputError(f"program {self.name}: the listing is that of {listing.program}")
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:

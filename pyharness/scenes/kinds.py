@@ -7,7 +7,7 @@ from random import Random
 
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
 from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import turned
+from pyharness.scenes.rotated import rotated
 
 
 def _body(source: Random) -> list[float]:
@@ -62,7 +62,7 @@ def _from_rest(source: Random) -> Scene:
     def kept(values: Triple) -> Triple:
         return _triple([x if k in axes else 0.0 for k, x in enumerate(values)])
 
-    return turned(replace(scene, omega=(0.0, 0.0, 0.0), torque=law), kept, body=False)
+    return rotated(replace(scene, omega=(0.0, 0.0, 0.0), torque=law), kept, body=False)
 
 
 def _slow_waves(source: Random) -> Scene:
@@ -100,7 +100,7 @@ def _far_scale(source: Random) -> Scene:
         scene = replace(_plain(source), torque=TorqueLaw())
     found = scaled(scene, 2.0**exponent)
     mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
-    return replace(turned(found, lambda each: _times(mass, each), body=True), omega=found.omega)
+    return replace(rotated(found, lambda each: _times(mass, each), body=True), omega=found.omega)
 
 
 def _sensitive(source: Random) -> Scene:

@@ -52,7 +52,7 @@ def is_ordinary(scene: Scene) -> bool:
     return 1.0 / _LARGE <= max(map(abs, scene.omega)) <= _LARGE
 
 
-def factor_near_one(scene: Scene, time: float) -> float:
+def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the power of 2 by which a scene is scaled; 1 for every ordinary one."""
     if is_ordinary(scene):
         return 1.0

@@ -10,7 +10,7 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
 from pyharness.model.trajectory import Array
 
 
-def turned(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
+def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with every vector of the body turned, the body too where it takes part.
 
     A torque about the axes of space stays; the attitude is the caller's.
@@ -30,7 +30,9 @@ def turned(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     )
 
 
-def shifted(scene: Scene, omega: Array, by: float, attitude: Quaternion | None = None) -> Scene:
+def restarted_at(
+    scene: Scene, omega: Array, by: float, attitude: Quaternion | None = None
+) -> Scene:
     """Return the problem that begins at the time `by` (s) with `omega` and `attitude`.
 
     InputError where a torque about the axes of space takes an attitude and none is given.

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, case_scene
-from pyharness.compare.candidates import called, listed, solved, unstopped
+from pyharness.compare.candidates import (
+    method_candidate,
+    prepared_candidate,
+    program_candidate,
+    unstopped,
+)
 from pyharness.model.listing import PROGRAMS, corrected, original
 from pyharness.original.programs import IMPLEMENTATIONS
 
@@ -15,7 +20,7 @@ END = SCENE.step_size * SCENE.steps
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_end_of_a_program_is_its_last_row(program: str, implementation: str) -> None:
-    candidate = listed(corrected(program), implementation, may_stop=False)
+    candidate = program_candidate(corrected(program), implementation, may_stop=False)
     rows, end = candidate.rows(SCENE), candidate.end(SCENE, END)
     np.testing.assert_array_equal(end.omega, rows.omega[-1])
     assert (end.ended, end.steps, end.evaluations) == ("complete", rows.steps, rows.evaluations)
@@ -25,11 +30,11 @@ def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> N
     """The bits are the same: only who made them tells the two apart."""
     for room in ("compare.candidates", "original.compiled"):
         monkeypatch.setattr(f"pyharness.{room}.extension", lambda: pytest.fail("compiled"))
-    assert listed(original("two-term"), "python").end(SCENE, END).ended == "complete"
+    assert program_candidate(original("two-term"), "python").end(SCENE, END).ended == "complete"
 
 
 def test_end_of_a_method_is_that_of_its_rows() -> None:
-    method = solved("taylor", 1e-12)
+    method = method_candidate("taylor", 1e-12)
     np.testing.assert_array_equal(method.end(SCENE, END).omega, method.rows(SCENE, [END]).omega[-1])
 
 
@@ -37,9 +42,11 @@ def test_what_a_candidate_has_not_is_refused() -> None:
     with pytest.raises(InputError, match=r"its steps end at 1 s, not at 2 s"):
         unstopped(original("two-term")).end(SCENE, 2.0)
     with pytest.raises(InputError, match="the end alone"):
-        called("quick", 1e-3).rows(SCENE)
+        prepared_candidate("quick", 1e-3).rows(SCENE)
 
 
 def test_a_call_before_leaves_nothing_behind() -> None:
-    plain, primed = (called("auto", 1e-6, primed).end(SCENE, END) for primed in (False, True))
+    plain, primed = (
+        prepared_candidate("auto", 1e-6, primed).end(SCENE, END) for primed in (False, True)
+    )
     np.testing.assert_array_equal(plain.omega, primed.omega)

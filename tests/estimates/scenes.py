@@ -14,7 +14,7 @@ import numpy as np
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, TorqueLaw, Triple, Wave
 from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
-from pyharness.scenes.rotated import turned
+from pyharness.scenes.rotated import rotated
 from tests.estimates.truth import Truth, truth_of
 from tests.random_scenes import NASTY, triple
 
@@ -125,7 +125,7 @@ def _about_other_axes(source: Random, scene: Scene) -> Scene:
     bare = replace(scene, moments=None, inertia=(0.5 * (matrix + matrix.T)).tolist())
     if scene.torque.frame == "space":
         return replace(bare, omega=turn(scene.omega))
-    return turned(bare, turn, body=False)
+    return rotated(bare, turn, body=False)
 
 
 def _times(source: Random, end: float) -> tuple[float, ...]:
@@ -183,7 +183,7 @@ def _steady(source: Random, scene: Scene) -> Scene:
 
     if source.random() < 0.5:
         scene = replace(scene, torque=TorqueLaw())
-    return turned(scene, along, body=False)
+    return rotated(scene, along, body=False)
 
 
 def _cancelling(source: Random, scene: Scene) -> Scene:
@@ -223,7 +223,7 @@ def _pushed(scene: Scene, factor: float) -> Scene:
     def times(values: Triple) -> Triple:
         return values[0] * factor, values[1] * factor, values[2] * factor
 
-    return replace(turned(scene, times, body=False), omega=scene.omega)
+    return replace(rotated(scene, times, body=False), omega=scene.omega)
 
 
 def _rough(source: Random) -> tuple[Scene, float, tuple[str, ...]]:

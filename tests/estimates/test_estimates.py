@@ -13,7 +13,7 @@ from pyharness import InputError, Scene, TorqueLaw, solve
 from pyharness.model.attitude import product
 from pyharness.model.report import short
 from pyharness.model.trajectory import Trajectory
-from pyharness.scenes.rotated import shifted
+from pyharness.scenes.rotated import restarted_at
 from pyharness.truth.free_attitude import free_attitude
 from pyharness.truth.reference import reference
 from pyharness.views.table import write
@@ -157,7 +157,7 @@ def test_growth_is_the_norm_of_the_derivative(name: str) -> None:
         if at is not None and at.attitude is not None:
             a, b, c, d = at.attitude[0].tolist()
             turned = a, b, c, d
-        later = replace(shifted(scene, omega, begin, turned), attitude=turned)
+        later = replace(restarted_at(scene, omega, begin, turned), attitude=turned)
         columns = []
         for axis, size in enumerate(units):
             step = np.zeros(len(units))

@@ -14,7 +14,7 @@ from pyharness.model.scene import most_steps
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
 from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import shifted, turned
+from pyharness.scenes.rotated import restarted_at, rotated
 
 GOOD = """
 name = "spinning brick"
@@ -83,7 +83,7 @@ def test_torque_about_the_axes_of_space_is_read_written_and_told(tmp_path: Path)
 def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> None:
     law = TorqueLaw((1, 2, 3), (0, 0, 1), [((1, 0, 0), 3)], [((0, 1, 0), 4)], "space")
     scene = Scene("", (1, 2, 3), (4, 5, 6), torque=law, attitude=(0, 1, 0, 0))
-    other = turned(scene, lambda v: (v[1], v[2], v[0]), body=True)
+    other = rotated(scene, lambda v: (v[1], v[2], v[0]), body=True)
     assert other == replace(scene, omega=(2, 3, 1), moments=(5, 6, 4))
     full = Scene("", (1, 2, 3), inertia=((4, 1, 0), (1, 5, 0), (0, 0, 6)), torque=law)
     about_principal, axes = principal(full)
@@ -93,11 +93,11 @@ def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> 
     assert matrices(np.array([about_principal.attitude]))[0] == pytest.approx(axes)
     faster = scaled(scene, 4.0).torque
     assert (faster.frame, faster.constant) == ("space", (16, 32, 48))
-    later = shifted(scene, np.ones(3), 0.5, (0.0, 0.0, 1.0, 0.0))
+    later = restarted_at(scene, np.ones(3), 0.5, (0.0, 0.0, 1.0, 0.0))
     assert later.torque.at(0.25) == pytest.approx(law.at(0.75))
     assert (later.torque.frame, later.attitude) == ("space", (0.0, 0.0, 1.0, 0.0))
     with pytest.raises(InputError, match="begun later, it takes the attitude then"):
-        shifted(scene, np.ones(3), 0.5)
+        restarted_at(scene, np.ones(3), 0.5)
 
 
 def test_torque_about_unknown_axes_is_refused(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError
-from pyharness.scenes.rescaled import factor_near_one, omega_by_torque, scaled
+from pyharness.scenes.rescaled import omega_by_torque, rescaling_factor, scaled
 
 _METHODS = ("auto", "taylor", "quick", "gauss-2", "gauss-8", "rk4", "improved-euler", "taylor-3")
 _LAW = TorqueLaw(
@@ -48,18 +48,18 @@ def test_torques_are_scaled_too(method: str) -> None:
     for power in (-330, 330):
         factor = math.ldexp(1.0, power)
         fast = scaled(scene, factor)
-        assert factor_near_one(fast, 2.0 / factor) != 1.0
+        assert rescaling_factor(fast, 2.0 / factor) != 1.0
         found = prepare(fast, method, 1e-6)(np.array(fast.omega), 2.0 / factor)
         np.testing.assert_array_equal(found / factor, wanted)
 
 
 def test_ordinary_scenes_are_left_alone() -> None:
     for case in range(1, 8):
-        assert factor_near_one(case_scene(case), 1.0) == 1.0
+        assert rescaling_factor(case_scene(case), 1.0) == 1.0
     # What the torque gives counts: such a start is soon an ordinary motion.
     for case, first, time in ((5, 1e-200, 1.0), (4, 0.0, 1.0), (4, 1e200, 1e200)):
         scene = replace(case_scene(case), omega=(first, 0.0, 0.0))
-        assert factor_near_one(scene, time) == 1.0
+        assert rescaling_factor(scene, time) == 1.0
 
 
 def test_a_result_beyond_the_range_of_numbers_is_an_overflow() -> None:
@@ -161,7 +161,7 @@ def test_a_scale_that_loses_time_or_torque_is_not_taken(
 def test_torque_counts_by_what_it_gives_a_body() -> None:
     law = TorqueLaw((1e-50, 0.0, 0.0))
     scene = Scene("heavy", (0.0, 0.0, 0.0), moments=(1e50, 1e50, 1e50), torque=law)
-    assert factor_near_one(scene, 1.0) > 2.0**300
+    assert rescaling_factor(scene, 1.0) > 2.0**300
 
 
 @pytest.mark.parametrize("time", [0.01, -1.3, 40.0])

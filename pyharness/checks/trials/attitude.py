@@ -37,7 +37,7 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.extreme import EXTREMES, POINTED
 from pyharness.scenes.random_scenes import random_scene
-from pyharness.scenes.rotated import turned
+from pyharness.scenes.rotated import rotated
 from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, conditioning
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
@@ -70,7 +70,7 @@ def _about_body(turn: Quaternion, vectors: Callable[[Triple], Triple], moments: 
     w, x, y, z = turn
 
     def scene(given: Scene) -> Scene:
-        other = turned(given, vectors, body=moments)
+        other = rotated(given, vectors, body=moments)
         return replace(other, attitude=product(given.attitude or POINTED, turn))
 
     return Turn(scene, lambda q: _product(q, (w, -x, -y, -z)))

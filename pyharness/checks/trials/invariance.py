@@ -25,7 +25,7 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.model.trajectory import Array
 from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import shifted, turned
+from pyharness.scenes.rotated import restarted_at, rotated
 from pyharness.theory.conditioning import Conditioning, conditioning
 
 _ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
@@ -67,7 +67,7 @@ def _signs(first: float, second: float, third: float) -> Symmetry:
         return first * v[0], second * v[1], third * v[2]
 
     return Symmetry(
-        lambda scene: turned(scene, turn, body=False),
+        lambda scene: rotated(scene, turn, body=False),
         1.0,
         lambda omega: omega * [first, second, third],
         # Rounding to nearest knows no sign. Radau and LSODA difference their Jacobian in a
@@ -87,7 +87,7 @@ SYMMETRIES = {
     # Each axis does what the next does: products of the next two, in this order. The series of
     # Taylor and the sums of the others add over the axes, or multiply them, in a fixed order.
     "cyclic": Symmetry(
-        lambda scene: turned(scene, lambda v: (v[1], v[2], v[0]), body=True),
+        lambda scene: rotated(scene, lambda v: (v[1], v[2], v[0]), body=True),
         1.0,
         lambda omega: np.asarray(np.roll(omega, 1)),
         ("closed-form", "gauss-2", "gauss-4", "gauss-8", *FIXED_STEP, "runge-kutta"),
@@ -159,7 +159,7 @@ def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Ch
 def _back(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     there = end(scene, time, method, tolerance)
-    start = shifted(scene, there, time)
+    start = restarted_at(scene, there, time)
     # A method of SciPy may meet a little less on the way back.
     coarser = tolerance
     if method in SCIPY_METHODS:
@@ -183,7 +183,7 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
     flow = _flow(scene.name, 0.0, time)
     limit = flow.limit(tolerance)
     for begin, stop in pairwise([0.0, *cuts, time]):
-        omega = end(shifted(scene, omega, begin), stop - begin, method, tolerance)
+        omega = end(restarted_at(scene, omega, begin), stop - begin, method, tolerance)
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
         # The rest of the way propagates the error of each piece.
@@ -199,7 +199,7 @@ def _flow(circumstance: str, begin: float, length: float) -> Conditioning:
     omega = np.array(scene.omega)
     if begin > 0.0:
         omega = solve(scene, [begin], "taylor", METHODS["taylor"].finest).omega[-1]
-    return conditioning(shifted(scene, omega, begin), length)
+    return conditioning(restarted_at(scene, omega, begin), length)
 
 
 def _program(listing: Listing, symmetry: Symmetry, name: Name) -> Check:

@@ -11,7 +11,7 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.compare.candidates import called, solved, unstopped
+from pyharness.compare.candidates import method_candidate, prepared_candidate, unstopped
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
 from pyharness.model.codes import Series
@@ -43,7 +43,7 @@ _HALFWAY = 0.25
 _LOST = 0.1
 
 # At the finest tolerance the last two terms of the series have no larger part of omega.
-_LEFT_OUT = Series.SLACK * Series.LEAST_SHARE
+_LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
 # Steps of Gauss collocation, in radians of the fastest rate: with 8 stages truncation is far below
 # rounding, with 4 it leads the phase and must leave energy alone.
 _PARTS = {8: 1.0, 4: 0.25}
@@ -75,7 +75,7 @@ class Marcher:
 
 
 def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
-    found = solved("taylor", METHODS["taylor"].finest).rows(scene, times)
+    found = method_candidate("taylor", METHODS["taylor"].finest).rows(scene, times)
     return found.omega, found.steps * np.array(times) / times[-1]
 
 
@@ -216,14 +216,14 @@ def _prepared(name: Name) -> Check:
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
     rows, _ = MARCHERS[method].run(scene, [time])
     stepped = replace(scene, step_size=_PARTS[8] / _rate(scene))
-    found = called(method, METHODS[method].finest).end(stepped, time).omega
+    found = prepared_candidate(method, METHODS[method].finest).end(stepped, time).omega
     return name.bounded(float(np.count_nonzero(rows[-1] != found)), 0.0)
 
 
 def _closed_form(name: Name) -> Iterator[Check]:
     scene, body = MOTIONS[name.circumstance], orbit_of(name.circumstance)
     times = [r * 2.0 * math.pi / body.largest for r in REVOLUTIONS]
-    rows = solved("closed-form", METHODS["closed-form"].finest).rows(scene, times).omega
+    rows = method_candidate("closed-form", METHODS["closed-form"].finest).rows(scene, times).omega
     found = [brouwer.errors(scene, body, t, row, False) for t, row in zip(times, rows, strict=True)]
     for what in LAWS:
         gain = body.turn if what == "phase" else body.gains[what]
@@ -234,7 +234,7 @@ def _closed_form(name: Name) -> Iterator[Check]:
 def _scipy(name: Name) -> Iterator[Check]:
     scene = MOTIONS[name.circumstance]
     time = 1e2 * 2.0 * math.pi / orbit_of(name.circumstance).largest
-    found = solved(name.subject, finest(name.subject, scene, time)).end(scene, time)
+    found = method_candidate(name.subject, finest(name.subject, scene, time)).end(scene, time)
     yield from _described(name, scene, time, found.omega)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from pyharness.checks.check import Check, may_hold
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.compare.candidates import listed, solved
+from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solver import PREPARED, Solver
@@ -110,7 +110,7 @@ def jobs() -> list[Job]:
 
 def _rows(scene: Scene, name: str) -> bytes:
     tolerance = max(_TOLERANCE, finest(name, scene, _TIMES[-1]))
-    found = solved(name, tolerance).rows(scene, _TIMES)
+    found = method_candidate(name, tolerance).rows(scene, _TIMES)
     return found.omega.tobytes() + f"{found.steps} {found.evaluations} {found.ended}".encode()
 
 
@@ -131,14 +131,14 @@ def _shared(scene: Scene, name: str) -> Solver:
 
 
 def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:
-    found = listed(listing, implementation).rows(scene)
+    found = program_candidate(listing, implementation).rows(scene)
     velocity = b"" if found.velocity is None else found.velocity.tobytes()
     return found.recorded_time.tobytes() + found.omega.tobytes() + velocity + found.ended.encode()
 
 
 def _refusal(scene: Scene) -> bytes:
     """Ask for a tolerance that no method claims to meet."""
-    return solved("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
+    return method_candidate("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
 
 
 def _linear(seed: int) -> bytes:

@@ -19,7 +19,7 @@ from pyharness.checks.hold import (
 from pyharness.checks.judge import AMPLIFIED, Truth, by_end, judge
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest_and_middling
-from pyharness.compare.candidates import Candidate, called, solved, unstopped
+from pyharness.compare.candidates import Candidate, method_candidate, prepared_candidate, unstopped
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene, TorqueLaw, Triple
 from pyharness.theory import brouwer
@@ -177,7 +177,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
     """Judge one method by the truth: tolerance and rounding, amplified by the flow."""
     assert tolerance is not None
     method = name.subject
-    kind = called if method in _PREPARED else solved
+    kind = prepared_candidate if method in _PREPARED else method_candidate
     candidate = kind(_PREPARED.get(method, method), tolerance)
     yield judge(
         name, by_end(method, candidate, tolerance, scene_of(name), truth.end), truth, POLICY
@@ -200,7 +200,7 @@ def _describe_axial(name: Name) -> Iterator[Attempt]:
         yield Attempt(own, partial(describe, unstopped(listing)))
     for method in FIXED_STEP:
         own = replace(name, subject=method, setting="own-steps")
-        yield Attempt(own, partial(describe, solved(method, 1.0)))
+        yield Attempt(own, partial(describe, method_candidate(method, 1.0)))
 
 
 TRIAL = Trial(

@@ -6,7 +6,7 @@ from functools import partial
 from pyharness.cli import options as shared
 from pyharness.cli import say
 from pyharness.ensembles.executors import EXECUTORS, check_dask
-from pyharness.ensembles.forecast import said
+from pyharness.ensembles.forecast import format_estimate
 from pyharness.ensembles.run import swept
 from pyharness.ensembles.store import check_zarr
 from pyharness.ensembles.sweep_file import read_sweep
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         executor,
         workers,
         options.scheduler,
-        before=lambda estimate: say(f"pyharness: {said(estimate)}\n"),
+        before=lambda estimate: say(f"pyharness: {format_estimate(estimate)}\n"),
         progress=shared.progress,
         repair=options.repair,
     ) as (store, outcome):

@@ -25,7 +25,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
 from pyharness.original.many import run_many
-from pyharness.scenes.rotated import shifted
+from pyharness.scenes.rotated import restarted_at
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that say what the cases of Table 1 do.
@@ -96,7 +96,7 @@ class Starts:
         scene, state = self.scene(case), self._starts(case)
         rows = np.empty((len(state), scene.steps, 3))
         for step in range(scene.steps):
-            later = shifted(scene, np.array(scene.omega), step * scene.step_size)
+            later = restarted_at(scene, np.array(scene.omega), step * scene.step_size)
             state = solve_many(later, scene.step_size, omega0=state, effort=_EFFORT).omega
             rows[:, step] = state
         return self._shaped(case, rows)

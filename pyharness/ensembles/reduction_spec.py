@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 
 from pyharness.ensembles.reductions import RANKS, REDUCTIONS
-from pyharness.ensembles.sweep import Asked
+from pyharness.ensembles.sweep import ReductionSpec
 from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.values import number, whole
+from pyharness.model.values import integer, number
 
 _MOST_SAMPLES = 10_000
 
 
-def asked_of(entry: object, claims: Mapping[str, str]) -> Asked:
+def reduction_spec_of(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
     """Return the reduction that a sweep file asks for: its name, or a table of name and parameters.
 
     `claims` says where the function of each claim stands.
@@ -27,7 +27,10 @@ def asked_of(entry: object, claims: Mapping[str, str]) -> Asked:
         if key not in ("name", "as", *defaults):
             raise unknown("parameter", key, ("as", *defaults), where)
     given = {key: table.get(key, default) for key, default in defaults.items()}
-    if "samples" in given and not 1 <= whole(f"{where} samples", given["samples"]) <= _MOST_SAMPLES:
+    if (
+        "samples" in given
+        and not 1 <= integer(f"{where} samples", given["samples"]) <= _MOST_SAMPLES
+    ):
         raise InputError(f"{where} samples {given['samples']}; allowed: 1 to {_MOST_SAMPLES}")
     if "offset" in given and not 0.0 < number(f"{where} offset", given["offset"]) <= 1.0:
         raise InputError(f"{where} offset {given['offset']:g}; allowed: above 0, to 1")
@@ -46,4 +49,4 @@ def asked_of(entry: object, claims: Mapping[str, str]) -> Asked:
     title = table.get("as", title)
     if not isinstance(title, str) or not title.replace("-", "").replace("_", "").isalnum():
         raise InputError(f"{where} as: allowed: a name of letters, digits and '-'")
-    return Asked(title, name, tuple(given.items()), function)
+    return ReductionSpec(title, name, tuple(given.items()), function)

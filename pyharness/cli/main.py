@@ -11,24 +11,31 @@ from pyharness.model.errors import InputError, NotBuiltError, unknown
 
 # Each verb is a module of pyharness.cli.verbs, loaded when it is called for.
 VERBS = {
-    "compare": "original against corrected, Fortran against Python, all against the truth",
-    "run": "one trajectory: a program of the appendix, or a method",
-    "cards": "the text of the edition, card by card: scan, port, twin, apparatus",
-    "deck": "a program as a deck of cards, in fixed-form FORTRAN",
-    "defects": "the apparatus: every defect and reading, the evidence, and its effect",
-    "limits": "what the original programs tend to as the step goes to zero",
-    "figures": "Figures 6 to 12 of the thesis, original and corrected: SVG, PNG, CSV",
-    "claims": "statements of the thesis by kind, judged for the programs as printed and corrected",
-    "family": "the weighted residual methods: orders derived, and orders measured",
-    "plan": "what a scene needs, what is therefore not computed, and why",
-    "rotations": "the steady rotations of a scene, their stability, and the time between flips",
-    "words": "the programs in words of any length and rounding, those of the CDC among them",
-    "bench": "run time against error: ours, the programs, and other people's integrators",
-    "sweep": "a grid of scenes, solved here or by a cluster, in a store that resumes",
-    "verify": "bits between languages, error against the truth, and what changed since recorded",
-    "stress": "numerical stability tried to breaking, each trial with a bound derived beforehand",
-    "edition": "all of it as pages: a static site in which the programs run",
-    "doctor": "what is built, with what, and what is missing",
+    "compare": "compare original and corrected programs, Fortran and Python, and solve_ivp",
+    "run": "compute one trajectory with a program of the appendix or with a method",
+    "cards": "show the listings card by card with scan, port, twin and apparatus",
+    "deck": "write a program as a deck of cards in fixed-form FORTRAN",
+    "defects": "list the defects and readings with their evidence and their effect",
+    "limits": "show what the original programs converge to as the step goes to zero",
+    "figures": "redraw Figures 6 to 12 of the thesis, original and corrected",
+    "claims": "judge the statements of the thesis for the original and the corrected programs",
+    "family": "derive and measure the orders of the weighted residual methods",
+    "plan": "show what a scene requires, what is not computed, and why",
+    "rotations": "find the steady rotations of a scene, their stability and the time between flips",
+    "words": "run the programs in the CDC's arithmetic and in other word lengths",
+    "bench": "measure run time against error of our and of third-party integrators",
+    "sweep": "solve a grid of scenes on this machine or a cluster and store the results",
+    "verify": "check all programs and methods against each other and against the truth",
+    "stress": "test the numerical stability of every method against derived bounds",
+    "edition": "write the whole edition as a static web site with a laboratory",
+    "doctor": "report the build, its compiler and flags, and what is missing",
+}
+# The order in which a reader looks for them.
+_GROUPS = {
+    "for everyone": ("compare", "run", "plan", "doctor"),
+    "the thesis": ("claims", "figures", "cards", "defects", "deck", "limits", "family", "words"),
+    "rigid bodies": ("rotations", "sweep"),
+    "checks and publication": ("verify", "stress", "bench", "edition"),
 }
 
 
@@ -49,6 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain("standard output is closed", 2)
     try:
         try:
+            if "_ARGCOMPLETE" in os.environ:
+                return _complete()
             return _run(list(sys.argv[1:] if arguments is None else arguments))
         finally:
             sys.stdout.flush()
@@ -70,12 +79,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help"):
-        lines = ["usage: pyharness VERB [options]; pyharness VERB --help tells the options", ""]
-        lines += [f"  {verb:10s}{description}" for verb, description in VERBS.items()]
-        sys.stdout.write("\n".join(lines) + "\n")
+    if not arguments or arguments[0] in ("-h", "--help") or arguments == ["help"]:
+        sys.stdout.write(_overview())
         return 0
     verb, *rest = arguments
+    if verb == "help":
+        verb, rest = rest[0], ["--help"]
     if verb == "--version":
         from pyharness import __version__
 
@@ -88,6 +97,39 @@ def _run(arguments: list[str]) -> int:
     parser = Parser(verb, VERBS[verb])
     code: int = parser.module.run(parser.read(verb, rest))
     return code
+
+
+def _complete() -> int:
+    """Answer a shell that asks through argcomplete how the line typed so far may continue."""
+    from argparse import ArgumentParser
+
+    try:
+        import argcomplete
+    except ImportError:  # it is installed beside the shell, and not here
+        return 1
+    line, first = os.environ["COMP_LINE"], int(os.environ["_ARGCOMPLETE"])
+    # A word counts as typed once a blank follows it.
+    typed = f"{line[: int(os.environ['COMP_POINT'])]}|".split()[:-1]
+    verb = typed[first] if len(typed) > first else ""
+    parser = ArgumentParser("pyharness", add_help=False)
+    if verb in VERBS:
+        from pyharness.cli.options import Parser
+
+        parser = Parser(verb, VERBS[verb])
+    else:
+        parser.add_argument("verb", choices=[*VERBS] if verb == "help" else [*VERBS, "help"])
+    if verb in (*VERBS, "help"):
+        os.environ["_ARGCOMPLETE"] = str(first + 1)
+    argcomplete.autocomplete(parser)
+    return 0
+
+
+def _overview() -> str:
+    lines = ["usage: pyharness VERB [options]", "       pyharness help VERB"]
+    for title, verbs in _GROUPS.items():
+        lines += ["", f"{title}:", *(f"  {verb:10s}{VERBS[verb]}" for verb in verbs)]
+    lines += ["", "example:", "  pyharness compare --case 3"]
+    return "\n".join(lines) + "\n"
 
 
 def _leave_stdout() -> None:

@@ -19,48 +19,83 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import case_numbers, case_scene, read_scene
 
 FORMATS = ("table", "json", "csv", "markdown")
-# Options of several verbs, and what they say of themselves; without a word for a value, a switch.
+# Options that several verbs share, each with its help; an option without a placeholder is a switch.
 SCENE = {
-    "--case N": "a case of Table 1, 1 to 7",
-    "--scene FILE": "a scene file (TOML)",
-    "--omega0 A,B,C": "initial angular velocity, rad/s",
-    "--step-size H": "step, s",
-    "--steps N": "number of steps",
+    "--case N": "Take the scene of this case of Table 1, 1 to 7.",
+    "--scene FILE": "Take the scene from this scene file (TOML).",
+    "--omega0 A,B,C": "Initial angular velocity, rad/s (default: the scene's).",
+    "--step-size H": "Step size, s (default: the scene's).",
+    "--steps N": "Number of steps (default: the scene's).",
 }
 LISTING = {
-    "--listing L": "original or corrected",
-    "--fix NAME,...": "correct these defects, readings or conjectures",
-    "--keep NAME,...": "keep these; alone: correct all others",
-    "--reading NAME,...": "read cards of the original in the way that is not adopted",
-    "--conjecture NAME,...": "what the original assumes where no card exists; none: nothing",
-    "--lipschitz L": "constant of the stop test (default 500)",
-    "--no-stop": "run on where the stop test would end the run",
+    "--listing L": "Which listing to run: original (all defects active) or corrected (none).",
+    "--fix NAME,...": "Correct these defects, readings or conjectures of the original listing.",
+    "--keep NAME,...": "Keep these active in the corrected listing, and correct all others.",
+    "--reading NAME,...": "Read cards of the original in the way that is not adopted.",
+    "--conjecture NAME,...": "Choose what the original assumes where no card exists, or none.",
+    "--lipschitz L": "Constant of the stop test, 1/s (default 500, as on the cards).",
+    "--no-stop": "Continue where the stop test would end the run.",
 }
-EFFORT = {"--effort F": "factor on the work that is done before giving up (default 1)"}
-STRICT = {"--strict": "exit with 1 where the motion makes more of rounding than the tolerance"}
+EFFORT = {"--effort F": "Multiply the work limit by this factor (default 1, about ten seconds)."}
+STRICT = {"--strict": "Exit with status 1 if rounding errors, amplified, exceed the tolerance."}
 _NEGATIVE = re.compile(r"-[.\d]")
+
+
+_GROUPS = {**dict.fromkeys(SCENE, "scene"), **dict.fromkeys(LISTING, "listing")}
+_OUTPUTS = ("--format", "--plot", "--out", "--strict")
+_NARROWEST, _WIDEST = 80, 100  # columns
+
+
+class _Formatter(argparse.HelpFormatter):
+    """Help in which the example keeps its lines, and the usage names no option: the groups do."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        if text.startswith("example:"):
+            return text
+        return super()._fill_text(text, width, indent)
+
+    def _format_usage(self, *arguments: Any) -> str:
+        _, actions, *_ = arguments
+        places = "".join(f" [{each.metavar}]" for each in actions if not each.option_strings)
+        return f"usage: {self._prog}{places} [options]\n\n"
 
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, with the nearest name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the OPTIONS of a verb's module, which has FORMATS where it has not the usual."""
+        """Declare the OPTIONS of a verb's module; its FORMATS, where it has any, replace ours."""
+        self._width = _WIDEST
+        self.module = import_module(f"pyharness.cli.verbs.{verb}")
         super().__init__(
             prog=f"pyharness {verb}",
-            description=description,
+            description=f"{description[:1].upper()}{description[1:]}.",
+            epilog=f"example:\n  pyharness {self.module.EXAMPLE}",
             allow_abbrev=False,
-            # Given a width, argparse need not ask the terminal, which costs it an import.
-            formatter_class=lambda prog: argparse.HelpFormatter(prog, width=100),
+            add_help=False,
+            # Without a width argparse would import what asks the terminal, for every command.
+            formatter_class=lambda prog: _Formatter(prog, width=self._width),
         )
-        self.module = import_module(f"pyharness.cli.verbs.{verb}")
-        for option, told in self.module.OPTIONS.items():
+        titles = ["arguments", *dict.fromkeys([*_GROUPS.values(), "options", "output"])]
+        groups = {title: self.add_argument_group(title) for title in titles}
+        for option, text in self.module.OPTIONS.items():
             name, _, metavar = option.partition(" ")
-            if not metavar:
-                self.add_argument(name, action="store_true", help=told)
+            if not name.startswith("--"):
+                groups["arguments"].add_argument(name, nargs="?", metavar=metavar, help=text)
+                continue
+            group = groups[_GROUPS.get(option, "output" if name in _OUTPUTS else "options")]
+            if metavar:
+                group.add_argument(name, metavar=metavar, help=text)
             else:
-                nargs = None if name.startswith("--") else "?"
-                self.add_argument(name, nargs=nargs, metavar=metavar, help=told)
+                group.add_argument(name, action="store_true", help=text)
+        groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
+
+    def format_help(self) -> str:
+        """Return the help, as wide as the terminal or COLUMNS, between 80 and 100 columns."""
+        from shutil import get_terminal_size
+
+        self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
+        return super().format_help()
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError in place of printing the usage."""
@@ -93,11 +128,13 @@ class Parser(argparse.ArgumentParser):
         return result
 
 
-def outputs(formats: Sequence[str] = FORMATS, plot: str = "draw a picture") -> dict[str, str]:
-    """Return where results go, and in what form; `plot` is empty where nothing is drawn."""
-    picture = {"--plot FILE": f"{plot}, with its numbers as CSV"} if plot else {}
-    out = {"--out FILE": "write to this file, not to the terminal"}
-    return {"--format F": ", ".join(formats), **picture, **out}
+def outputs(formats: Sequence[str] = FORMATS, plot: str = "Draw a picture") -> dict[str, str]:
+    """Return the options of the output; `plot` is the help of --plot, empty if there is none."""
+    first, *others = formats
+    form = {"--format F": f"Form of the result: {first} (default), {', '.join(others)}."}
+    picture = {"--plot FILE": f"{plot} in this file, and write its numbers beside it as CSV."}
+    out = {"--out FILE": "Write the result to this file instead of the terminal."}
+    return {**form, **(picture if plot else {}), **out}
 
 
 def chosen_effort(options: argparse.Namespace) -> float:

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, solve
-from pyharness.cli.main import main
+from pyharness.cli.main import VERBS, main
+from pyharness.cli.options import Parser
 from pyharness.model import extension
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import original
@@ -52,6 +53,32 @@ def test_help_and_version(printed: Printed, capsys: Capture) -> None:
             main([verb, "--help"])
         assert caught.value.code == 0
         assert "--out" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("columns", [80, 100])
+def test_help_is_in_whole_sentences_and_fits(
+    verb: str, columns: int, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    with pytest.raises(SystemExit):
+        main(["help", verb])
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= columns
+    assert f"example:\n  pyharness {verb}" in told
+    parser = Parser(verb)
+    assert parser.read(verb, shlex.split(parser.module.EXAMPLE)[1:])
+    for option, text in parser.module.OPTIONS.items():
+        assert text[0].isupper(), (option, text)
+        assert text.endswith("."), (option, text)
+        assert len(text.split()) >= 3, (option, text)
+
+
+def test_overview_names_every_verb_once(printed: Printed) -> None:
+    lines = printed("help").splitlines()
+    named = [line.split()[0] for line in lines if line[:2] == "  "]
+    assert sorted(named) == sorted([*VERBS, "pyharness"])
+    assert max(map(len, lines)) <= 100
 
 
 def _record(printed: Printed, command: str) -> dict[str, Any]:
@@ -344,3 +371,24 @@ def test_json_of_a_scene_and_of_drifts_is_that_of_the_findings(
         assert each["energy_drift"] != each["momentum_drift"]
         if each["listing"]["label"] == "corrected":
             assert (each["order_state"], round(each["order"])) == ("as due", 2)
+
+
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        ("pyharness ver", {"verify"}),
+        ("pyharness he", {"help"}),
+        ("pyharness help ver", {"verify"}),
+        ("pyharness run --me", {"--method"}),
+        ("pyharness verify --listing", {"--listing-output"}),
+    ],
+)
+def test_shell_completes_verbs_and_options(line: str, wanted: set[str], tmp_path: Path) -> None:
+    found = tmp_path / "found"
+    environment = {
+        "_ARGCOMPLETE": "1", "_ARGCOMPLETE_STDOUT_FILENAME": str(found), "COMP_LINE": line,
+        "COMP_POINT": str(len(line)), "COMP_TYPE": "9", "IFS": "\v",
+    }  # fmt: skip
+    command = [sys.executable, "-m", "pyharness"]
+    subprocess.run(command, env={**os.environ, **environment}, check=True)
+    assert set(found.read_text().replace("\v", " ").split()) == wanted

@@ -22,19 +22,20 @@ _Named = TypeVar("_Named", bound=Contender)
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 OPTIONS = {
-    "--case N": "one case of Table 1 (default: 2 to 7)",
-    "--horizon T": "go to this time, s (default: 3; Cases 3 and 4 also 100)",
-    "--random N": "N random scenes, the kinds in turn, in place of the cases",
-    "--ensemble": "many bodies in one call: rates, growth with their number, memory",
-    "--bodies N": "of an ensemble (default: 100000)",
-    "--seed S": "of the random scenes, or bodies (default: the week)",
-    "--attitude": "omega and attitude together, of the cases 1 to 7 or of the random scenes",
-    "--methods A,B": "these of ours only, or none",
-    "--peers X,Y": "these peers or packages only, or none",
-    "--plan": "what each skip of the plan saves, with and without",
-    "--growth": "error of the Taylor method up to 1e5 s (Cases 3, 4)",
+    "--case N": "Measure one case of Table 1 (default: Cases 2 to 7).",
+    "--horizon T": "Integrate from 0 to this time, s (default: 3; Cases 3 and 4 also to 100).",
+    "--random N": "Measure N random scenes of all kinds in place of the cases.",
+    "--ensemble": "Measure many bodies in one call: rates, their change with the number, memory.",
+    "--bodies N": f"Number of bodies of --ensemble (default {_BODIES}).",
+    "--seed S": "Seed of the random scenes or bodies (default: year and week).",
+    "--attitude": "Measure omega and attitude together.",
+    "--methods A,B": "Measure these of our methods alone, or none; an unknown name names them all.",
+    "--peers X,Y": "Measure these third-party packages alone, or none.",
+    "--plan": "Measure what each computation that the plan leaves out would cost.",
+    "--growth": "Measure the error of the Taylor method up to 1e5 s in Cases 3 and 4.",
     **shared.outputs(),
 }
+EXAMPLE = "bench --case 5 --peers none"
 
 
 def run(options: argparse.Namespace) -> int:

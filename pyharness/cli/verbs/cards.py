@@ -15,12 +15,13 @@ from pyharness.original.deck_collation import faults, rows
 _LARGEST_SCAN = 1 << 24  # bytes
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
-    "cards CARDS": "two-term, 1660, 1040-1090, two-term:1660; all where nothing is named",
-    "--classes": "count the alterations by class",
-    "--collate": "compare the decks with each other and with sections II to V, step by step",
-    "--scan FILE": "hold the cards against a scan of the thesis, character by character",
+    "cards CARDS": "Show these cards: two-term, 1660, 1040-1090 or two-term:1660 (default: all).",
+    "--classes": "Count the differences between the scan and our reading by their class.",
+    "--collate": "Compare the three decks with each other and with sections II to V of the thesis.",
+    "--scan FILE": "Compare our reading with the text of a scan, character by character.",
     **shared.outputs(FORMATS, plot=""),
 }
+EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,14 +9,16 @@ from pyharness.model.errors import InputError
 from pyharness.original.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
-    "--explain ID": "one claim, with its numbers",
-    "--assignments": "which initial conditions let all claims hold",
-    "--word W": "with the programs in another word (`words`), as cdc48",
-    "--evidence": "score every combination of starts, readings, conjectures and steps",
-    "--atlas STORE": "what a sweep of claims over starts found; with --sweep",
-    "--sweep FILE.toml": "the sweep file of the store",
-    **shared.outputs(plot="draw the claims that discriminate (--evidence, --atlas)"),
+    "--explain ID": "Explain the verdict on this claim with its numbers.",
+    "--assignments": "Show with which initial conditions all claims hold.",
+    "--word W": "Judge the programs in this arithmetic: "
+    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
+    "--evidence": "Score every combination of initial conditions, readings, conjectures and steps.",
+    "--atlas STORE": "Report a sweep of the claims over initial conditions; needs --sweep.",
+    "--sweep FILE.toml": "The sweep file from which the store of --atlas was made.",
+    **shared.outputs(plot="Draw the claims that tell choices apart (--evidence, --atlas)"),
 }
+EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,22 +8,24 @@ from pyharness.compare.comparison import compare_programs, listings_for
 from pyharness.compare.report import comparison_report
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.listing import names_of
+from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Scene
 from pyharness.original.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
-    "--program P": "this program only",
-    "--word W": f"arithmetic of the programs: {', '.join(WORD_NAMES)}",
-    "--tolerance E": "of each method of solve_ivp (default: the method's own)",
-    "--attitude": "the attitude too: its error as an angle",
-    "--ablate": "every subset of the defects, sorted by effect",
+    "--program P": f"Compare this program alone: {', '.join(PROGRAMS)} (default: all three).",
+    "--word W": "Run the programs in this arithmetic: "
+    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
+    "--tolerance E": "Relative tolerance of every method of solve_ivp (default: the method's own).",
+    "--attitude": "Compare the attitude too; its error is an angle in rad.",
+    "--ablate": "Run every subset of a program's defects and sort the subsets by their effect.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),
 }
+EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ import argparse
 
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS
 from pyharness.model.records import listing_record
 from pyharness.model.report import Line, Report
 from pyharness.model.scene_file import case_numbers, case_scene
@@ -11,15 +12,18 @@ from pyharness.original.decks import DIALECTS, SYSTEMS, deck_text, job_text
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--program P": "two-term, four-term or runge-kutta",
-    "--case N": "a case of Table 1, 1 to 7 (default: the case that was printed)",
+    "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)}.",
+    "--case N": "Use the data cards of this case, 1 to 7 (default: the case that was printed).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
-    "--dialect D": f"{', '.join(DIALECTS)} (default {DIALECTS[0]}); ftn: a batch job for it",
-    "--system S": f"with --dialect ftn: its operating system, {' or '.join(SYSTEMS)} (default nos)",
-    "--round": "with --dialect ftn: rounded instructions",
-    "--terms N": "3 or 5: a model that is not printed, made of the four-term deck, a conjecture",
+    "--dialect D": f"Write for this compiler: {', '.join(DIALECTS)} (default {DIALECTS[0]}); ftn "
+    "writes a batch job for the CDC's compiler.",
+    "--system S": "Operating system of the batch job, with --dialect ftn: "
+    f"{' or '.join(SYSTEMS)} (default nos).",
+    "--round": "Compile with rounded arithmetic, with --dialect ftn.",
+    "--terms N": "Make a model of 3 or 5 terms from the four-term deck; it is a conjecture.",
     **shared.outputs(FORMATS, plot=""),
 }
+EXAMPLE = "deck --program runge-kutta --dialect gfortran --out runge-kutta.f"
 
 
 def run(options: argparse.Namespace) -> int:

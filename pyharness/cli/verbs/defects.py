@@ -8,10 +8,12 @@ from pyharness.history.apparatus_report import apparatus_report, entry_report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "an entry, with its effect; or a card: 1660, two-term:1660",
-    "--kind K": "only the entries of one kind",
+    "name NAME": "Show this entry and its effect in every case: a name from the list, or a card "
+    "as in 1660 or two-term:1660 (default: list all entries).",
+    "--kind K": "List the entries of this kind alone; an unknown kind names them all.",
     **shared.outputs(FORMATS, plot=""),
 }
+EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ FORMATS = ("table", "json")
 OPTIONS = {
     **shared.outputs(FORMATS, plot=""),
 }
+EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -7,10 +7,11 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "folder for the pages, index.html at its top; made if missing",
-    "--docs DIR": "the documents, docs of the source (default: those of the checkout)",
-    "--format F": "table (default) or json: of what was written",
+    "--out DIR": "Write the pages to this folder, which is made if missing; start at index.html.",
+    "--docs DIR": "Folder of the documents (default: docs of the checkout).",
+    "--format F": "Print the list of what was written as a table (default) or as json.",
 }
+EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:

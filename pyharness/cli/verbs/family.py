@@ -12,14 +12,17 @@ _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
 OPTIONS = {
     **shared.SCENE,
-    "--weighting W": f"one member: {', '.join(WEIGHTINGS)}",
-    "--terms N": "one member: powers of t (default 2)",
-    "--points P": "one member: thesis, gauss or a,b,... in parts of the step",
-    "--corrections K": "one member: corrections (default 1)",
-    "--lost": "the mistakes that IV.2's three failed programs may have had, ranked",
-    "--word W": "with --lost: their arithmetic (`words`), as cdc48",
+    "--weighting W": f"Measure one method with this weighting: {', '.join(WEIGHTINGS)}.",
+    "--terms N": "Number of terms of the trial solution of that method (default 2).",
+    "--points P": "Collocation points of that method: thesis, gauss, or fractions of the step, as "
+    "in 0.3,0.6.",
+    "--corrections K": "Number of corrections of that method in each step (default 1).",
+    "--lost": "Rank the mistakes with which the three failed programs of section IV.2 could fail.",
+    "--word W": "Arithmetic of the programs that --lost runs: "
+    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
     **shared.outputs(plot=""),
 }
+EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,9 +8,10 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "folder for SVG, PNG and CSV; made if missing",
-    "--format F": "table (default) or json: of what was drawn",
+    "--out DIR": "Write the SVG, PNG and CSV files to this folder, which is made if missing.",
+    "--format F": "Print the list of what was drawn as a table (default) or as json.",
 }
+EXAMPLE = "figures --out figures"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,14 +5,16 @@ import argparse
 from pyharness.cli import options as shared
 from pyharness.history.limits import invisible, limit, limits_report
 from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS
 
 OPTIONS = {
     **shared.SCENE,
-    "--program P": "this program only",
-    "--halvings K": "how often the step is halved (default 6)",
+    "--program P": f"Halve the step of this program alone: {', '.join(PROGRAMS)} (default: all).",
+    "--halvings K": "How many times the step is halved (default 6).",
     **shared.EFFORT,
     **shared.outputs(plot=""),
 }
+EXAMPLE = "limits --case 5 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,12 +9,13 @@ from pyharness.methods.solver import PREPARED
 
 OPTIONS = {
     **shared.SCENE,
-    "--method M": "auto (default), or a name",
-    "--tolerance E": "relative (default: the method's own, 1e-12 for auto)",
-    "--velocity": "the velocity is wanted too",
-    "--rows": "results on the way are wanted too, as in run",
+    "--method M": "Plan for this method (default auto); an unknown name names them all.",
+    "--tolerance E": "Relative tolerance (default: the method's own, 1e-12 for auto).",
+    "--velocity": "Plan for the translational velocity too.",
+    "--rows": "Plan for intermediate output too, as `run --times` requests it.",
     **shared.outputs(plot=""),
 }
+EXAMPLE = "plan --case 5 --tolerance 1e-9"
 
 
 def run(options: argparse.Namespace) -> int:

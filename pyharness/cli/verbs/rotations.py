@@ -9,9 +9,10 @@ from pyharness.theory.rotations_report import rotations_report
 
 OPTIONS = {
     **shared.SCENE,
-    "--disturbance D": "size of a disturbance over that of the rotation (default 0.001)",
-    **shared.outputs(plot="draw polhodes, and the growth of all bodies"),
+    "--disturbance D": "Size of the perturbation, relative to the rotation (default 0.001).",
+    **shared.outputs(plot="Draw the polhodes, and the growth of a perturbation over all bodies"),
 }
+EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 
 
 def run(options: argparse.Namespace) -> int:

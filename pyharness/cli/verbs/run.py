@@ -25,21 +25,24 @@ PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": ", ".join(PROGRAMS),
-    "--implementation I": "fortran (default) or python",
-    "--word W": f"arithmetic of the program, as {', '.join(WORD_NAMES)}; python but in the first, "
-    f"where fortran is not asked for, in which {', '.join(COMPILED_WORDS[1:])} run too",
-    "--method M": "a method in place of a program",
+    "--program P": f"Run this program of the appendix: {', '.join(PROGRAMS)}.",
+    "--implementation I": "Run the program in fortran (default) or in python.",
+    "--word W": f"Run the program in this arithmetic: {', '.join(WORD_NAMES)} (default "
+    f"{WORD_NAMES[0]}). Fortran has {', '.join(COMPILED_WORDS)}; the others run in Python.",
+    "--method M": "Run this method in place of a program: auto, taylor, closed-form, dop853, ...; "
+    "an unknown name names them all.",
     **shared.LISTING,
-    "--times T1,T2,...": "where results are wanted, s (methods)",
-    "--attitude FORM": f"the attitude too: {', '.join(FORMS)}",
-    "--animate FILE": "a turning brick, as .gif or .html (methods; with --attitude)",
-    "--tolerance E": "error at these times over the largest |omega| (methods; default: the "
-    "method's own, 1e-12 for auto)",
+    "--times T1,T2,...": "Times of the results of a method, s; strictly monotonic, of either sign.",
+    "--attitude FORM": "Compute the attitude too, with a method, and print it in this form: "
+    f"{', '.join(FORMS)}.",
+    "--animate FILE": "Write an animation of the rotating body (.gif or .html); needs --attitude.",
+    "--tolerance E": "Largest error of omega at these times, relative to the largest |omega| "
+    "(default: the method's own, 1e-12 for auto).",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(FORMATS),
 }
+EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:

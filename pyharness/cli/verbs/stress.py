@@ -11,10 +11,12 @@ from pyharness.model.errors import InputError, unknown
 FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
 OPTIONS = {
-    "--only ID,...": f"trials, or checks by name: {', '.join(TRIALS)}",
-    "--save DIR": "save each method's worst input there, as a scene file (else: failures, worst/)",
-    **shared.outputs(FORMATS, plot="draw one trial"),
+    "--only ID,...": f"Run these trials, or checks with ids that begin so: {', '.join(TRIALS)}.",
+    "--save DIR": "Save the worst scene of every method as a scene file in this folder (default: "
+    "failures alone, in worst/).",
+    **shared.outputs(FORMATS, plot="Draw one trial"),
 }
+EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -17,15 +17,18 @@ from pyharness.model.errors import InputError
 CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {
-    "file FILE.toml": "the sweep file: a scene, axes, what solves, reductions",
-    "--out STORE": "the store, a folder (Zarr); one that is there goes on where it ended",
-    "--repair": "compute the damaged chunks of the store again, and write its metadata again",
-    "--executor E": f"{', '.join(EXECUTORS)} (default: here)",
-    "--workers N": "processes, of processes and dask (default: as many as processors)",
-    "--scheduler ADDRESS": "of a Dask cluster, as in tcp://host:8786 (default: one of our own)",
-    "--quantity NAME": "the reduction to draw (default: the first)",
-    **{key: told for key, told in shared.outputs().items() if key != "--out FILE"},
+    "file FILE.toml": "The sweep file: a scene, axes, solvers and reductions.",
+    "--out STORE": "Keep the results in this folder, a Zarr store; continue an incomplete one.",
+    "--repair": "Compute damaged chunks of the store again, and write its metadata again.",
+    "--executor E": f"Where to compute: {', '.join(EXECUTORS)} "
+    f"(default {EXECUTORS[0]}: in this process).",
+    "--workers N": "Number of processes of the executors processes and dask (default: one for each "
+    "processor).",
+    "--scheduler ADDRESS": "Use this Dask cluster, as in tcp://host:8786 (default: a local one).",
+    "--quantity NAME": "The reduction that --plot draws (default: the first).",
+    **{key: help for key, help in shared.outputs().items() if key != "--out FILE"},
 }
+EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -20,20 +20,22 @@ FORMATS = ("table", "json", "junit")
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record")
 OPTIONS = {
-    "--only ID,...": f"kinds, or checks by name: {', '.join(KINDS)}",
-    "--seed S": "of the random draws (default: the week)",
-    "--draws N": f"random draws (default {DRAWS})",
-    "--external FILE": "a file of published figures, these alone",
-    "--listing-output FILE": "a page that one of the programs printed, anywhere: in which word?",
-    "--port COMMAND": "a port in any language, against the twins in every cell (docs/ports.md)",
-    "--program P": "of that page, or of that port (default: any)",
-    "--case N": "of that page, or of that port, 1 to 7 (default: any)",
-    "--cell NAME,...": "of that port, by leading parts of names, as in two-term/case-3",
-    "--self-test": "plant faults, and report which check catches which",
-    "--update": "write the golden record anew",
-    "--record DIR": "the golden record (default: the checkout's)",
+    "--only ID,...": "Run the checks of these kinds, or with ids that begin so: "
+    f"{', '.join(KINDS)}.",
+    "--seed S": "Seed of the random draws (default: year and week).",
+    "--draws N": f"Number of random draws (default {DRAWS}).",
+    "--external FILE": "Check the published figures in this file alone.",
+    "--listing-output FILE": "Find the arithmetic in which a program printed this page.",
+    "--port COMMAND": "Check a port in any language against the Python twins (docs/ports.md).",
+    "--program P": "Program of that page or port (default: any).",
+    "--case N": "Case of that page or port, 1 to 7 (default: any).",
+    "--cell NAME,...": "Check these cells of that port, as in two-term/case-3 (default: all).",
+    "--self-test": "Plant faults one by one, and report which check finds which fault.",
+    "--update": "Write the golden record anew, and report what changed.",
+    "--record DIR": "Folder of the golden record (default: that of the checkout).",
     **shared.outputs(FORMATS, plot=""),
 }
+EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:

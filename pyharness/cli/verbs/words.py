@@ -7,6 +7,7 @@ from pyharness.cli import options as shared
 from pyharness.history.words import LENGTHS, cells
 from pyharness.history.words_report import words_report
 from pyharness.model.errors import InputError
+from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table
 from pyharness.model.report import words as columns
 from pyharness.model.scene_file import case_numbers
@@ -14,12 +15,13 @@ from pyharness.original.vectors import Answer, answers
 
 FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
-    "--case N": "this case only, 1 to 7",
-    "--program P": "this program only",
-    "--all": f"every p from {LENGTHS[0]} to {LENGTHS[-1]}; some twelve minutes",
-    "--vectors FILE": "hold the CDC's arithmetic against the operations of a file (JSON)",
-    **shared.outputs(FORMATS, plot="draw the error against p (with --case)"),
+    "--case N": "Run this case alone, 1 to 7 (default: all).",
+    "--program P": f"Run this program alone: {', '.join(PROGRAMS)} (default: all three).",
+    "--all": f"Take every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits; takes twelve minutes.",
+    "--vectors FILE": "Check our arithmetic of the CDC against the operations in a JSON file.",
+    **shared.outputs(FORMATS, plot="Draw the error against the precision (needs --case)"),
 }
+EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""Three FORTRAN programs of a thesis of 1982 on rigid bodies: original, corrected, checked."""
+"""An edition of three FORTRAN programs of 1982 on rigid bodies: original, corrected, checked."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pyharness.original.programs import run_program
 
     __version__: str
-    # What the build makes.
+    # Modules that the build generates.
     _build: Any
     _kernels: Any
 
@@ -49,7 +49,7 @@ __all__ = [
     "subset",
 ]
 
-# A name loads its room when it is first asked for: a program that needs one pays for one.
+# A name imports its module at its first use, so that a program loads only the modules it needs.
 _SUBMODULES = {
     "compare.comparison": ("Comparison", "compare_programs"),
     "model.errors": ("InputError", "NotBuiltError"),
@@ -68,7 +68,7 @@ _SUBMODULES = {
 }
 
 
-# For a type checker the imports above say it all: with this, any name would be one.
+# Type checkers read the imports above. With this function they would accept any attribute name.
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:

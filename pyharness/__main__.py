@@ -1,4 +1,4 @@
-"""`python -m pyharness`, and what the command `pyharness` starts."""
+"""The entry point of `python -m pyharness` and of the command `pyharness`."""
 
 import os
 import signal
@@ -11,14 +11,14 @@ def _leave(*_: object) -> None:
         os._exit(130)
 
 
-# Before anything else is imported: until here, a Ctrl-C ends in a traceback of the interpreter.
-# Where it is ignored, as a shell does for what runs in the background, it stays so.
+# This comes before all other imports: until here, Ctrl-C ends in a traceback of the interpreter.
+# A shell starts background processes with SIGINT ignored; it then stays ignored.
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, _leave)
 
 
 def start() -> None:
-    """Run the command line and leave with its exit code, soon where it was interrupted."""
+    """Run the command line and exit with its exit status, promptly if it was interrupted."""
     from pyharness.cli import interruption
     from pyharness.cli.main import main
 

@@ -1,1 +1,1 @@
-"""Run time against error: ours, the programs of the thesis, and other people's integrators."""
+"""Benchmarks of run time against error: our methods, the thesis programs, third-party solvers."""

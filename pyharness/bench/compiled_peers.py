@@ -1,7 +1,7 @@
-"""The peers that numba compiles: fixed steps of its own, and the solvers of numbalsoda.
+"""Third-party contenders that numba compiles: fixed-step Runge-Kutta methods and numbalsoda.
 
-The source of each right-hand side is written out with the numbers of its scene, as one would
-write it by hand for speed; so are the stages of the methods.
+For speed, the source text of each right-hand side contains the numbers of its scene, as in code
+written by hand. The stages of the fixed-step methods are written out in the same way.
 """
 
 from collections.abc import Sequence
@@ -18,17 +18,17 @@ from pyharness.model.trajectory import Array
 
 MOST_STEPS = 10_000_000
 Formula = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]
-# Classical Runge-Kutta: stages below the diagonal, weights, nodes.
+# Classical Runge-Kutta method: the stage coefficients below the diagonal, the weights, the nodes.
 RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0.0, 0.5, 0.5, 1.0]
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Equal steps of RK4, or of the formula of order 8 in DOP853."""
+    """Return a `Maker` of runs with a fixed step: RK4, or the formula of order 8 from DOP853."""
     import numba
 
     formula: Formula = RK4
     if method != "rk4":
-        # SciPy has them nowhere else.
+        # No public module of SciPy has these coefficients.
         from scipy.integrate._ivp import dop853_coefficients as table  # noqa: PLC2701
 
         count = table.N_STAGES
@@ -50,7 +50,7 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def numbalsoda(name: str, scene: Scene) -> Maker:
-    """`dop853` or `lsoda` of numbalsoda with a compiled right-hand side."""
+    """Return a `Maker` of runs by `dop853` or `lsoda` of numbalsoda, right-hand side compiled."""
     import numba
     import numbalsoda as package
 
@@ -62,7 +62,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
         compiled_function(_callback_source(scene, counted=True))
     )
     start, size = np.array(state_of(scene)), max(map(abs, scene.omega)) or 1.0
-    # It takes one for all unknowns.
+    # numbalsoda takes one absolute tolerance for all unknowns.
     size = size if scene.attitude is None else min(1.0, size)
 
     def make(horizon: float, setting: float) -> Ready:
@@ -85,7 +85,7 @@ def numbalsoda(name: str, scene: Scene) -> Maker:
 
 
 def compiled_function(source: str) -> Any:
-    """Return the function of a source, in plain Python."""
+    """Return the function that `source` defines, as plain Python that is not compiled yet."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
     return names["function"]
@@ -94,9 +94,10 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand sides as text; A, B, C are the scene's where none are given.
+    """Return the right-hand sides as source text, one expression for each unknown.
 
-    Of three names omega's, of seven the attitude's as well: q' = q (0, omega)/2.
+    If `state` has three names, they are omega's. If it has seven, the last four are the attitude's,
+    with q' = q (0, omega)/2. `coefficients` are A, B and C, by default the scene's.
     """
     x, y, z, *attitude = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -129,19 +130,22 @@ def rates(
 
 
 def state_names(scene: Scene) -> str:
-    """Return a letter for each unknown: omega's three, and the attitude's four if any."""
+    """Return a letter for each unknown: three for omega, four more for the attitude, if any."""
     return "xyz" if scene.attitude is None else "xyzabcd"
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return the end of a call from the unknowns at T."""
+    """Return the result of a call from its unknowns at time T."""
     found = plain(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)
 
 
 def steps_source(scene: Scene, formula: Formula) -> str:
-    """Return a function of equal Runge-Kutta steps without a loop over stages or components."""
+    """Return the source of a function that takes equal Runge-Kutta steps.
+
+    The function has no loop over stages or components.
+    """
     stages, weights, nodes = formula
     lines = [
         "def function(omega0, t_end, steps, omega):",
@@ -168,7 +172,7 @@ def _increment(factors: Sequence[float], name: str) -> str:
 
 
 def _callback_source(scene: Scene, counted: bool) -> str:
-    """Return a right-hand side as numbalsoda calls it; `p` counts the calls if asked to."""
+    """Return the source of a right-hand side for numbalsoda; if `counted`, `p` counts the calls."""
     names = state_names(scene)
     lines = ["def function(t, u, du, p):"]
     lines += [f"    {name} = u[{i}]" for i, name in enumerate(names)]

@@ -1,4 +1,4 @@
-"""Who takes part in `bench`: the interface of a contender, our methods and the programs."""
+"""Contenders of `bench`: their interface, our own methods, and the programs of the thesis."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,40 +18,41 @@ from pyharness.model.listing import corrected, original
 from pyharness.model.scene import Scene
 from pyharness.original.programs import PROGRAM_REGISTRY
 
-# Finer than decades: a method whose error stays well below its tolerance must not be judged by it.
+# Three tolerances per decade: a method whose error is far below its tolerance is then compared by
+# its error, and not by its tolerance.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
-# From the horizon (s) and the setting to a call.
+# A function from the horizon (s) and the setting to a call.
 Maker = Callable[[float, float], Ready]
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A solver in a benchmark, ours or a peer, with a setting that trades time for accuracy."""
+    """A solver in a benchmark, ours or third-party; its setting trades time for accuracy."""
 
     name: str
-    setting: str  # what is varied: tolerance, steps, none
-    package: str = field(default="", kw_only=True)  # that it needs; empty for our own
+    setting: str  # quantity that is varied: "tolerance", "steps" or "none"
+    package: str = field(default="", kw_only=True)  # package that the solver needs; empty for ours
 
     @property
     def is_installed(self) -> bool:
-        """Whether its package is there."""
+        """Return whether the package that the contender needs is installed."""
         return not self.package or find_spec(self.package) is not None
 
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender that finds omega(T) of one scene, and its attitude."""
+    """A contender that computes omega(T) of one scene, and its attitude if requested."""
 
-    # From the scene to a `Maker`; all that can be done beforehand, compiling included.
+    # Returns a `Maker` for a scene. All preparation takes place here, including compilation.
     prepare: Callable[[Scene], Maker]
-    settings: tuple[float, ...] = ()  # of a fixed step none: the numbers follow from the scene
-    order: int = 0  # of a method of a fixed step
-    attitude: bool = False  # whether it carries that of a scene that has one
-    velocity: bool = True  # whether it takes a scene that has none
+    settings: tuple[float, ...] = ()  # empty for a fixed step: the scene determines the steps
+    order: int = 0  # of a method with a fixed step
+    attitude: bool = False  # whether the contender propagates the attitude of a scene
+    velocity: bool = True  # whether the contender takes a scene without an attitude
 
 
 def own() -> list[SceneContender]:
-    """Return our methods and the three programs, original and corrected."""
+    """Return our methods and the three programs, each program original and corrected."""
     both = partial(SceneContender, attitude=True)
     found = [
         both("auto", "tolerance", partial(_prepared, "auto"), TOLERANCES),
@@ -72,7 +73,10 @@ def own() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Refuse what SciPy would replace by 100 eps with a warning, and LSODA calls illegal."""
+    """Raise InputError if a tolerance is below 100 eps, the smallest that SciPy and LSODA accept.
+
+    SciPy would replace a smaller tolerance by 100 eps with a warning. LSODA calls it illegal.
+    """
     limit = 100 * 2.0**-52
     if setting < limit:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")

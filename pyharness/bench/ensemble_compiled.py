@@ -1,4 +1,4 @@
-"""The peers of `bench --ensemble` that are compiled at the first call: numba, JAX, diffrax."""
+"""Third-party contenders of `bench --ensemble` compiled at the first call: numba, JAX, diffrax."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -10,11 +10,11 @@ import numpy as np
 from pyharness.bench.ensemble_contenders import HORIZON, EnsembleLoad, coefficients
 from pyharness.model.trajectory import Array
 
-LANES = 64  # of a block
+LANES = 64  # bodies in a block
 
 
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
-    """Call `solve` for blocks of bodies: in turn, or dealt out to threads."""
+    """Call `solve` for blocks of bodies, one after another or distributed over threads."""
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
         for piece in pieces:
@@ -27,7 +27,10 @@ def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int)
 def numba_rk4(
     in_blocks: bool, load: EnsembleLoad, setting: float, threads: int
 ) -> Callable[[], Array]:
-    """Take steps of a block of bodies, a loop over its lanes within each; or body by body."""
+    """Return a function that runs RK4 compiled by numba, for blocks of bodies or body by body.
+
+    In a block, each step is a loop over the bodies of the block.
+    """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies
     starts, torques = load.omega0, load.acceleration
@@ -73,7 +76,8 @@ def _numba_kernels() -> tuple[Any, Any]:
             z + sixth * (z1 + 2.0 * (z2 + z3) + z4),
         )
 
-    # A product and a sum may become one operation, as in ours; nothing else may change.
+    # A product and a sum may be contracted into one operation, as in our kernels. No other change
+    # of the arithmetic is allowed.
     step = numba.njit(inline="always", fastmath={"contract"})(step)
 
     def blocks(
@@ -113,7 +117,7 @@ def _numba_kernels() -> tuple[Any, Any]:
 
 
 def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Take steps of arrays of all bodies, one an unknown, in a loop that JAX compiles."""
+    """Return a function that runs RK4 compiled by JAX, on an array of all bodies per unknown."""
     compiled, jnp = _jax_steps()
     steps = round(setting)
     given = [tuple(jnp.array(each) for each in rows.T) for rows in (load.omega0, load.acceleration)]
@@ -147,7 +151,7 @@ def _jax_steps() -> tuple[Any, Any]:
 
 
 def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Let Dopri8 choose the steps, each body its own."""
+    """Return a function that runs diffrax's Dopri8, with steps chosen separately for each body."""
     compiled, jnp = _diffrax_solve()
     given = jnp.array(load.omega0), jnp.array(load.acceleration), setting
     return lambda: np.asarray(compiled(*given))
@@ -175,7 +179,7 @@ def _diffrax_solve() -> tuple[Any, Any]:
 
 
 def _jax() -> tuple[Any, Any]:
-    """Return JAX, computing in binary64, and its arrays."""
+    """Return JAX, set to compute in binary64, and its module of arrays."""
     import jax
     import jax.numpy as jnp
 

@@ -1,4 +1,4 @@
-"""Who takes part in `bench --ensemble`, what all are given, and our own part in it."""
+"""Contenders of `bench --ensemble`: the problem that they all solve, and our own methods."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,19 +14,19 @@ from pyharness.truth.reference import exact_coefficients
 
 MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2
 HORIZON = 3.0  # s
-SAMPLE = 200  # bodies whose error is found
+SAMPLE = 200  # bodies whose error is measured
 _FASTEST = 2.0  # rad/s, about each axis
 _HARDEST = 1.0  # rad/s2, about each axis
 
 
 def coefficients() -> list[float]:
-    """Return A, B, C of the body."""
+    """Return the Euler coefficients A, B and C of the body."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 
 @dataclass(frozen=True, eq=False)
 class EnsembleLoad:
-    """Bodies of one kind, each with its start and its torque."""
+    """Bodies with the same moments, each with its own initial omega and its own torque."""
 
     name: str
     omega0: Array  # (n, 3), rad/s
@@ -34,29 +34,29 @@ class EnsembleLoad:
 
     @property
     def n(self) -> int:
-        """How many bodies."""
+        """Return the number of bodies."""
         return len(self.omega0)
 
     @property
     def scene(self) -> Scene:
-        """The body without start and torque of its own."""
+        """Return the scene that all bodies share, at rest and without torque."""
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
     def acceleration(self) -> Array:
-        """Torque over moment, (n, 3), rad/s2."""
+        """Return the torque divided by the moments, shape (n, 3), in rad/s2."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
         found: Array = self.torque / np.array(MOMENTS)
         return found
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return some of the bodies."""
+        """Return a load of the bodies with these indices."""
         torque = None if self.torque is None else np.ascontiguousarray(self.torque[rows])
         return replace(self, omega0=np.ascontiguousarray(self.omega0[rows]), torque=torque)
 
     def ends(self) -> Array:
-        """Return omega of each body at the horizon, one by one and as good as can be."""
+        """Return omega of each body at the horizon, solved one by one at tolerance 1e-15."""
         found = np.empty_like(self.omega0)
         for i, start in enumerate(self.omega0.tolist()):
             law = TorqueLaw() if self.torque is None else TorqueLaw(self.torque[i].tolist())
@@ -65,22 +65,23 @@ class EnsembleLoad:
         return found
 
 
-# From bodies, setting and threads to a call that returns omega at the horizon, (n, 3).
+# A function from the bodies, the setting and the number of threads to a call. The call returns
+# omega at the horizon, shape (n, 3).
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender that finds the ends of many bodies."""
+    """A contender that computes omega of many bodies at the horizon."""
 
-    prepare: EnsembleMaker  # compiling may be left to the first call
-    # On how many threads it runs; 0 for all that its package takes.
+    prepare: EnsembleMaker  # compilation may be left to the first call
+    # Numbers of threads to measure with; 0 means as many as the package uses.
     threads: tuple[int, ...] = (1, 2)
-    torque_free: bool = False  # whether it takes no torque
+    torque_free: bool = False  # whether it solves only bodies without torque
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
-    """Return n bodies without torque, and the same with a torque of each."""
+    """Return a load of n bodies without torque, and a load of the same bodies with torques."""
     source = np.random.default_rng([ord(letter) for letter in f"ensemble/{seed}"])
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)
@@ -91,7 +92,7 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return ours."""
+    """Return our own contenders."""
     return [
         EnsembleContender("closed-form", "none", _own("closed-form"), torque_free=True),
         EnsembleContender("taylor", "tolerance", _own("taylor")),
@@ -101,7 +102,7 @@ def own_ensembles() -> list[EnsembleContender]:
 
 def _own(method: str) -> EnsembleMaker:
     def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-        # Results go where those of the call before went.
+        # Each call writes its results into the arrays of the previous call.
         tolerance = setting if method == "taylor" else None
         step = HORIZON / setting if method == "rk4" else None
         kept = None

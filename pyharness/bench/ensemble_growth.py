@@ -1,4 +1,4 @@
-"""How the cost of a body falls as there are more of them, and what memory a call takes."""
+"""Cost per body against the number of bodies in a call, and the memory that a call takes."""
 
 import subprocess
 import sys
@@ -24,29 +24,32 @@ _BATCH, _ROUNDS = 0.02, 5
 
 @dataclass(frozen=True)
 class Size:
-    """What a call for so many bodies takes on one core, by method."""
+    """Time per body of a call with this number of bodies on one core, by method."""
 
     bodies: int
-    seconds: dict[str, float]  # of a body
+    seconds: dict[str, float]  # s per body, by method
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What a process needed beyond what it had, bytes."""
+    """Memory that a process needed for a call, beyond what it had before (bytes)."""
 
     method: str
     bodies: int
-    arrays: int  # starts, torques, results
-    peak: int | None  # with them; None where the system does not tell
+    arrays: int  # initial omegas, torques, results
+    peak: int | None  # including the arrays; None where the system does not report it
 
     @property
     def ratio(self) -> float | None:
-        """Peak over arrays."""
+        """Return the ratio of the peak to the arrays."""
         return None if self.peak is None else self.peak / self.arrays
 
 
 def sizes(seed: str, most: int, say: Callable[[str], None] = lambda _: None) -> list[Size]:
-    """Measure calls for 1, 10, ... bodies, `most` at most: without torque the closed form."""
+    """Measure calls with 1, 10, ... up to `most` bodies.
+
+    The closed form is measured without torque, the other methods with torque.
+    """
     free, pushed = draw(seed, most)
     found, n = [], 1
     while n <= most:
@@ -63,13 +66,16 @@ def sizes(seed: str, most: int, say: Callable[[str], None] = lambda _: None) -> 
 
 
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
-    """Return a call of a solver made beforehand, which has the closed form alone."""
+    """Return a function that calls a prepared solver, which uses the closed form only."""
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
 
 
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
-    """Measure what a call takes, each in a process of its own: peaks do not fall again."""
+    """Measure the memory of a call for each method.
+
+    Each method runs in a separate process, because the peak memory of a process never decreases.
+    """
     found = []
     for method in own_ensembles() if methods is None else methods:
         command = f"from pyharness.bench.ensemble_growth import needed; needed({method.name!r}, "
@@ -85,7 +91,7 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the bytes of arrays in and out, and the growth of this process up to its peak."""
+    """Print the bytes of the arrays in and out, and the growth of this process to its peak."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()
@@ -96,13 +102,13 @@ def needed(method: str, bodies: int) -> None:
         source.random(out=array)
     many = EnsembleLoad("memory", given[0], None if own.torque_free else given[1])
     omega = own.prepare(many, SETTINGS[method], 1)()
-    statuses = bodies  # a byte each
+    statuses = bodies  # one byte each
     arrays = sum(each.nbytes for each in given) + omega.nbytes + statuses
     print(arrays, _resident("VmHWM") - before)
 
 
 def _resident(name: str) -> int:
-    """Return what Linux tells of this process (bytes); 0 on other systems."""
+    """Return an entry of Linux's status of this process (bytes); 0 on other systems."""
     try:
         with open("/proc/self/status", encoding="ascii") as file:
             for line in file:

@@ -1,9 +1,9 @@
-"""Rates of ensembles: bodies a second at an error, and steps of RK4 a second.
+"""Rates of ensembles: bodies per second at a target error, and steps of RK4 per second.
 
-Each contender gets the coarsest setting whose error is at most the target, on a sample, and then
-as many bodies as it can do in a part of a second. All are called in turn, in rounds, and the
-shortest time of a call counts, as what else the machine does can only lengthen it: on one core in
-the processor's time.
+Each contender gets the coarsest setting whose error on a sample is at most the target. It then gets
+as many bodies as it can integrate in a fraction of a second. All contenders are called in turn, in
+rounds. The shortest time of a call counts, because other work of the machine can only lengthen it.
+Calls on one core are timed in processor time.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -24,74 +24,76 @@ from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 
 TARGETS = (1e-6, 1e-12)
-STEPS = 300  # of RK4, where steps a second are asked for
+STEPS = 300  # of RK4, where the rate is in steps per second
 ROUNDS = 9
-# s; who takes less gets more bodies, and so does who is much faster with more, up to the second.
+# Durations of a call (s). A call shorter than the first gets more bodies. A call shorter than the
+# second also does, as long as its rate has grown by more than half.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
-_BATCH = 0.02  # s; of calls in a round
+_BATCH = 0.02  # s; duration of the calls in a round
 _MOST_STEPS = 1 << 14
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Rate:
-    """What a contender did."""
+    """The measured rate of one contender on one task."""
 
     load: str
-    target: float | None  # error asked for; None where the steps were given
+    target: float | None  # requested error; None where the steps were prescribed
     method: str
-    threads: int  # 0: as many as its package takes
+    threads: int  # 0 means as many as the package uses
     setting: float | None
-    bodies: int  # of a call
+    bodies: int  # in a call
     seconds: float  # the shortest time of a call
-    error: float  # largest of the sample
+    error: float  # largest error in the sample
 
     @property
     def bodies_a_second(self) -> float:
-        """Bodies brought to the horizon, 1/s."""
+        """Return the number of bodies integrated to the horizon per second."""
         return self.bodies / self.seconds
 
     @property
     def rate(self) -> float:
-        """Bodies a second, or steps of bodies where the steps were given."""
+        """Return bodies per second, or body-steps per second if the steps were prescribed."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
 @dataclass(frozen=True)
 class Rates:
-    """What a run found."""
+    """All rates that a run measured, and the contenders that were refused."""
 
     seed: str
     bodies: int
     rows: list[Rate] = field(default_factory=list)
-    refused: list[tuple[str, str, str]] = field(default_factory=list)  # where, who, why
+    refused: list[tuple[str, str, str]] = field(default_factory=list)  # (task, contender, reason)
 
 
 @dataclass(frozen=True, eq=False)
 class _Task:
     """Bodies to be solved to a target error, or in `STEPS` steps of RK4 where there is no target.
 
-    The error is that of a sample: the first bodies, which are as random as any.
+    The error is measured on a sample. The sample consists of the first bodies, which are as random
+    as the others.
     """
 
     load: EnsembleLoad
     target: float | None
     sample: EnsembleLoad
-    ends: Array  # of the sample, (n, 3)
+    ends: Array  # omega of the sample at the horizon, (n, 3)
 
     @property
     def place(self) -> str:
-        """The task in words."""
+        """Return a description of the task."""
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Whether the task is one for a contender."""
+        """Return whether a contender can do the task."""
         torque = self.load.torque is not None and each.torque_free
         return not torque and (self.target is not None or each.setting == "steps")
 
     def error(self, omega: Array) -> float:
-        """Return the largest error, each over the body's largest omega at start and end."""
+        """Return the largest error, each relative to the body's largest omega at start and end."""
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
         sizes = np.maximum(np.abs(ends).max(axis=1), np.abs(starts).max(axis=1))
@@ -99,7 +101,7 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting with at most the target error; None where there is none."""
+        """Return the coarsest setting that reaches the target error, or None if no setting does."""
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):
@@ -118,7 +120,10 @@ def measure_ensembles(
     seed: str,
     say: Say = lambda _: None,
 ) -> Rates:
-    """Measure all on all loads, to all errors; RK4 on the last load, in `STEPS` steps too."""
+    """Measure all contenders on all loads, at all target errors.
+
+    On the last load, RK4 is also measured in `STEPS` steps.
+    """
     found = Rates(seed, loads[0].n)
     for load in loads:
         sample = load.part(slice(0, SAMPLE))
@@ -158,7 +163,8 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
     if each.setting == "none":
         yield 1.0
     elif each.setting == "tolerance":
-        # Nobody's estimate is a hundred times too large, nor a thousand times too small.
+        # No contender's error is below a hundredth of its tolerance, nor above a thousand times its
+        # tolerance.
         for digits in range(-2, 4):
             if target * 10.0**-digits >= FINEST:
                 yield float(f"{target * 10.0**-digits:.0e}")
@@ -172,12 +178,15 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return so many bodies that a call is long enough to be timed, all where they are few."""
+    """Return as many bodies as make a call long enough to be timed, and the call.
+
+    All bodies are returned if they are too few for that.
+    """
     n, before = min(load.n, 64), 0.0
     while True:
         part = load.part(slice(0, n))
         run = prepare(part, setting, threads)
-        run()  # what is compiled
+        run()  # the first call may compile
         taken = batch_seconds(run, clock=clock_of(threads))
         if n == load.n or taken > (_LONG_CALL if n / taken > 1.5 * before else _CALL):
             return part, run
@@ -185,5 +194,5 @@ def _enough(
 
 
 def clock_of(threads: int) -> Clock:
-    """Return what a call is timed by: the processor's time on one core, else that on the wall."""
+    """Return the clock for a call: processor time on one core, wall-clock time on several."""
     return process_time if threads == 1 else perf_counter

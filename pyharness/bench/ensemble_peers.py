@@ -1,4 +1,4 @@
-"""Other people's ways to the ends of many bodies: NumPy, SciPy and heyoka; all of them, listed."""
+"""Third-party contenders of `bench --ensemble`: NumPy, SciPy and heyoka, and the list of all."""
 
 from collections.abc import Callable
 from functools import cache, partial
@@ -16,11 +16,11 @@ from pyharness.bench.ensemble_contenders import (
 )
 from pyharness.model.trajectory import Array
 
-_BLOCK = 4096  # bodies whose arrays stay near the processor
+_BLOCK = 4096  # bodies whose arrays fit into the cache
 
 
 def ensemble_peers() -> list[EnsembleContender]:
-    """Return all peers, installed or not."""
+    """Return all third-party contenders, installed or not."""
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     return [
@@ -36,7 +36,7 @@ def ensemble_peers() -> list[EnsembleContender]:
 
 
 def _heyoka_batch(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """One integrator, whose state and torque are set for each batch."""
+    """Return a function that runs one heyoka integrator, with state and torque set per batch."""
     import heyoka
 
     size = heyoka.recommended_simd_size()
@@ -98,14 +98,17 @@ def _integrator(with_torque: bool, tolerance: float, size: int) -> Any:
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return arrays of (3, size), the last filled up with its last body."""
+    """Return the rows as batches, shape (batches, 3, size).
+
+    The last batch is padded with copies of the last body.
+    """
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
     return np.ascontiguousarray(filled.reshape(-1, size, 3).transpose(0, 2, 1))
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Arrays of a block of bodies for each unknown."""
+    """Return a function that runs RK4 in NumPy, on an array of a block of bodies per unknown."""
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
     found = np.empty_like(load.omega0)
@@ -145,7 +148,7 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """One body after the other, plain floats in the right-hand side."""
+    """Return a function that runs `solve_ivp` for one body after another, on floats, not arrays."""
     from scipy.integrate import solve_ivp
 
     refuse_rounding("solve_ivp", setting)

@@ -1,4 +1,4 @@
-"""The report of `bench --ensemble`: rates at an error, growth with the number, memory."""
+"""The report of `bench --ensemble`: rates at a target error, cost against ensemble size, memory."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -27,7 +27,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """What a run found."""
+    """The results of one run of `bench --ensemble`."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -35,7 +35,7 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Report a table for each load and error, then growth and memory."""
+    """Return the report: a table for each load and target error, then cost per body and memory."""
     return measured_report(
         "## Ensembles",
         _DRIFT,
@@ -50,9 +50,9 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return the best rate of ours among such rows, with as many threads, over a row's own.
+    """Return our best rate on the same task and number of threads, divided by the rate of `row`.
 
-    What takes all cores is held against ours on the most threads.
+    A contender that takes all cores is compared with our rate on the most threads.
     """
     ours = [each for each in rows if each.method in _STYLES]
     threads = row.threads or max((each.threads for each in ours), default=0)
@@ -152,7 +152,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Draw the time of a body over how many there are."""
+    """Draw the time per body against the number of bodies."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

@@ -1,7 +1,7 @@
-"""How errors grow with time: the Taylor method against the closed form, up to 1e5 s.
+"""Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-The yardstick is the closed form's own conditioning: a relative change of time, or of any rate, by
-one rounding (2**-53) turns the solution by 2**-53 t |omega'|, whatever the method.
+The errors are compared with the conditioning of the closed form. A relative change of time, or of
+any rate, by one rounding (2**-53) changes the solution by 2**-53 t |omega'|, whatever the method.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,12 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """Error at one time (s)."""
+    """The error of the Taylor method at one time (s), and the conditioning there."""
 
     time: float
-    # Largest difference of the Taylor method from the closed form over `_STARTS` starts of the same
-    # motion, relative to the largest angular velocity; what one rounding of the time changes.
+    # Both are relative to the largest angular velocity. `error` is the largest difference between
+    # the Taylor method and the closed form, over `_STARTS` initial states of the same motion.
+    # `conditioning` is the change caused by one rounding of the time.
     error: float
     conditioning: float
     steps: int  # of the Taylor method in one run
@@ -34,16 +35,16 @@ class Growth:
 def growth(
     scene: Scene, horizons: Sequence[float] = HORIZONS, tolerance: float = 1e-15
 ) -> list[Growth]:
-    """Measure the growth of the error of the Taylor method at times (s) of a torque-free body.
+    """Measure the error of the Taylor method at several times (s) of a torque-free motion.
 
-    InputError where the scene has no closed form.
+    Raise InputError if the scene has no closed form.
     """
     if closed_form(scene) is None:
         raise InputError("growth: the scene has no closed form to be held against")
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()
-    # Of one motion, so that no lucky phase decides.
+    # Several starts of one motion, so that the result does not depend on a favourable phase.
     omega = np.array(scene.omega)
     starts = np.array([exact(omega, 0.37 * k).copy() for k in range(_STARTS)])
     found = []

@@ -1,9 +1,9 @@
-"""The benchmark: run time against error, ours and other people's, in one process and one run.
+"""The benchmark: run time against error, of our and third-party methods, in one process and run.
 
-Every contender is called with a ladder of settings, each call from time 0 to T: to omega, and of a
-scene with an attitude to both. First all are made, called once and judged against the reference;
-then they are timed in rounds, a batch of each in turn, so that what else the machine does hits all
-alike. The median counts.
+Every contender is called with a ladder of settings. Each call integrates omega from time 0 to T,
+and also the attitude if the scene has one. All calls are first prepared, made once, and compared
+with the reference. They are then timed in rounds, one batch of each in turn, so that other work of
+the machine affects all alike. The median time counts.
 """
 
 import math
@@ -27,11 +27,11 @@ from pyharness.truth.reference import Reference, reference
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 HORIZON, LONG_HORIZON = 3.0, 100.0
 _CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
-# With attitude; in Case 6 the reference would need too many steps.
+# Cases with attitude. For long times Case 6 is omitted: the reference would need too many steps.
 _TURNING_CASES, _LONG_TURNING_CASES = (1, *_CASES), (1, 2, 3, 4, 5, 7)
 
 _LONGEST_CALL = 1.0  # s
-# Seconds for the first calls of a contender in one case, by what is varied.
+# Time (s) for the first calls of a contender in one case, by the quantity that is varied.
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
 _LARGEST_STEPS = 1 << 22
 _FAILURES = 12
@@ -41,12 +41,13 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 
 @dataclass(frozen=True)
 class Workload:
-    """A scene and how far to go."""
+    """A scene and the time up to which it is integrated."""
 
-    label: str  # `5` for Case 5 to T = 3, `3L` for Case 3 to T = 100; of a random scene its number
+    label: str  # `5`: Case 5 to T = 3; `3L`: Case 3 to T = 100; the number of a random scene
     scene: Scene
     horizon: float  # T, s
-    # Of a random scene: its kinds, the solution, growth of small differences, turns of the body.
+    # For a random scene only: its kinds, its solution, the error amplification, and the revolutions
+    # of the body.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
@@ -54,12 +55,12 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """What it is called in a sentence."""
+        """Return the name of the workload in a sentence."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
-        """What its ratios are averaged with."""
+        """Return the name of the group in which the ratios of the workload are averaged."""
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
         return f"{'torque-free' if self.scene.torque.is_zero else 'torque'}, T = {self.horizon:g}"
@@ -67,23 +68,23 @@ class Workload:
 
 @dataclass(frozen=True)
 class Row:
-    """A contender with one setting."""
+    """The result of a contender with one setting."""
 
     workload: Workload
     method: str  # name of the contender
-    kind: str  # what the setting is: tolerance, steps, none
+    kind: str  # quantity that is varied: "tolerance", "steps" or "none"
     setting: float | None
-    seconds: float | None  # median time of a call; None where it failed
-    # Of omega at T, over the largest component there, or the attitude's (rad) where it is larger;
-    # None where it failed.
+    seconds: float | None  # median time of a call; None if the call failed
+    # Error of omega at T, relative to the largest component there, or the error of the attitude
+    # (rad) if that is larger. None if the call failed.
     error: float | None
-    evaluations: int | None  # right-hand sides of a call, where they can be counted
-    note: str = ""  # why it failed
+    evaluations: int | None  # number of right-hand sides in a call, where it can be counted
+    note: str = ""  # why the call failed
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A setting that was not run, or a contender that was not (setting None), and why."""
+    """A setting that was not run, or a contender (setting None) that was not, and the reason."""
 
     workload: Workload
     method: str
@@ -93,26 +94,27 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a run of the benchmark found."""
+    """The results of one run of the benchmark."""
 
     workloads: list[Workload]
     rows: list[Row]
     refused: list[Refusal]
     preparation: dict[tuple[int | str, str], float]  # s, by (case or random scene, method)
-    doubt: dict[str, float]  # error that the reference may have, as that of a row, by label
+    doubt: dict[str, float]  # by label: error bound of the reference, measured like `Row.error`
 
     @property
     def attitude(self) -> bool:
-        """Whether the attitude was asked for."""
+        """Return whether the attitude was requested."""
         return any(load.scene.attitude is not None for load in self.workloads)
 
 
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return what is integrated: Cases 2 to 7, Cases 3 and 4 also for long; or what is asked.
+    """Return the workloads: by default Cases 2 to 7, with Cases 3 and 4 also for a long time.
 
-    With `attitude` all cases, from the axes of space, and for long all but Case 6.
+    With `attitude` they are all cases, starting from the axes of space, and all but Case 6 for a
+    long time. `case` and `horizon` (s) select other workloads.
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -132,7 +134,7 @@ def measure(
     contenders: Sequence[SceneContender],
     say: Callable[[str], None] = lambda _: None,
 ) -> Finding:
-    """Run the benchmark; `say` is told how far it is."""
+    """Run the benchmark; `say` receives messages about the progress."""
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
     for number, load in enumerate(loads, 1):
@@ -147,14 +149,14 @@ def measure(
         found.doubt[load.label] = max(truth.estimate / size, truth.angle_estimate)
         entries: list[tuple[Ready, Row]] = []
         if load.kinds:
-            makers.clear()  # no random scene comes twice
+            makers.clear()  # no random scene occurs twice
         for contender in contenders:
             if load.scene.attitude is not None and not contender.attitude:
                 found.refused.append(Refusal(load, contender.name, None, "carries no attitude"))
                 continue
             tell(contender.name)
             key = (load.scene.case or load.label, contender.name)
-            # Compiled code is kept for the same scene with another horizon.
+            # The same compiled code serves all horizons of a scene.
             begin = perf_counter()
             try:
                 if key not in makers:
@@ -175,26 +177,29 @@ def measure(
 
 
 def error_of(end: End, truth: Reference) -> float | None:
-    """Return the relative error of omega, or the attitude's (rad) where it is larger; None if none.
+    """Return the relative error of omega, or the error of the attitude (rad) if that is larger.
 
-    Of a truth with an attitude both count, and who has none has no error.
+    If `truth` has an attitude, both errors count. Return None if the result is not finite, or if
+    the attitude is missing.
     """
     error = relative_error(end.omega, truth)
     if error is None or truth.attitude is None:
         return error
     if end.attitude is None or not np.isfinite(end.attitude).all() or not end.attitude.any():
         return None
-    # Whatever its length, which integrators do not keep; scaled first, for its square is a number.
+    # Normalise, because integrators do not preserve the norm. Scale first, so that the squares in
+    # the norm neither overflow nor underflow.
     attitude = end.attitude / np.abs(end.attitude).max()
     attitude /= np.linalg.norm(attitude)
     return max(error, float(angle_between(attitude[None], truth.attitude)[0]))
 
 
 def relative_error(omega: Array, truth: Reference) -> float | None:
-    """Return the largest error of omega over the largest component of the truth; None if none."""
+    """Return the largest error of omega, relative to its largest component; None if not finite."""
     if len(truth.omega) == 0:
         return None
-    # Near the truth the difference is exact: what the reference has beyond binary64 then counts.
+    # Near the true solution this subtraction is exact. The digits of the reference beyond binary64
+    # then matter.
     difference = omega - truth.omega[0]
     if truth.remainder is not None:
         difference -= truth.remainder[0]
@@ -204,17 +209,20 @@ def relative_error(omega: Array, truth: Reference) -> float | None:
 
 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
-    """Yield settings from coarse to fine; numbers of steps by factors of 3/2 and 4/3."""
+    """Yield settings from coarse to fine; numbers of steps grow by factors of 3/2 and 4/3.
+
+    For methods of order 2 or less, numbers of steps grow by factors of 2.
+    """
     if contender.settings:
         yield from contender.settings
         return
-    # A step for 16 radians of the first motion is too few for anyone. A fast torque does not
-    # count: it may be too faint to need its own steps.
+    # No method can take a step of 16 radians of the initial rotation. The frequencies of the torque
+    # do not count, since a fast torque may be too weak to need steps of its own.
     phase = max(map(abs, scene.omega)) * horizon / 16.0
     steps = 1 << max(1, math.ceil(math.log2(max(1.0, phase))))
     while steps <= _LARGEST_STEPS:
         yield float(steps)
-        # A low order needs many steps: coarser rungs find its place as well.
+        # A method of low order needs many steps, and factors of 2 resolve its error well enough.
         if contender.order > 2:
             yield float(steps * 3 // 2)
         steps *= 2
@@ -223,13 +231,13 @@ def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[
 def _first_calls(
     load: Workload, contender: SceneContender, make: Maker, truth: Reference, refused: list[Refusal]
 ) -> tuple[list[tuple[Ready, Row]], float]:
-    """Return what will be timed, and the seconds that making and first calls took beyond it."""
+    """Return the calls to be timed, and the time (s) that preparing them took beyond the calls."""
     entries: list[tuple[Ready, Row]] = []
     errors: list[float | None] = []
     spent = preparing = last = before = 0.0
     for setting in ladder(contender, load.scene, load.horizon):
         named = None if contender.setting == "none" else setting
-        # Bounded: one call may have been interrupted.
+        # The factor is bounded, because an interruption may have lengthened one of the two calls.
         expected = last * min(4.0, max(1.0, last / before)) if before else last
         hopeless = ""
         if expected > _LONGEST_CALL or spent + expected > _BUDGET[contender.setting]:
@@ -274,6 +282,6 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Whether smaller steps no longer help: three times in a row nothing was gained."""
+    """Return whether smaller steps no longer help: the last three errors brought no improvement."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

@@ -1,4 +1,4 @@
-"""Orekit's closed form without torque, `TorqueFree`, in a Java machine in this process."""
+"""Orekit's closed form of torque-free motion, `TorqueFree`, in a Java machine in this process."""
 
 from importlib import import_module
 from time import perf_counter
@@ -11,12 +11,13 @@ from pyharness.compare.candidates import End, Ready
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
-# s, of calls before the first that counts: Java compiles what runs often, while it runs.
+# Time (s) of the calls before the first one that counts. Java compiles frequently run code while it
+# runs.
 WARMING = 2.0
 
 
 def orekit(scene: Scene) -> Maker:
-    """Return calls that each make the motion from its start, elliptic integrals and all."""
+    """Return a `Maker` of calls; each sets up the motion anew, with its elliptic integrals."""
     if not scene.torque.is_zero or scene.moments is None:
         raise InputError("TorqueFree does not take this scene; allowed: moments, and no torque")
     jpype = _machine()
@@ -25,7 +26,7 @@ def orekit(scene: Scene) -> Maker:
         vector = named("org.hipparchus.geometry.euclidean.threed.Vector3D")
         axis = named("org.orekit.attitudes.InertiaAxis")
         motion = named("org.orekit.attitudes.TorqueFree")
-        # Neither needs Orekit's data: no Earth, no leap seconds.
+        # Neither needs Orekit's data on the Earth or on leap seconds.
         begin = named("org.orekit.time.AbsoluteDate").ARBITRARY_EPOCH
         frame = named("org.orekit.frames.FramesFactory").getGCRF()
         axes = vector.PLUS_I, vector.PLUS_J, vector.PLUS_K
@@ -56,20 +57,20 @@ def orekit(scene: Scene) -> Maker:
 
 
 def _end(found: Any) -> End:
-    # Orekit turns space's vectors into the body's, and Hipparchus by the inverse of a quaternion:
-    # the four numbers are ours.
+    # Orekit's rotation takes vectors from space to the body, and Hipparchus applies the inverse of
+    # a quaternion. The four components therefore agree with our convention.
     q, w = found.getRotation(), found.getSpin()
     attitude = np.array([q.getQ0(), q.getQ1(), q.getQ2(), q.getQ3()])
     return End(np.array([w.getX(), w.getY(), w.getZ()]), attitude=attitude)
 
 
 def _machine() -> Any:
-    """Return JPype with a machine that runs; it can be started once in a process."""
+    """Return JPype with a running Java machine, which can be started once in a process."""
     try:
-        # JPype's types tell only some of its names.
+        # JPype's type hints declare only some of its names.
         jpype, package = map(import_module, ("jpype", "orekit_jpype"))
         if not jpype.isJVMStarted():
-            # The signals stay Python's.
+            # With -Xrs Java leaves the signals to Python.
             package.initVM("-Xrs")
     except (ImportError, OSError, RuntimeError, TypeError, ValueError) as error:
         raise _unable(error) from error

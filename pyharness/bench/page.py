@@ -1,4 +1,4 @@
-"""The report of a measurement: its tables and notes, its page with what made it and where."""
+"""The report of a measurement: its tables and notes, and a page that names command and machine."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -19,10 +19,11 @@ def measured_report(
     packages: Iterable[str],
     command: str,
 ) -> Report:
-    """Report tables, each with its title, and notes.
+    """Return the report of a measurement, made of titled tables and notes.
 
-    `title` is that of the page, with its marks, and `worth` says how far its numbers can be
-    compared. `packages` are those whose versions count; `command` makes the page again.
+    `title` is the heading of the page, with its Markdown marks. `worth` says how far the numbers
+    can be compared. `packages` are the packages whose versions are listed. `command` produces the
+    page again.
     """
     here, built = machine(packages), build()
     versions = [
@@ -56,10 +57,10 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return what came to nothing, given as (who, why, where): a line for each reason and places.
+    """Return a line for each reason why contenders have no result.
 
-    Of the places of one contender the first `most` are named; contenders that fail alike share a
-    line.
+    `reasons` are tuples (contender, reason, place). At most the first `most` places of a contender
+    are named. Contenders with the same reason and the same places share a line.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:

@@ -1,4 +1,4 @@
-"""Other people's integrators in `bench`, each used as its documentation says to be fast."""
+"""Third-party integrators in `bench`, each used in the way that its documentation calls fast."""
 
 import warnings
 from collections.abc import Callable
@@ -19,13 +19,13 @@ _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
 
 def peers() -> list[SceneContender]:
-    """Return all peers, installed or not."""
+    """Return all third-party contenders, installed or not."""
     # 2**-52 is heyoka's default.
     finest = (*TOLERANCES, 2.0**-52)
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> SceneContender:
         settings = finest if name == "heyoka" else TOLERANCES
-        # That one writes to the standard output where it calls a motion stiff.
+        # numbalsoda-dop853 writes to the standard output if it considers a motion stiff.
         attitude = name != "numbalsoda-dop853"
         return SceneContender(
             name, "tolerance", prepare, settings, package=package, attitude=attitude
@@ -53,7 +53,10 @@ def peers() -> list[SceneContender]:
 
 
 def _heyoka(scene: Scene) -> Maker:
-    """One integrator for each tolerance, kept: a call resets its time and state."""
+    """Return a `Maker` of heyoka runs, which keeps one integrator for each tolerance.
+
+    A call resets the time and the state of its integrator.
+    """
     import heyoka
 
     equations = _heyoka_equations(scene)
@@ -95,19 +98,19 @@ def _heyoka_equations(scene: Scene) -> list[tuple[Any, Any]]:
 
 
 def _right_hand_side(scene: Scene) -> RightHandSide:
-    """Return that of omega, or of both, in plain floats."""
+    """Return the right-hand side of omega, or of omega and attitude, in floats."""
     slopes = scene.right_hand_side()
     return slopes if scene.attitude is None else turning(slopes)
 
 
 def _absolute(scene: Scene) -> Any:
-    """Return what a relative tolerance is to be multiplied by: sizes of the unknowns."""
+    """Return the magnitudes of the unknowns, the ratio of absolute to relative tolerance."""
     largest = max(map(abs, scene.omega)) or 1.0
     return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
-    """Integrate from end to end: no dense output, plain floats in the right-hand side."""
+    """Return a `Maker` of `solve_ivp` runs: no dense output, floats in the right-hand side."""
     from scipy.integrate import solve_ivp
 
     slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
@@ -140,7 +143,7 @@ def _odeint(scene: Scene) -> Maker:
         )  # fmt: skip
 
         def read(rows: Any) -> End:
-            # The counts come with an output of their own, which the timed call need not make.
+            # Counting needs an output option which the timed call does not use.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 _, told = run(full_output=True)

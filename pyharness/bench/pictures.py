@@ -1,4 +1,4 @@
-"""The pictures of `bench`: error against time and against right-hand sides; growth of errors."""
+"""The figures of `bench`: error against time and against right-hand sides, and error growth."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pyharness.bench.growth import Growth
 
 _FLOOR = 2.0**-53
-# Told apart without colour: a family by its dashes and width, a member by its marker.
+# The curves can be told apart without colour: families by dashes and line width, members by marker.
 _FAMILIES: dict[str, dict[str, Any]] = {
     "ours": {"linestyle": "-", "linewidth": 1.5, "color": "#1040a0"},
     "gauss": {"linestyle": (0, (6, 1.5)), "linewidth": 0.9, "color": "#3a86c8"},
@@ -23,12 +23,12 @@ _FAMILIES: dict[str, dict[str, Any]] = {
 _MARKERS = "osD^v<>pP*Xhd8"
 _PROGRAMS = ("two-term", "four-term", "runge-kutta")
 _OURS = ("auto", "taylor", "closed-form", "rk4", "improved-euler", "taylor-3")
-# Orders whose slopes are drawn, against right-hand sides.
+# Orders whose slopes are drawn in the plots against right-hand sides.
 _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Draw a row for each workload; `data` has the same numbers."""
+    """Draw a row of plots for each workload; `data` is the table that goes with the figure."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -85,7 +85,7 @@ def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
             family = "program" if name.startswith(_PROGRAMS) else "peer"
         marker = _MARKERS[used[family] % len(_MARKERS)]
         used[family] += 1
-        # Original filled, corrected open; the same for peers and ours.
+        # Markers are filled for our methods and for the programs, open for the others.
         face = _FAMILIES[family]["color"] if family in ("ours", "program") else "white"
         styles[name] = _FAMILIES[family] | {
             "marker": marker, "markersize": 5.0, "markerfacecolor": face, "markeredgewidth": 0.8,
@@ -105,14 +105,17 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def draw_slopes(axes: "Axes") -> None:
-    """Draw how the error of an order falls: a fan in the upper right, where no method belongs."""
+    """Draw reference slopes: the error of methods of some orders against right-hand sides.
+
+    They form a fan in the upper right corner, where no method has its results.
+    """
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3
     for order in _SLOPES:
         end = min(begin * (high / begin) ** 0.7, begin * 10.0 ** (6.0 / order))
         last = 0.5 * (end / begin) ** -order
         axes.plot([begin, end], [0.5, last], color="#909090", linewidth=1.0, zorder=0)
-        # On white, above what might stand there all the same.
+        # A white background covers curves that cross the label nevertheless.
         axes.annotate(
             f"order {order}", (end, last), (0, -2), textcoords="offset points", color="#505050",
             fontsize=8, ha="center", va="top", zorder=5,
@@ -122,7 +125,7 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Draw error over time beside what one rounding of time changes."""
+    """Draw the error against time, beside the change caused by one rounding of the time."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

@@ -1,7 +1,7 @@
-"""Random scenes for `bench`, by kind: what no method was tuned on.
+"""Random scenes for `bench`, by kind; no method was tuned on them.
 
-A seed and a number say which; what the second reference says of the motion decides whether a draw
-counts.
+A seed and a number determine a scene. The second reference, which computes its motion, decides
+whether a draw is accepted.
 """
 
 import math
@@ -24,30 +24,32 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return what `number`, from 1 on, of a seed stands for; its kind of torque is next in turn.
+    """Return the random workload that a seed and a number (from 1) determine.
 
-    Moments in kg m2, omega in rad/s, torque in N m, horizon in s; its `truth` is the second
-    reference's, its `kinds` are of `KINDS`. Drawn again where a small difference grows
-    `MOST_GROWTH` times or more, or the body turns less than once or more than 300 times. With
-    `attitude` it is the same scene, from the axes of space, and has no `truth`: the second
-    reference carries no attitude.
+    Successive numbers take the kinds of torque in turn. Moments are in kg m2, omega in rad/s,
+    torque in N m, the horizon in s. `truth` comes from the second reference, and `kinds` are
+    members of `KINDS`. A scene is drawn again if its error amplification is `MOST_GROWTH` or more.
+    It is also drawn again if the body turns less than once or more than 300 times. With `attitude`
+    the scene is the same, starting from the axes of space. It then has no `truth`, because the
+    second reference does not propagate the attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
     law, place = LAWS[place % len(LAWS)], place // len(LAWS)
-    # Four bodies and three speeds: all pairs come up in twelve.
+    # Four bodies and three speeds: twelve draws contain all pairs.
     body = list(BODIES)[place % len(BODIES)]
     speed = list(SPEEDS)[place % len(SPEEDS)] if law in WAVES else ""
     name = ", ".join(filter(None, (f"{number}: {law}", speed.removesuffix(" waves"), body)))
     while True:
         scene, horizon = by_torque(source, name, law, speed, body)
         try:
-            # Spares the reference what is far beyond; it decides what is near.
+            # This estimate spares the reference the scenes far beyond the limit. The reference
+            # decides on scenes near the limit.
             if conditioning(scene, horizon).amplification > 2.0 * MOST_GROWTH:
                 continue
             path = integer_series(scene, [horizon])
             found = along(scene, path.nodes, path.way)
-        except InputError:  # more steps than the reference takes
+        except InputError:  # too many steps for the reference
             continue
         growth = found.amplification
         turning = np.linalg.norm(path.way, axis=1)

@@ -1,4 +1,4 @@
-"""The reports of `bench`: run time against error, what the plan saves, growth of errors."""
+"""The reports of `bench`: run time against error, savings of the plan, growth of errors."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,11 +31,11 @@ _DRIFT = (
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Report a table for each workload, then the means; of random scenes how ratios spread.
+    """Return the report of a benchmark: a table for each workload, then the mean ratios.
 
-    The page tells the machine as well.
-
-    `packages` are those whose versions count, `command` what makes the page again.
+    For random scenes the report shows the distribution of the ratios instead. The page also
+    describes the machine. `packages` are the packages whose versions are listed. `command` produces
+    the page again.
     """
     drawn, data = _random(finding), _data(finding)
     return measured_report(
@@ -66,7 +66,7 @@ def _spread_data(finding: Finding) -> Table:
 
 
 def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return title and table of every contender at every error."""
+    """Return a title and a table for every contender at every target error."""
     heads = ("mean", "smallest", "25 %", "median", "75 %")
     columns = [
         Column("kind", left=True),
@@ -96,7 +96,7 @@ def _data(finding: Finding) -> Table:
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
-    """Report what each skip of the plan saves."""
+    """Return the report of the time saved by each part of the work that the plan skips."""
     time = digits(".3g", 1e6)
     columns = (
         *words("skipped where"), Column("us with it", time, unit="s", full=time),
@@ -109,7 +109,7 @@ def savings_report(found: Sequence[Saving]) -> Report:
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
-    """Report errors of the Taylor method over time, by case."""
+    """Return the report of the errors of the Taylor method against time, by case."""
     time, error = digits(".3g"), digits(".2g")
     columns = (
         *words("case"), Column("time", time, unit="s", full=time),
@@ -166,7 +166,7 @@ def _asked(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return two or three digits of a time: 0.63, 12, 1234, -."""
+    """Return a time in microseconds, as in 0.63, 12.3 or 1234; "-" if None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6
@@ -174,7 +174,7 @@ def microseconds(seconds: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return three digits of a ratio: 12.3, 0.0123, -; whole numbers from 100 on."""
+    """Return a ratio as in 0.0123, 12.3 or 1234; "-" if None."""
     if value is None:
         return "-"
     if value >= 99.95:
@@ -184,7 +184,7 @@ def ratio(value: float | None) -> str:
 
 
 def _parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return title and table of every workload, and of every mean."""
+    """Return a title and a table for every workload, and for every group of mean ratios."""
     targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]
     for name in targets:
@@ -241,8 +241,9 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return what came to nothing, a line for each reason: by whom, and the first places."""
-    # What a call would take, and where it ended, differs from case to case; the reason does not.
+    """Return a line for each reason why a contender has no result, with the first places."""
+    # Expected times and the steps at which runs ended differ from case to case. They are cut off,
+    # so that equal reasons share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]

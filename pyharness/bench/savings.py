@@ -1,4 +1,4 @@
-"""What each skip of the plan saves: the same result with and without it, timed in one run."""
+"""Time saved by each part that the plan skips, measured with and without the part in one run."""
 
 import subprocess
 import sys
@@ -16,26 +16,26 @@ from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
 
 _BATCHES = 9
-_SECONDS = 2e-3  # of a batch
+_SECONDS = 2e-3  # duration of a batch
 
 
 @dataclass(frozen=True)
 class Saving:
-    """One skip."""
+    """The times of one computation with and without a part that the plan skips."""
 
-    part: str  # what is skipped, as the plan names it
-    where: str  # the scene or program that shows it
-    with_it: float  # s with the part computed, a median of interleaved batches
+    part: str  # the part that is skipped, as the plan names it
+    where: str  # the scene or program on which it is measured
+    with_it: float  # s with the part computed, median of interleaved batches
     without: float
 
     @property
     def ratio(self) -> float:
-        """How many times longer it takes with the part computed."""
+        """Return the ratio of the time with the part to the time without it."""
         return self.with_it / self.without
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Measure every skip; `t_end` in s, `tolerance` relative."""
+    """Measure the saving of every skip; `t_end` in s, `tolerance` relative."""
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
     rows = prepare(constant, "taylor", tolerance)
@@ -69,7 +69,8 @@ def _solver(scene: Scene, method: str, t_end: float, tolerance: float) -> Callab
 
 
 def _as_if_varying(scene: Scene) -> Scene:
-    # A rate too small to move a bit, so that the kernel has to look at the time.
+    # The rate is too small to change a bit, but it forces the kernel to evaluate the torque at each
+    # time.
     return replace(scene, torque=replace(scene.torque, rate=(1e-300, 0.0, 0.0)))
 
 

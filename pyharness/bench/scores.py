@@ -1,4 +1,4 @@
-"""What the rows of a benchmark come to: time to an error, ratios, geometric means."""
+"""Scores of a benchmark: time to reach an error, ratios of times, geometric means."""
 
 import math
 from collections.abc import Sequence
@@ -8,42 +8,42 @@ import numpy as np
 
 from pyharness.bench.measure import TARGETS, Finding, Row, Workload
 
-# The first of these that took part is the one others are measured by.
+# The first of these that took part is the baseline of all ratios.
 YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 
 @dataclass(frozen=True)
 class Score:
-    """A contender on one workload."""
+    """The score of a contender on one workload."""
 
     method: str
-    seconds: tuple[float | None, ...]  # of the fastest setting with an error of each of `TARGETS`
+    seconds: tuple[float | None, ...]  # of the fastest setting that reaches each of `TARGETS`
     best: float | None  # the smallest error of any setting
-    ratios: tuple[float | None, ...]  # time of the yardstick over its own: above 1 it is faster
+    ratios: tuple[float | None, ...]  # time of the baseline over the contender's; above 1 is faster
 
 
 @dataclass(frozen=True)
 class Spread:
-    """The ratios of a contender over the random scenes of a kind, at one error."""
+    """The distribution of a contender's ratios over the random scenes of one kind, at one error."""
 
     method: str
     kind: str
-    target: float  # error of omega at T, over the largest component there
-    scenes: int  # of this kind
-    reached: int  # those in which it and the yardstick reach the error, over which is averaged
-    mean: float | None  # geometric
+    target: float  # error of omega at T, relative to the largest component there
+    scenes: int  # number of scenes of this kind
+    reached: int  # number of scenes in which it and the baseline reach the error
+    mean: float | None  # geometric mean over these scenes
     smallest: float | None
     quartiles: tuple[float | None, float | None, float | None]
 
 
 def yardstick(finding: Finding) -> str | None:
-    """Return the contender that others are measured by; None where nothing was measured."""
+    """Return the name of the baseline contender, or None if nothing was measured."""
     names = list(dict.fromkeys(row.method for row in finding.rows))
     return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
 
 def scores(finding: Finding, load: Workload) -> list[Score]:
-    """Return the contenders of a workload, the yardstick first, the others as they came."""
+    """Return the scores on a workload, the baseline first, the others as measured."""
     rows: dict[str, list[Row]] = {}
     for row in finding.rows:
         if row.workload == load:
@@ -61,7 +61,7 @@ def scores(finding: Finding, load: Workload) -> list[Score]:
 
 
 def groups(finding: Finding) -> dict[str, list[Workload]]:
-    """Return the workloads whose ratios are averaged, by the name of the group."""
+    """Return the workloads whose ratios are averaged together, by the name of the group."""
     found: dict[str, list[Workload]] = {}
     for load in finding.workloads:
         found.setdefault(load.group, []).append(load)
@@ -82,7 +82,7 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
-    """Return all spreads: by contender, the yardstick left out, then by error, then by kind."""
+    """Return all spreads without the baseline, ordered by contender, error and kind."""
     tables = {
         load.label: {each.method: each.ratios for each in scores(finding, load)}
         for load in finding.workloads

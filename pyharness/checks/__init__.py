@@ -1,1 +1,1 @@
-"""Everything that passes or fails: what is compared, within which limit, and what repeats it."""
+"""The checks: each compares a value with a limit, and names the command that repeats it."""

@@ -1,4 +1,7 @@
-"""Fortran against twin: the same bits in every cell, and in scenes drawn at random."""
+"""Checks that the Fortran programs and their Python twins agree bit for bit.
+
+They cover every cell (program, case, defects and readings) and scenes drawn at random.
+"""
 
 from collections.abc import Iterator
 from functools import partial
@@ -17,13 +20,13 @@ from pyharness.original.cells import all_cells, cell_name, listing_name
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.scenes.random_scenes import draw
 
-# Right-hand sides of a step: at the start and at each point of collocation, or at four stages. The
-# step in which a run overflows is counted.
+# Right-hand sides per step: at the start and at each point of collocation, or at four stages. The
+# step in which a run overflows is counted as well.
 _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Hold Fortran against twin in every program, case, subset of defects and reading."""
+    """Compare Fortran with the twin in every program, case, subset of defects and reading."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -40,7 +43,7 @@ def of_cell(suite: str, listing: Listing, case: int) -> Name:
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Hold Fortran against twin in scenes, listings and steps drawn from the seed."""
+    """Compare Fortran with the twin in scenes, listings and steps drawn from the seed."""
     for number in range(chosen.draws):
         yield Attempt(chosen.drawn(number, "program"), partial(_of_draw, chosen.seed, number))
 
@@ -57,7 +60,7 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
     """Return the check that both implementations of a program agree to the last bit.
 
-    A listed divergence that no longer occurs fails, as an unexpected one does.
+    A listed divergence that no longer occurs fails the check, as an unexpected divergence does.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))

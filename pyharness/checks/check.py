@@ -1,4 +1,4 @@
-"""Checks: what is compared with what, whether it passed, and the command that repeats it."""
+"""Checks: what they compare, whether they passed, and the commands that repeat them."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -8,7 +8,8 @@ from typing import Any
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 
-# The note of a check begins so where a method reported that it can't, or would take too long.
+# The note of a check begins with this if a method could not solve the problem, or refused to exceed
+# its work limit.
 REFUSED = "refused: "
 # Suites whose ids name the problem before the method that solves it.
 _CIRCUMSTANCE_FIRST = ("random", "external")
@@ -16,7 +17,7 @@ _CIRCUMSTANCE_FIRST = ("random", "external")
 
 @dataclass(frozen=True)
 class Name:
-    """What a check compares: parts that, joined by slashes, are its id, as in ``cells/two-term``.
+    """The name of a check; its parts, joined by slashes, form the id, as in ``cells/two-term``.
 
     Attributes
     ----------
@@ -29,7 +30,7 @@ class Name:
     command, options : str
         The verb that makes the check, and its options beside ``--only``.
     scene : Scene or None
-        The input, where it is a scene that may be saved.
+        The input, if it is a scene that may be saved.
     """
 
     suite: str
@@ -43,19 +44,19 @@ class Name:
 
     @property
     def id(self) -> str:
-        """The parts that are not empty, joined by slashes; no two checks of a run have the same."""
+        """Return the non-empty parts joined by slashes; ids are unique within a run."""
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
 
     @property
     def place(self) -> str:
-        """The parts after the subject."""
+        """Return the parts after the subject."""
         return "/".join(filter(None, (self.circumstance, self.setting, self.quantity)))
 
     @property
     def replay(self) -> str:
-        """The command that makes this check alone."""
+        """Return the command that makes this check alone."""
         return f"python -m pyharness {self.command} --only {self.id}{self.options}"
 
     def of(self, quantity: str) -> "Name":
@@ -63,50 +64,50 @@ class Name:
         return replace(self, quantity=quantity)
 
     def bounded(self, value: float, limit: float, note: str = "") -> "Check":
-        """Return the check that `value` does not exceed `limit`; NaN does."""
-        # NumPy's numbers come here too, and are no JSON.
+        """Return the check that `value` does not exceed `limit`; NaN fails."""
+        # Values of NumPy's types occur here and can't be written as JSON.
         found, allowed = float(value), float(limit)
         return Check(self, not math.isnan(found) and found <= allowed, found, allowed, note)
 
     def judged(
         self, passed: bool, note: str, value: float | None = None, limit: float | None = None
     ) -> "Check":
-        """Return a check that passed or not for a reason that `note` tells."""
+        """Return a check whose result is decided already; `note` gives the reason."""
         return Check(self, bool(passed), value, limit, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
-        """Return a finding without a bound, which can't fail."""
+        """Return a check without a limit: it describes a value and can't fail."""
         return Check(self, True, None if value is None else float(value), None, note)
 
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison."""
+    """The result of one comparison."""
 
     name: Name
     passed: bool
-    value: float | None  # None where there is no one number
-    limit: float | None  # of `value`; None where the check is yes or no, or only describes
-    note: str = ""  # what is wrong, or what was seen, in a few words
-    again: str = ""  # the command that repeats it, where that is not the one of its name
+    value: float | None  # None if there is no single number
+    limit: float | None  # limit of `value`; None if the check is yes or no, or only describes
+    note: str = ""  # the fault or the observation, in a few words
+    again: str = ""  # the command that repeats the check, if the name's command does not
 
     @property
     def id(self) -> str:
-        """The id of its name."""
+        """Return the id of the check's name."""
         return self.name.id
 
     @property
     def suite(self) -> str:
-        """The suite that it belongs to."""
+        """Return the suite of the check."""
         return self.name.suite
 
     @property
     def replay(self) -> str:
-        """The command that makes this check alone."""
+        """Return the command that makes this check alone."""
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return what JSON tells of it."""
+        """Return the check as a record for JSON."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         return {**head, "replay": self.replay, "note": self.note, **more}
@@ -117,16 +118,19 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a scene drawn at random, with what its limit is made of."""
+    """A check in a scene drawn at random, with the quantities that determine its limit."""
 
-    entrance: str = ""  # how the scene was solved
-    tolerance: float = math.nan  # the requested one
-    growth: float = math.nan  # error amplification: by how much an earlier perturbation grows
+    entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
+    tolerance: float = math.nan  # requested tolerance
+    growth: float = math.nan  # error amplification: norm of the state-transition matrix
 
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """What is computed where a check below `name` is requested: `make` returns checks or parts."""
+    """The computation of the checks whose ids begin with `name`, done on request by `make`.
+
+    `make` takes the name, and returns checks or further attempts.
+    """
 
     name: Name
     make: Callable[[Name], "Check | Iterable[Check | Attempt]"]
@@ -136,7 +140,7 @@ Attempts = Iterable[Check | Attempt]
 
 
 def made(attempts: Attempts, only: Sequence[str]) -> Iterator[Check]:
-    """Compute what `only` requests; a check that is there already is yielded as it is."""
+    """Compute the checks that `only` requests; yield finished checks unchanged."""
     for each in attempts:
         if isinstance(each, Check):
             yield each
@@ -152,9 +156,10 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),
 ) -> Iterator[Check]:
-    """Make the checks requested, suite after suite.
+    """Make the requested checks, suite after suite.
 
-    A refusal that ends a suite fails; in suites `of_the_user` it is a mistake in the user's input.
+    If an InputError ends a suite, that is a failed check. In the suites `of_the_user` the
+    InputError is raised again, because it is a mistake in the user's input.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
@@ -170,22 +175,23 @@ def run_suites(
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return what orders checks: those that failed last, then by their ratio to the limit."""
+    """Return a sort key for checks: failed ones last, then by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf
-    # NaN compares with nothing.
+    # NaN can't be ordered.
     return not check.passed, math.inf if math.isnan(ratio) else ratio
 
 
 def selected(id: str, only: Sequence[str]) -> bool:
-    """Whether a check is requested: all are where nothing is named, else whole leading parts.
+    """Return whether a check is requested; an empty `only` requests all checks.
 
-    ``cells/two-term`` selects ``cells/two-term/case-3``, not ``cells/two-terms``.
+    Names match by whole leading parts: ``cells/two-term`` selects ``cells/two-term/case-3``, but
+    not ``cells/two-terms``.
     """
     return not only or any(id == each or id.startswith(each + "/") for each in only)
 
 
 def may_hold(id: str, only: Sequence[str]) -> bool:
-    """Whether checks below or above `id` are requested: only these are computed."""
+    """Return whether checks below or above `id` are requested; only these are computed."""
     return selected(id, only) or any(each.startswith(id + "/") for each in only)

@@ -1,7 +1,8 @@
-"""The decks, compiled from the author's own cards, against the port: a third, independent path.
+"""Checks of the port against the decks, which are compiled from the author's own cards.
 
-TAPE5 bit for bit and the page as text, in every case; after an overflow, which ends the port, the
-deck goes on and its numbers are not finite.
+The decks are a third, independent path from the cards to the numbers. TAPE5 is compared bit for bit
+and the page as text, in every case. An overflow ends a run of the port. The deck continues after
+it, and its numbers must not be finite.
 """
 
 from collections.abc import Iterator
@@ -27,7 +28,10 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return original and corrected, each defect alone kept and alone mended, each reading."""
+    """Return the listings to check: original, corrected, and those with one difference from either.
+
+    They are each defect alone kept, each defect alone corrected, and each reading in both.
+    """
     names = frozenset(switches(program))
     found = [original(program), corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]
@@ -38,7 +42,10 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Hold every deck against the port; none without a compiler, and `verify` says so."""
+    """Compare every deck with the port; yield nothing if there is no compiler.
+
+    `verify` then reports that the decks were not run.
+    """
     asked = [
         (of_cell("decks", listing, case), listing, case)
         for program in PROGRAMS
@@ -79,7 +86,7 @@ def _held(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Say what is wrong with the records after the port's last."""
+    """Return the faults of the deck's records after the port's last row."""
     rest = deck.tape5[steps:]
     if not overflowed:
         return [f"{len(rest)} records more"] if len(rest) else []

@@ -1,6 +1,7 @@
-"""What the programs themselves make of small disturbances: their steps, probed by running them.
+"""Propagation of small perturbations by a step of each program, measured by running it.
 
-Held against `pyharness.theory.amplification`, which knows the schemes but not the programs.
+The results are compared with `pyharness.theory.amplification`, which uses the schemes but not the
+programs.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,22 +22,23 @@ from pyharness.theory.conditioning import ROUNDING
 from pyharness.theory.rational import Exact
 from pyharness.theory.schemes import Numbers, runge_kutta_punched, spacing
 
-# A step is a polynomial of omega: each product of stages doubles its degree.
+# Degree of a step as a polynomial of omega: each product of stages doubles it.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
-# Roundings on the longest way through a step but for the solving of systems: four stages of a
-# rate and a sum, seven each, and the result.
+# Roundings along the longest chain of operations in a step, without the solution of linear systems.
+# The chain has four stages of a rate and a sum, with seven roundings each, and the result.
 _LONGEST = 40.0
-# Of omega: how far neighbours lie that a derivative is taken from.
+# Largest distance of the neighbours from which a derivative is computed, as a fraction of omega.
 _REACH = 2.0**-2
 _GROWTH_STEPS = 64
-# Sizes of the weights of all points, wherever they lie: largest where points far beyond the
-# step are extrapolated to its beginning, by 2, -1 or by 4, -6, 4, -1.
+# Sums of the absolute weights of the points, as bounds for any position of the points. They are
+# largest where points far beyond the step are extrapolated to its beginning, with the weights 2, -1
+# or 4, -6, 4, -1.
 _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 
 @dataclass(frozen=True)
 class Probe:
-    """What was found, what was derived, and how far rounding may part any two elements of them."""
+    """A measured and a derived array, with a bound on their difference by rounding."""
 
     found: Array
     derived: Array
@@ -44,14 +46,14 @@ class Probe:
 
     @property
     def difference(self) -> float:
-        """Largest difference of an element; NaN where one is not finite."""
+        """Return the largest difference of two elements; NaN if one is not finite."""
         return float(np.abs(self.found - self.derived).max())
 
 
 def held_steady(coefficients: Triple, omega: Triple, step: float) -> Scene:
     """Return the scene in which a constant torque holds a body at a steady omega.
 
-    With few binary digits everywhere the balance is exact, and no rounding disturbs it.
+    If all numbers have few binary digits, the balance is exact and no rounding disturbs it.
     """
     a, b, c = coefficients
     x, y, z = omega
@@ -62,22 +64,22 @@ def held_steady(coefficients: Triple, omega: Triple, step: float) -> Scene:
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
-    """Return step size times the derivatives of equations 13-15, exactly."""
+    """Return the exact Jacobian of equations 13-15, times the step size."""
     a, b, c = (Fraction(each) * Fraction(scene.step_size) for each in scene.euler_coefficients)
     x, y, z = map(Fraction, omega)
     return [[Fraction(0), a * z, a * y], [b * z, Fraction(0), b * x], [c * y, c * x, Fraction(0)]]
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return z of a steady rotation: step size times the eigenvalues."""
+    """Return z of a steady rotation: the eigenvalues of the Jacobian times the step size."""
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Differentiate the first step of a program at a steady rotation.
 
-    The step is a polynomial of known degree, so that differences with enough neighbours have
-    no error but rounding.
+    The step is a polynomial of known degree. Differences with enough neighbours therefore have no
+    error except rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -92,10 +94,10 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
-    """Follow a disturbance of a spinning top through the steps of a scene.
+    """Follow a perturbation of a spinning top through the steps of a scene.
 
-    C and the torque are zero, omega3 the spin and the others the disturbance: the equations are
-    linear, so that no disturbance is too large.
+    C and the torque are zero. omega3 is the spin, and omega1 and omega2 are the perturbation. The
+    equations are then linear, so that the perturbation may be of any size.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -116,7 +118,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 
 
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
-    """Run the twin's step on x' = z x, as in step number `step` of a run of steps of 1 s."""
+    """Run the twin's step on x' = z x, as step number `step` of a run with steps of 1 s."""
     program = listing.program
     moved = _moved(listing, step)
 
@@ -134,16 +136,16 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 
 
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
-    """Find by bisection where the disturbance of a spinning top begins to grow.
+    """Find by bisection where the perturbation of a spinning top begins to grow.
 
-    Where a second vector is kept, growth is that of the change from step to step: beside what
-    stays it would not be seen.
+    If the program keeps a second vector, growth is measured by the change from step to step. The
+    constant part of the result would hide it otherwise.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
 
     def grows(distance: float) -> bool:
-        # Along -1 the disturbance lies on the eigenvector that decays, exactly.
+        # Along -1 the perturbation is exactly the eigenvector that decays.
         second = distance if direction.real else -distance
         start = (1.0, -1.0 if direction.real else 0.0, 1.0)
         scene = Scene(
@@ -168,15 +170,15 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
 
 def _moved(listing: Listing, step: int) -> float:
-    """Return how many steps from its beginning the points of a step are."""
+    """Return the factor by which `dt-accumulates` has moved the points of a step."""
     return float(step) if listing.has("dt-accumulates") else 1.0
 
 
 def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
-    """Differentiate a step of the twin of a collocation program where the body is not steady.
+    """Differentiate a step of a collocation twin at a state that is no steady rotation.
 
-    Its result is omega + h F + h**2/2 J F + w h**3 Q(F), Q the quadratic part of F; only w knows
-    where the points are.
+    The step gives omega + h F + h**2/2 J F + w h**3 Q(F), where Q is the quadratic part of F. Only
+    w depends on the positions of the points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -194,7 +196,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     a, omega = np.array(coefficients), np.array(scene.omega)
 
     def along(direction: Array) -> Array:
-        """Return the derivative of equations 13-15 at `direction`, a matrix."""
+        """Return the Jacobian of equations 13-15 at omega = `direction`."""
         x, y, z = direction
         return np.asarray(a[:, None] * np.array([[0.0, z, y], [z, 0.0, x], [y, x, 0.0]]))
 
@@ -207,7 +209,10 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], omega: Sequence[float], count: int
 ) -> tuple[Array, float, float]:
-    """Return the derivative of a step, how far neighbours lay, how far rounding is amplified."""
+    """Return the derivative of a step, the distance of its neighbours, and a rounding factor.
+
+    The factor tells how far the differences amplify the rounding of a step.
+    """
     base = np.array(omega)
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count
@@ -223,19 +228,20 @@ def _differentiated(
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
-    """Return by how many units of 2**-53 rounding may change each omega in a step.
+    """Return a bound on the rounding error of each omega in a step, in units of 2**-53.
 
-    Every rounding is one of a term that is no larger than with all signs positive.
+    Every rounding belongs to a term that is no larger than the same term with all signs positive.
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
-        # In the original each stage stands on the last one: the larger terms.
+        # Each stage of the original program starts from the previous stage, so that its terms are
+        # larger.
         return _LONGEST * runge_kutta_punched(on, sizes)
     first = on.times_step(on.rate(sizes))
     estimate = sizes + moved * first
     rate = on.times_step(on.rate(estimate))
     _, varying = solver_roundings(program)
-    # The solution of the first system is wrong likewise, and is carried through the rates.
+    # The solution of the first system has a similar error, which the rates propagate.
     wrong = varying * moved * first
     carried = 0.5 * on.times_step(on.rate(estimate + wrong) - on.rate(estimate - wrong))
     weights = _WEIGHTS[program]

@@ -1,4 +1,4 @@
-"""Where fixed steps are too large: foretold by linear stability, and found by running."""
+"""Step sizes at which runs diverge: predicted by linear stability, and found by running."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -18,11 +18,12 @@ _SAMPLES = 20_000
 
 @dataclass(frozen=True)
 class Divergence:
-    """The smallest steps that diverge (s): found, and foretold by linear stability.
+    """The smallest steps that diverge (s): found by running, and predicted by linear stability.
 
-    Found is the smallest with which some omega leaves twice the bound of the solution, or
-    overflows, 0 where the smallest one tried does; foretold the one with which the wobble about
-    axis 3 doubles; `limit` is how far they may be apart, relative to that.
+    `found` is the smallest step with which some omega exceeds twice its bound on the solution, or
+    overflows. It is 0 if this already happens with the smallest step that is tried. `foretold` is
+    the smallest step with which the wobble about axis 3 doubles. `limit` is the largest allowed
+    difference of the two, relative to `foretold`.
     """
 
     found: float
@@ -33,10 +34,11 @@ class Divergence:
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> Divergence:
-    """Compare where runs of a spinning body diverge with where they should.
+    """Compare the step at which runs of a spinning body diverge with the prediction.
 
-    The scene is without torque, and spins about a stable axis 3 for `time` (s); `matrix` is that
-    of the step of the method by which `runner` runs a scene; `smallest` (s) is tried.
+    The scene has no torque, and spins about a stable axis 3 for `time` (s). `runner` runs a scene
+    by a method, and `matrix` is the amplification matrix of its step. `smallest` (s) is the
+    smallest step tried.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -44,14 +46,14 @@ def divergence(
     rate = math.sqrt(-a * b) * spin
     foretold = _doubling(matrix, rate, time, smallest)
     bounds = _bounds(scene, time)
-    # omega3**2 - (C/A) omega1**2 does not change, nor does omega3**2 - (C/B) omega2**2: until
-    # the wobble has doubled, the spin, and the rate with it, change by so much of themselves.
+    # omega3**2 - (C/A) omega1**2 and omega3**2 - (C/B) omega2**2 are constant. Until the wobble has
+    # doubled, they allow the spin, and with it the rate, to change by this fraction at most.
     change = 0.0
     if c:
         wobble = 2.0 * max(bounds[:2])
         change = abs(c) / min(abs(a), abs(b)) * wobble**2 / (2.0 * spin * spin)
     low = _doubling(matrix, rate * (1.0 + change), time, smallest)
-    # A peak between two results may be missed by half the angle of a step.
+    # Between two results, a peak may be missed by half the angle of a step.
     missed = -math.log(math.cos(min(1.5, 0.5 * rate * foretold)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
     limit = max(foretold - low, high - foretold) / foretold + 2.0 * foretold / time
@@ -59,9 +61,10 @@ def divergence(
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
-    """Return the smallest step (s) with which a run leaves twice the solution's bound.
+    """Return the smallest step (s) with which omega exceeds twice the solution's bound.
 
-    By bisection of the number of steps; 0 if `smallest` leaves it too, infinity if none does.
+    The number of steps is found by bisection. Return 0 if `smallest` exceeds the bound too, and
+    infinity if no step does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -83,7 +86,7 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) with which a wobble at `rate` (1/s) doubles, and `missed`."""
+    """Return the smallest step (s) with which a wobble at `rate` (1/s) grows by 2 exp(`missed`)."""
     wanted = math.log(2.0) + missed
 
     def grown(step: float) -> float:
@@ -98,7 +101,7 @@ def _doubling(
 
 
 def _bounds(scene: Scene, time: float) -> Sequence[float]:
-    """Return the largest size of each omega along the solution."""
+    """Return the largest magnitude of each component of omega along the solution."""
     times = np.linspace(0.0, time, _SAMPLES + 1)[1:].tolist()
     omega: Array = solve(scene, times, "taylor", 1e-12).omega
     largest: list[float] = np.abs(np.vstack([scene.omega, omega])).max(axis=0).tolist()

@@ -1,7 +1,8 @@
-"""Every method against published figures that were not computed here.
+"""Checks of every method against published figures that were not computed here.
 
-A check passes if a method is as near to the print as the print reaches, plus what the method
-itself may be wrong by, plus what rounding the numbers of the problem to binary64 does to it.
+A check passes if the difference from the figure is at most the sum of three terms. They are the
+accuracy of the printed figure, the error that the method may have, and the effect of rounding the
+numbers of the problem to binary64.
 """
 
 import math
@@ -30,7 +31,7 @@ from pyharness.scenes.perturbed import perturbed
 
 __all__ = ["external_checks", "problems"]
 
-# The finest that a method claims, except where no one would wait for it.
+# The finest tolerance that a method claims is used, except where that would take too long.
 _TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
 _SOLVED = (
     "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
@@ -38,27 +39,27 @@ _SOLVED = (
 )  # fmt: skip
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
-# A number is rounded when it is read, and once more in what a method makes of it.
+# A number is rounded when it is read, and once more when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
 _STEP_ASIDE = 2.0**-30
-# These answer wherever a method does: a choice of method, and a formula.
+# These must solve every problem that any method solves: a choice of method, and a formula.
 _MAY_NOT_REFUSE = ("auto", "closed-form")
 
 _Row = TypeVar("_Row")
 
 
-# What a method gives at one time (rad/s): omega, and by how much each may be wrong.
+# Result of a method at one time: omega, and a bound on the error of each component (rad/s).
 _Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Judge every method that can take a problem by its published figures.
 
-    Checks are ``external/<problem>/<time>/<method>``; value and limit are in the problem's unit, of
-    the component that is worst against its limit.
+    The ids of the checks are ``external/<problem>/<time>/<method>``. Value and limit are in the
+    problem's unit, for the component that is worst against its limit.
     """
     for problem in problems:
-        # Times on one side are solved together: a replay of one gives the same bits.
+        # Times of one sign are solved together, so that a replay of one check gives the same bits.
         for side in (1.0, -1.0):
             values = sorted(
                 (value for value in problem.values if float(value.time) * side > 0.0),
@@ -73,7 +74,7 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
 def _names(
     problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
 ) -> list[tuple[int, Name]]:
-    """Return the row and the name of each requested check, none where a method can't take it."""
+    """Return row and name of each requested check; empty if the method can't take the problem."""
     given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
     places = [f"{problem.name}/{value.time}" for value in values]
     names = [
@@ -86,9 +87,10 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method that gave nothing at a time.
+    """Return the check of a method that has no result at a time.
 
-    The figures of a user's file may be for a time that takes a method too long.
+    A refusal passes for a problem from a user's file, because its times may take the method too
+    long.
     """
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
@@ -97,7 +99,7 @@ def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
 
 
 def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Iterator[Check]:
-    """Judge every method that propagates the attitude by the printed ones, as an angle (rad)."""
+    """Compare the attitudes of every method that propagates them with the printed ones (rad)."""
     scene, times = problem.scene, [float(value.time) for value in values]
     for method in (name for name in _SOLVED if REGISTRY[name].attitude and values):
         asked = _names(problem, values, method, only, "attitude")
@@ -124,9 +126,10 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return by how much rounding the numbers of a scene turns the body (rad), as `_moves`.
+    """Return the rotation that rounding the numbers of a scene causes at each time (rad).
 
-    Nothing where that can't be solved.
+    It is computed like the changes in `_moves`. Where the scene can't be solved, only the rounding
+    of the quaternions is counted.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -157,7 +160,8 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
             elif (result := results[row]) is not None:
                 yield _check(name, problem.unit, value, result, rounding[value.time])
             else:
-                # In the problems that come with the project LEQT1F solves the longest steps.
+                # In the problems of this package LEQT1F solves the equations of the longest steps,
+                # so that this is a failure.
                 note = "no step long enough for the linear equations"
                 yield name.judged(problem.path is not None, note)
 
@@ -165,10 +169,10 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
 def _as_far_as_solved(
     solve: Callable[[Sequence[Value]], list[_Row]], values: Sequence[Value]
 ) -> tuple[list[_Row], str]:
-    """Return a row for each value, and why there are no more; all are solved together.
+    """Return a row for each value, and the reason why there are no more.
 
-    Where that is refused they are solved one by one up to the first that is refused: what takes
-    too long to the furthest time may not to the nearest.
+    All values are solved together. If that is refused, they are solved one by one up to the first
+    refusal, because an earlier time may be within the work limit.
     """
     try:
         return solve(values), ""
@@ -188,14 +192,14 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Solve a problem by a method, to the times of the values."""
+    """Return the results of a method at the times of the values."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     return [*_solved(problem.scene, [float(value.time) for value in values], method)]
 
 
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
-    """Whether a method takes the problem at all; programs run forward only."""
+    """Return whether a method takes the problem at all; programs run only forward."""
     if method == "closed-form":
         return closed_form(scene) is not None
     if method == "quick":
@@ -220,10 +224,11 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 
 
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
-    """Run a corrected program in steps that are halved until the print is met or rounding reigns.
+    """Run a corrected program, halving its steps down to the accuracy of the print or to rounding.
 
-    The error is taken from the last halving, and twice that for safety; rounding may add half a
-    unit in the last place a step. None where no step is long enough for its linear equations.
+    The error is estimated from the last halving, and doubled for safety. Rounding may add half a
+    unit in the last place per step. Return None if no step is long enough for the program's linear
+    equations.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -236,16 +241,17 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
         stepped = replace(scene, step_size=time / steps, steps=steps)
         rows = run(stepped)
         if rows.ier is not None and rows.ier.any():
-            # LEQT1F takes the matrices of tiny steps for singular and leaves a step of order 1.
+            # LEQT1F declares the matrices of tiny steps singular. The program then has order 1.
             break
-        # In steps far too long a motion overflows that in shorter ones does not.
+        # With steps that are far too long, a motion may overflow that does not with shorter ones.
         ended = rows.ended
         omega = rows.omega[-1] if ended == "complete" else None
         if omega is not None and before is not None:
             halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
             rounding = steps * _HALF_ULP * _scale(scene, omega)
             result = omega, halving + rounding
-            # Two coarse runs may agree by accident: only where halving helps is it believed.
+            # Two coarse runs may agree by accident. The estimate counts only if halving has reduced
+            # it.
             if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
                 break
             previous = halving
@@ -262,25 +268,26 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
     judged = []
     for axis, figure in enumerate(value.omega):
         if figure is not None:
-            # Subtracted in decimals: the print may have more digits than binary64.
+            # Subtract in decimals, because the print may have more digits than binary64.
             distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
-    # NaN is the worst of all, and no comparison shows it.
+    # NaN counts as the worst, but comparisons do not show it.
     worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     distance, limit, note = worst
     return name.bounded(distance, limit, note)
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest angular velocity at both ends: no more than the largest on the way."""
+    """Return the largest abs(omega) at start and end (rad/s), no more than that in between."""
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return by how much rounding the numbers of a scene moves omega, by time (rad/s).
+    """Return the change of omega caused by rounding the numbers of a scene (rad/s), by time.
 
-    Nothing where that can't be solved, and so not be excused: the method's own check tells.
+    It is zero where that can't be solved, so that such a time has no allowance. The method's own
+    check reports the reason.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -288,7 +295,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
         try:
             return [*_moves(scene, times, "taylor")]
         except InputError:
-            # A closed form goes further than a series.
+            # A closed form reaches later times than a series.
             return [*_moves(scene, times, "auto")]
 
     rows, _ = _as_far_as_solved(solve, values)
@@ -297,10 +304,10 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return by how much rounding the numbers of a scene and its times moves omega (rad/s).
+    """Return the change of omega caused by rounding the numbers of a scene and its times (rad/s).
 
-    The sum over all numbers of what each moves alone, to first order; nothing in the rows that
-    the motion does not have.
+    The changes caused by each number alone are computed to first order and added. Rows after the
+    end of the motion are zero.
     """
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows

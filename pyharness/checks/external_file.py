@@ -1,7 +1,7 @@
-"""External problems: published figures that were not computed here, from files of one form.
+"""Published figures that were not computed here, and the files that describe them.
 
-A file holds a scene in the words of the scene file, where the figures stand, and the digits as
-printed; how far the digits reach is read off the print.
+A file holds a scene in the terms of the scene file, the source of the figures, and their printed
+digits. The accuracy of a figure is read from its digits.
 """
 
 import math
@@ -29,28 +29,28 @@ _LONGEST_PRINT = 100
 
 @dataclass(frozen=True)
 class Figure:
-    """A number as it is printed."""
+    """A published number with its accuracy."""
 
-    print: str  # its digits
-    value: Decimal  # what they say
-    # how far it may be from the truth: half a unit of the last printed digit, or what the source
-    # states where that is more
+    print: str  # its digits as printed
+    value: Decimal  # the value of these digits
+    # bound on its error: half a unit of the last printed digit, or what the source states if that
+    # is larger
     accuracy: float
 
 
 @dataclass(frozen=True)
 class Pointing:
-    """An attitude as it is printed."""
+    """A published attitude with its accuracy."""
 
-    attitude: Quaternion  # of length 1
-    accuracy: float  # how far it may be from the truth, rad
+    attitude: Quaternion  # unit quaternion
+    accuracy: float  # bound on its error, rad
 
 
 @dataclass(frozen=True)
 class Value:
-    """What is published for one time."""
+    """The figures published for one time."""
 
-    time: str  # time as given (s); exact
+    time: str  # time as printed (s); taken as exact
     # angular velocity in the unit of the problem, None where nothing is printed
     omega: tuple[Figure | None, ...]
     pointing: Pointing | None = None
@@ -58,24 +58,25 @@ class Value:
 
 @dataclass(frozen=True)
 class Problem:
-    """A published problem."""
+    """A published problem with its figures."""
 
     name: str  # the name of its file
-    # what it is, who published it, where it stands there, what its figures belong to
+    # the problem in words, its publication, the page there, the conditions of its figures
     title: str
     source: str
     where: str
     conditions: str
-    unit: str  # of the printed omega, one of `UNITS`
-    scene: Scene  # its equations and start; the step size plays no part
-    values: tuple[Value, ...]  # the figures
-    path: str | None = None  # the user's file; None for a problem that comes with the package
+    unit: str  # unit of the printed omega, one of `UNITS`
+    scene: Scene  # its equations and initial state; the step size is not used
+    values: tuple[Value, ...]  # the figures, by time
+    path: str | None = None  # the user's file; None for a problem of the package
 
 
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
-    """Return a printed number and how far it reaches; its source admits an error of `good_to`.
+    """Return a printed number with its accuracy; `good_to` is the error that the source admits.
 
-    InputError, naming `where`, for what is no number in text, or too large for binary64.
+    Raise InputError, naming `where`, if `text` is not the text of a number, or is too large for
+    binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")
@@ -92,16 +93,17 @@ def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
 
 
 def read_problem(path: str | Path) -> Problem:
-    """Return the problem of a user's file, in the form that docs/external.md describes.
+    """Return the problem of a user's file, in the format of docs/how-to/external.md.
 
-    InputError where it can't be read, or something in it is missing, unknown or no number.
+    Raise InputError if the file can't be read, or if something in it is missing, unknown or no
+    number.
     """
     return _read(path, str(path))
 
 
 @cache
 def problems() -> tuple[Problem, ...]:
-    """Return the problems that come with the package, by name."""
+    """Return the problems of the package, ordered by name."""
     return tuple(_read(path, None) for path in sorted(_FOLDER.glob("*.toml")))
 
 
@@ -184,7 +186,7 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude of an entry, as a quaternion or as angles of the file's sequence."""
+    """Return the attitude of an entry, a quaternion or angles in the file's sequence."""
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:
         return None
@@ -194,7 +196,7 @@ def _pointing(
     count, prints = {"attitude": 4, "angles_deg": 3}[key], entry[key]
     if not isinstance(prints, list) or len(prints) != count:
         raise InputError(f"{where}: {key} must be a list of {count} texts")
-    # What a source grants its omega says nothing of its attitude, unless that stands alone.
+    # If the entry has an omega, `good_to` is the accuracy of omega and not of the attitude.
     alone = 0.0 if "omega" in entry else good_to
     figures = [figure(f"{where}: {key}", text, alone) for text in prints]
     values = [float(each.value) for each in figures]

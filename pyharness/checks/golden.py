@@ -1,7 +1,8 @@
-"""The golden record: the trajectories that this version produces, as exact text.
+"""The golden record: the trajectories that this version computes, as exact text.
 
-One file for each program or method, one entry for each trajectory: the command that makes it,
-how it ended, its first, tenth and last row as hexadecimal floats, and a digest of all its rows.
+There is one file for each program or method, with one entry for each trajectory. An entry has the
+command that computes the trajectory, its ending, a digest of all rows, and three rows. These are
+the first, the tenth and the last, as hexadecimal floats.
 """
 
 import hashlib
@@ -42,13 +43,13 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the record."""
+    """A trajectory of the golden record."""
 
     source: str  # the program or method, which names its file
     name: str  # the rest of the name of its check, as in ``case-3/original``
-    command: str  # what prints it
-    scene: Scene  # what it solves
-    tolerance: float | None  # of a method that states its error; None where every bit counts
+    command: str  # the command that prints it
+    scene: Scene  # the scene that is solved
+    tolerance: float | None  # of a method that states its error; None if every bit is compared
 
     def run(self) -> Trajectory:
         """Compute the trajectory."""
@@ -59,7 +60,7 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Return what the record holds."""
+    """Yield the trajectories that the record must contain."""
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -76,11 +77,12 @@ def recorded() -> Iterator[Recorded]:
 
 
 def golden(chosen: Selection) -> Iterator[Attempt]:
-    """Hold what is produced now against the record.
+    """Compare the trajectories that are computed now with the record.
 
-    Programs and fixed-step methods to the last bit; methods that state an error within it,
-    since processors and compilers may round their operations in another way. With another
-    mathematical library than the record's, a torque of waves may differ by rounding.
+    Programs and methods with a fixed step must agree to the last bit. Methods that state an error
+    must agree within it, because processors and compilers may round their operations differently.
+    With another mathematical library than the record's, results under a torque with waves may
+    differ by rounding.
     """
     if not chosen.record.is_dir():
         return
@@ -120,7 +122,7 @@ def _held(each: Recorded, entry: dict[str, Any] | None, same_library: bool, name
         return name.judged(False, moved, limit=0.0)
     old, new = _rows(entry), _rows(now)
     away = math.inf
-    # Step, time and TIME have no error to be within.
+    # Step, time and TIME must be equal, since no tolerance applies to them.
     same_times = old.shape == new.shape and np.array_equal(old[:, :3], new[:, :3])
     if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
@@ -129,7 +131,7 @@ def _held(each: Recorded, entry: dict[str, Any] | None, same_library: bool, name
 
 
 def read_record(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return the files of a record by name; InputError for one that is no record."""
+    """Return the files of a record by name; raise InputError if one is no record."""
     found = {}
     for path in sorted(folder.glob("*.toml")):
         try:
@@ -151,14 +153,14 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new record, and what moved against the one in `folder`.
+    """Return the files of a new record, and its differences from the one in `folder`.
 
-    A file of the old record without a trajectory that is still produced is not among them.
+    A file of the old record is omitted if none of its trajectories is computed any more.
     """
     try:
         known = read_record(folder) if folder.is_dir() else {}
     except InputError:
-        # Damaged: all of it is new.
+        # The old record is damaged, so that every trajectory counts as new.
         known = {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
     files: dict[str, list[dict[str, Any]]] = {}
@@ -176,7 +178,7 @@ def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
 
 
 def mathematics() -> str:
-    """Name the library whose sine and cosine are in the record."""
+    """Return the name of the library whose sine and cosine the record contains."""
     return " ".join([*platform.libc_ver(), platform.system(), platform.machine()]).strip()
 
 
@@ -198,7 +200,7 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
 
 
 def _digest(rows: Array, run: Trajectory) -> str:
-    """Return a digest of every bit of the rows, NaN being one value."""
+    """Return a digest of every bit of the rows, with one bit pattern for all NaN."""
     digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
     if run.ier is not None:
         digest.update(run.ier.astype("<i4").tobytes())
@@ -206,12 +208,12 @@ def _digest(rows: Array, run: Trajectory) -> str:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return the rows of an entry, the number of the step first."""
+    """Return the rows of an entry, with the number of the step in the first column."""
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    """Say in what two entries differ, numbers in units in the last place."""
+    """Describe the differences of two entries, with numbers in units in the last place."""
     parts = [
         f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"
         for key in ("ended", "steps", "evaluations", "stop")

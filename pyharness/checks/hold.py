@@ -1,4 +1,7 @@
-"""Methods and programs against the truth on one scene, each within a bound derived beforehand."""
+"""Checks of methods against the true solution of a scene, within bounds derived beforehand.
+
+The programs of the thesis are described on the same scenes, without a bound.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -39,17 +42,18 @@ from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 
-# Ours at two tolerances: near the finest, where rounding shows, and a middling one.
+# Our methods that are tried at two tolerances: a middling one, and one near the finest, where
+# rounding shows.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
 ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 _SERIES = ("taylor", "auto", "prepared-auto")
-_TOO_MANY_RADIANS = 1e8  # of a wave, for a series
-_ROWS = 10  # of a program's run that are compared with the truth
+_TOO_MANY_RADIANS = 1e8  # of a wave; the limit for a series
+_ROWS = 10  # rows of a program's run that are compared with the true solution
 FORMS = ("closed-form", "auto")
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
-    """Return the truth at `time` (s); the flow's conditioning, where it is known, as given."""
+    """Return the true solution at `time` (s); `flow` is its conditioning, if known."""
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
         return reference_truth(scene, [time], flow=flow)
@@ -65,7 +69,8 @@ def _is_free(scene: Scene) -> bool:
     return scene.torque.is_zero and scene.moments is not None
 
 
-# From the truth and a tolerance, None in the scene's steps, to the checks of one method.
+# A function from the true solution, a tolerance and a name to the checks of one method. The
+# tolerance is None for runs in the scene's own steps.
 Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
@@ -74,7 +79,7 @@ def hold_all(
     held: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Judge all methods by the truth in a suite's extreme scenes, and describe the programs."""
+    """Judge all methods in a suite's extreme scenes by the true solution; describe the programs."""
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (held or hold)(name, each.time)
@@ -90,12 +95,13 @@ def hold(
     tolerances: Callable[[str, Scene, float], Sequence[float | None]] | None = None,
     judged: Judged | None = None,
 ) -> Iterator[Attempt]:
-    """Judge each method by the truth at `time`: by default at two tolerances, fine and coarse.
+    """Judge each method by the true solution at `time`, at several tolerances.
 
-    The limit is the sum of the errors that the method promises to make, amplified by the flow;
-    rounding amplified likewise; and the error of the truth. Where no more than two digits are left
-    it says nothing. Energy and momentum without torque are judged always: the flow does not
-    amplify their errors. A method that refuses a scene which it has to take fails.
+    By default the tolerances are a fine and a coarse one. The limit is the sum of three terms. They
+    are the errors that the method promises to make and rounding, both multiplied by the error
+    amplification, and the error of the true solution. If fewer than two digits are left, no limit
+    is set. Energy and momentum without torque are always judged, because their errors are not
+    amplified. A method fails if it refuses a scene that it must take.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -112,7 +118,7 @@ def hold(
 
 
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
-    """Run a method; in the scene's steps where the tolerance is None; InputError on refusal."""
+    """Run a method, in the scene's steps if the tolerance is None; raise InputError on refusal."""
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
     return method_candidate(name, tolerance).end(scene, time)
@@ -123,10 +129,11 @@ def _steps(scene: Scene, time: float) -> int:
 
 
 def refusable(tried: Tried, truth: Truth, why: str) -> bool:
-    """Whether a method may refuse a scene; anything else that refuses is at fault.
+    """Return whether a method may refuse a scene; every other refusal is a fault.
 
-    `closed-form` where there is none. `quick`, which takes three products and leaves to the series
-    what takes too many steps. The series where a wave turns more often than anyone waits for.
+    `closed-form` may refuse where there is no closed form. `quick` may refuse every scene: it needs
+    three products, and leaves scenes with too many steps to the series. The series may refuse waves
+    with so many radians that it would take too long.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -137,24 +144,26 @@ def refusable(tried: Tried, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: Tried) -> float | None:
-    """Return the limit that follows from what a method promises."""
+    """Return the limit that follows from the errors that a method promises."""
     made = made_on_the_way(tried, truth)
     if truth.exact and tried.method in FORMS:
-        # It has no steps to accumulate errors: beside its own there is the rounding of A, B and C.
+        # A closed form accumulates no errors of steps. To its own error only the rounding of A, B
+        # and C is added.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
-        # It claims no error in steps of this size, only that it conserves.
+        # In steps of this size the method promises no error. It promises only to conserve energy
+        # and momentum.
         return None
     growth, steps = truth.flow.amplification, _roundings(tried, truth)
     return linear(allowed(truth, made, growth, steps=steps))
 
 
 DERIVED = Policy(_derived, refusable)
-"""The errors that a method promises to make, amplified."""
+"""Policy whose limit is the sum of the errors that a method promises, amplified by the flow."""
 
 
 def _roundings(tried: Tried, truth: Truth) -> float:
-    """Return the steps after which the method rounds omega and forgets what it took off."""
+    """Return the number of times that a method rounds omega without compensating for it."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
@@ -176,7 +185,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
             # Each step rounds omega, its sums, and the last iteration.
             lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
-        # An error of omega changes what is conserved by no more than itself.
+        # An error of omega changes the conserved quantities by no more than itself.
         limit = DERIVED.limit(truth, tried)
         most = min(math.inf if limit is None else limit, total + total * total)
         found = conserved(scene, answer.omega[-1], truth.flow.largest)
@@ -184,7 +193,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def scene_of(name: Name) -> Scene:
-    """Return the scene of a check that has one."""
+    """Return the scene of a check that has a scene."""
     assert name.scene is not None
     return name.scene
 
@@ -192,7 +201,7 @@ def scene_of(name: Name) -> Scene:
 def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
     """Return the sum of the errors that a method promises to make, over the largest omega.
 
-    None where it promises none.
+    Return None if it promises none.
     """
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
@@ -202,10 +211,10 @@ def made_on_the_way(tried: Tried, truth: Truth) -> float | None:
 
 
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
-    """Return how wrong omega must be, over `largest`, for energy and momentum to be as they are.
+    """Return the smallest error of omega, over `largest`, that explains the conservation errors.
 
-    An error e of every omega changes sum q w**2 by at most 2 e sum q abs(w): no less than e is
-    needed to change it by as much as was found.
+    An error e of every omega changes the sum of q w**2 by at most 2 e times the sum of q abs(w). An
+    error of at least e is therefore needed to cause the change that was found.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -225,7 +234,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Say how far the programs, original and corrected, are from the truth over their steps."""
+    """Describe the error of the programs, original and corrected, over the steps of the scene."""
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)
@@ -250,6 +259,6 @@ def describe_programs(name: Name) -> Iterator[Attempt]:
 
 
 def apart(found: Array, wanted: Array) -> float:
-    """Return the largest difference of the rows that both have."""
+    """Return the largest difference between two arrays in the rows that both have."""
     n = min(len(found), len(wanted))
     return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))

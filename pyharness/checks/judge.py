@@ -1,4 +1,4 @@
-"""The one judgement: what a method makes of a scene, against the truth, by a named limit policy."""
+"""The judgement of a method's answer by the true solution, within the limit of a named policy."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,27 +17,27 @@ from pyharness.model.trajectory import Array
 from pyharness.theory.conditioning import LIVELY, Conditioning, conditioning
 from pyharness.truth.reference import reference
 
-# Beyond it the linearised flow says little.
+# Beyond this error the linearised flow says little.
 LINEAR = 0.01
-# An error relative to the largest omega that says nothing.
+# Relative to the largest omega. A limit of this size says nothing.
 MOST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a method made of a scene: rows for the last of the times, or why there are none."""
+    """The answer of a method: rows for the last of the times, or the reason why there are none."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
     attitude: Array | None = None  # shape (n, 4), where it was requested
     ended: str = "complete"
     steps: int = 0
     evaluations: int | None = None
-    refusal: str = ""  # why the method would not solve the scene
-    is_whole: bool = True  # whether it has every row
+    refusal: str = ""  # why the method refused the scene
+    is_whole: bool = True  # whether every row is there
 
 
 def of_end(method: str, end: End) -> Answer:
-    """Return the answer of a call to one time; a prepared solver may refuse by its status."""
+    """Return the answer of a call to one time; a prepared solver refuses by its status."""
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
     attitude = None if end.attitude is None else end.attitude[None, :]
@@ -46,7 +46,7 @@ def of_end(method: str, end: End) -> Answer:
 
 
 def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answer:
-    """Return the answer at all times; attitude too, where the scene has one."""
+    """Return the answer at all times, with attitudes if the scene has one."""
     run = candidate.rows(scene, list(times))
     has_rows = run.has_all_rows and run.time.tolist() == list(times)
     if has_rows and (run.attitude is None) == (scene.attitude is None):
@@ -56,7 +56,7 @@ def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answe
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A method that is tried on a scene; `tolerance` is None in the scene's own steps."""
+    """A method to be run on a scene; `tolerance` is None for the scene's own steps."""
 
     method: str
     tolerance: float | None
@@ -65,7 +65,7 @@ class Tried:
 
     @cached_property
     def answer(self) -> Answer:
-        """The answer, computed once; a refusal where the method refused by InputError."""
+        """Return the answer, computed once; an InputError of the method becomes a refusal."""
         try:
             return self.ask()
         except InputError as refusal:
@@ -73,34 +73,36 @@ class Tried:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
-    """Try a method of the registry at all times."""
+    """Return a `Tried` that runs a method of the registry at all times."""
     ask = method_candidate(method, tolerance)
     return Tried(method, tolerance, scene, lambda: of_rows(ask, scene, times))
 
 
 def by_end(method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float) -> Tried:
-    """Try a candidate at one time (s)."""
+    """Return a `Tried` that runs a candidate at one time (s)."""
     return Tried(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The solution of a scene at some times, and what the flow makes of small errors until then.
+    """The true solution of a scene at some times, and the conditioning of the flow until then.
 
     Attributes
     ----------
     time, omega : ndarray of shape (n,) and (n, 3)
-        s and rad/s.
+        Times (s) and angular velocities (rad/s).
     error : float
-        Of any omega (rad/s).
+        Bound on the error of any component of `omega` (rad/s).
+    flow : Conditioning
+        Error amplification and rounding up to the last time.
     attitude, angle_error : ndarray of shape (n, 4) or None, float
-        Where the attitude is judged, and its error (rad).
+        The attitude if it is judged, and a bound on its error (rad).
     is_signed : bool
-        Whether the sign of a quaternion counts, which a rotation does not show.
+        Whether the sign of a quaternion counts, although both signs give the same rotation.
     data : float
-        What the rounding of A, B and C changes, over the largest abs(omega).
+        Change of omega by the rounding of A, B and C, over the largest abs(omega).
     exact : bool
-        Whether there is no torque, so that `data` and what the motion conserves are known.
+        Whether there is no torque, so that `data` and the conserved quantities are known.
     """
 
     time: Array
@@ -115,18 +117,18 @@ class Truth:
 
     @property
     def end(self) -> float:
-        """The last time (s)."""
+        """Return the last time (s)."""
         return float(self.time[-1])
 
     @property
     def relative_error(self) -> float:
-        """The error of any omega, over the largest."""
+        """Return the error of any omega, over the largest omega."""
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of the rows: of the angle (rad), or of omega over the largest.
+        """Return the largest error of an answer: an angle (rad), or omega relative to the largest.
 
-        NaN where one is.
+        Return NaN if a row has one.
         """
         if self.attitude is None:
             difference = float(np.abs(answer.omega - self.omega[-len(answer.omega) :]).max())
@@ -141,7 +143,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a flow that grants nothing of use, for closed forms: they need none."""
+    """Return a conditioning without useful bounds, for closed forms, which need none."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -151,9 +153,10 @@ def reference_truth(
     effort: float | None = None,
     flow: Conditioning | None = None,
 ) -> Truth:
-    """Return the truth of the reference; InputError where there is none at all times."""
+    """Return the reference as a true solution; raise InputError if it does not reach all times."""
     flow = flow or conditioning(scene, times[-1])
-    # The reference's steps are good to 1e-22: where the flow amplifies more, more is requested.
+    # The reference's steps are accurate to 1e-22. The precise series is requested where the flow
+    # amplifies errors by more than 1e3.
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(known.time) < len(times):
         raise InputError("the solution leaves every bound")
@@ -162,16 +165,16 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A limit policy: which error of an answer passes, and which refusal.
+    """A limit policy: the errors of an answer that pass, and the refusals that pass.
 
     Attributes
     ----------
     limit : callable
-        The largest error of an answer, relative to the largest omega, or as an angle (rad).
-        None where the method claims no error, infinite where the flow leaves no digits: then an
-        error is described and not judged.
+        The largest error of an answer, relative to the largest omega, or as an angle (rad). It is
+        None where the method promises no error, and infinite where the flow leaves no digits. The
+        error is then described and not judged.
     may_refuse : callable
-        Whether a refusal for a reason passes.
+        Whether a refusal passes, depending on its reason.
     """
 
     limit: Callable[[Truth, Tried], float | None]
@@ -179,10 +182,10 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the error that a policy allows, with the rounding of the flow and of the truth.
+    """Return the error that a policy allows, including rounding and the true solution's error.
 
-    `made` are the errors that a method makes in its steps, `growth` the factor granted to them,
-    `steps` after how many omega is rounded.
+    `made` is the sum of the errors that a method makes in its steps, and `growth` the factor
+    granted to it. `steps` is the number of times that omega is rounded.
     """
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
@@ -190,12 +193,12 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor that is granted to a tolerance: none up to a growth of `LIVELY`."""
+    """Return the factor granted to a tolerance: `growth` if it exceeds `LIVELY`, else 1."""
     return growth if growth > LIVELY else 1.0
 
 
 def linear(limit: float) -> float:
-    """Return a limit, infinite where the linearised flow leaves less than two digits."""
+    """Return `limit`, or infinity where the linearised flow leaves fewer than two digits."""
     return limit if limit <= LINEAR else math.inf
 
 
@@ -206,32 +209,35 @@ def tolerance_of(tried: Tried) -> float:
 
 
 def has_no_form(tried: Tried, truth: Truth, why: str) -> bool:
-    """Let a closed form refuse where there is none, and `quick` where a coefficient is 0."""
+    """Return whether a refusal passes: of `closed-form` without a closed form, or of `quick`.
+
+    `quick` may refuse if one of the coefficients A, B and C is 0.
+    """
     if tried.method == "quick":
-        # Its unknowns need three products.
+        # The unknowns of `quick` need all three products.
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
     return tried.method == "closed-form" and closed_form(tried.scene) is None
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, Tried], float]:
-    """Return the limit that grants a tolerance a factor, from the amplification of the flow."""
+    """Return a limit that multiplies a tolerance by a factor of the error amplification."""
     return lambda truth, tried: allowed(
         truth, tolerance_of(tried), factor(truth.flow.amplification)
     )
 
 
 AS_STATED = Policy(_granting(lambda growth: 1.0), has_no_form)
-"""The tolerance as it stands, and rounding amplified by the flow."""
+"""Policy that grants the tolerance itself, and rounding amplified by the flow."""
 IF_CALM = Policy(_granting(lively))
-"""The tolerance, amplified where perturbations grow a thousandfold, and rounding."""
+"""Policy that grants rounding and the tolerance, amplified if perturbations grow a thousandfold."""
 AMPLIFIED = Policy(_granting(lambda growth: growth))
-"""The tolerance and rounding, both amplified by the flow."""
+"""Policy that grants the tolerance and rounding, both amplified by the flow."""
 
 
 def judge(name: Name, tried: Tried, truth: Truth, policy: Policy) -> Check:
-    """Return the check that a method's answer is as near to the truth as a policy wants.
+    """Return the check that a method's answer is as near to the true solution as a policy requires.
 
-    A closed form that solves what has none fails.
+    A closed form fails if it solves a scene that has none.
     """
     answer = tried.answer
     if answer.refusal:

@@ -1,6 +1,7 @@
-"""Verify: bits between languages, error against the truth, and what changed since it was recorded.
+"""The kinds of checks of `verify`; the first part of a check's name is its kind.
 
-The first part of a check's name is its kind.
+They compare the bits of two languages, results with the true solution, and results with recorded
+ones.
 """
 
 from collections.abc import Callable, Iterator
@@ -34,39 +35,40 @@ _THIN_EXTERNAL = [
 ]
 
 KINDS: dict[str, Callable[[Selection], Attempts]] = {
-    # Program x case x listing x reading: Fortran against twin, bit for bit over the whole
-    # trajectory, counters and stop.
+    # Fortran against twin for every program, case, listing and reading: the bits of the whole
+    # trajectory, the counters and the stop.
     "cells": cells,
-    # Binary64 by our own arithmetic against the processor's, and the CDC's vectors.
+    # Binary64 in our own arithmetic against the processor's, and the vectors of the CDC.
     "words": words,
     # The decks, compiled from the author's own cards, against the port: TAPE5 and the page.
     "decks": decks,
-    # Every step of the corrected programs against its scheme, to rounding.
+    # Every step of the corrected programs against its scheme, within rounding.
     "schemes": schemes,
-    # Where and why the Runge-Kutta program stops, against the formula of its test.
+    # The step and the reason of the Runge-Kutta program's stop, against the formula of its test.
     "stops": stops,
-    # Modern methods against the reference, within the tolerance that they were given.
+    # Modern methods against the reference, within the requested tolerance.
     "methods": methods,
     "prepared": prepared,
-    # Where the body points, against the reference: cases, prepared solvers, random scenes.
+    # Attitudes against the reference, in the cases and by prepared solvers.
     "attitudes": attitudes,
-    # Corrected programs against `solve_ivp`, fixed-step methods against the reference: the power
-    # with which the error falls as the step is halved.
+    # The power with which the error decreases as the step is halved. Corrected programs are
+    # compared with `solve_ivp`, methods with a fixed step with the reference.
     "orders": orders,
-    # All of these in scenes drawn from a seed, half of them nasty.
+    # Programs, methods and attitudes in scenes drawn from a seed, half of them of the kinds in
+    # `NASTY`.
     "random": lambda chosen: chain(
         random_programs(chosen), random_methods(chosen), random_attitudes(chosen)
     ),
-    # Published figures that nobody here computed.
+    # Published figures that were not computed here.
     "external": _external,
     # Trajectories as they were recorded.
     "golden": golden,
 }
-# What these read is the user's.
+# These kinds read files of the user.
 _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Make the checks requested, one after another."""
+    """Make the requested checks, one after another."""
     suites = {kind: partial(attempts, chosen) for kind, attempts in KINDS.items()}
     return run_suites(suites, chosen.only, "verify", _OF_THE_USER)

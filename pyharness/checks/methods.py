@@ -1,6 +1,7 @@
-"""Methods against the reference in every case, omega and attitude, solved and prepared.
+"""Checks of methods against the reference in every case, for omega and attitude.
 
-A tolerance is on the error relative to the largest omega, or on the angle in radians.
+Methods are run by `solve` and as prepared solvers. A tolerance applies to the error relative to the
+largest omega, or to the angle in radians.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -25,10 +26,10 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 
 START: Quaternion = (0.5, -0.1, 0.7, 0.5)
-# s: one time far from those of the case, and those of prepared solvers.
+# Times (s): one far after the times of the cases, and the times for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# What states an error, and what propagates the attitude too.
+# Methods that state an error, and those among them that also propagate the attitude.
 _SOLVED = tuple(name for name in METHODS if METHODS[name].finest < 1.0 and name != "reference")
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
 _PREPARED = ("auto", "taylor", "quick", "closed-form")
@@ -36,14 +37,14 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Judge every method that states an error, at all results of a case and one time later."""
+    """Judge every method that states an error, at all times of a case and at one later time."""
     for case in cases(chosen):
         scene = case_scene(case)
         yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Judge prepared solvers, forward and backward; in the scene's own steps by their bits."""
+    """Judge prepared solvers, forward and backward; compare bits for the scene's own steps."""
     for case in cases(chosen):
         scene = case_scene(case)
         forms = _PREPARED if closed_form(scene) else _PREPARED[:-1]
@@ -54,7 +55,7 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Judge the attitude of every method that propagates it, solved and prepared."""
+    """Judge the attitude of every method that propagates it, by `solve` and prepared."""
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
         times = (*scene.times()[9::10], _LATER)
@@ -64,7 +65,7 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
-    """Return the cases in which checks are made, `thin` of them for the self-test."""
+    """Return the cases in which checks are made; the self-test makes them in the cases `thin`."""
     return thin if chosen.thin else list(case_numbers())
 
 
@@ -95,15 +96,18 @@ def _prepared(
 
 
 def solve_tried(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> Tried:
-    """Try a method at all times."""
+    """Return a `Tried` that runs a method at all times."""
     if method in SCIPY_METHODS and scene.attitude:
-        # Over a long time it can't be told to have so small an error.
+        # SciPy's methods can't be requested to have so small an error over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
     return by_rows(method, tolerance, scene, times)
 
 
 def call_tried(method: str, tolerance: float, scene: Scene, time: float) -> Tried:
-    """Try a prepared solver at one time (s), after a call from which nothing may stay."""
+    """Return a `Tried` that calls a prepared solver at one time (s).
+
+    Another call comes first, which must leave no trace.
+    """
     prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
 
@@ -113,7 +117,7 @@ def _judged(tried: Callable[[], Tried], truth: Callable[[], Truth], name: Name) 
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Hold a prepared solver in the scene's own steps to the bits of the kernel itself."""
+    """Compare a prepared solver in the scene's own steps with the kernel itself, bit for bit."""
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:

@@ -1,7 +1,8 @@
-"""Orders: the power with which the error falls as the step is halved, against the one that is due.
+"""Checks of the order of methods: the power with which errors decrease as the step is halved.
 
-Of corrected programs it is measured by `solve_ivp`, of methods by the reference; that of the
-programs' velocity too, against the reference: no other method has one.
+The errors of corrected programs are measured with `solve_ivp`, and the errors of methods with the
+reference. The velocity of the programs is also compared with the reference, because no other method
+computes it.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,16 +24,16 @@ from pyharness.model.trajectory import Array
 from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
-# The truth that solve_ivp gives is requested as finely as it goes.
+# solve_ivp gives the true solution here. The finest tolerance that it meets is requested.
 _IVP = "dop853"
-# Halvings in which an order has to show, one after another, and what may be missing in the last;
-# .006 is at the most.
+# Number of successive halvings in which the order must show, and the deficit allowed in the last
+# one. The largest deficit that occurs is .006.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
 
 
 def orders(chosen: Selection) -> Iterator[Attempt]:
-    """Measure every order; the value is what is missing to the order that is due."""
+    """Measure every order; the value of a check is the deficit from the expected order."""
     for case in cases(chosen, (5,)):
         scene = case_scene(case)
         known = cache(partial(reference, scene, scene.times()))
@@ -54,7 +55,7 @@ def _of_program(scene: Scene, truth: Callable[[], Reference], name: Name) -> Che
 def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> Check:
     def run(scene: Scene) -> Array:
         velocity = program_candidate(corrected(name.subject), may_stop=False).rows(scene).velocity
-        # None is as good as no rows: nothing settles.
+        # A run without velocity counts as a run without rows, which never settles.
         return np.empty((0, 3)) if velocity is None else velocity
 
     due = PROGRAM_REGISTRY[name.subject].order
@@ -70,14 +71,14 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that the order is as due; what the cases can't judge fails."""
+    """Return the check of an order; it also fails if the order can't be determined."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK)
 
 
 def _by_ivp(scene: Scene) -> Reference:
-    """Return what `solve_ivp` takes for the truth, good to its tolerance."""
+    """Return the solution of `solve_ivp` as a true solution, accurate to its tolerance."""
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())

@@ -1,4 +1,4 @@
-"""The pictures: of any trial what each method found, of Brouwer's law, of linear stability."""
+"""The figures of the checks: results of any trial, Brouwer's law, regions of linear stability."""
 
 import re
 import textwrap
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pyharness.checks.trials.length import Drift
 
-_FLOOR = 1e-18  # what is less, or exactly 0, lies here
+_FLOOR = 1e-18  # smaller values, and 0, are drawn here
 _TOP = 3.0
 _COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
 _MARKERS = {"error": "o", "drift": "v"}
@@ -30,9 +30,10 @@ _COARSE = 1e-6
 
 
 class _Mark(NamedTuple):
-    """A check: its method, the kind of its circumstance and all of it, and what sets it apart.
+    """A check as a mark in a figure: its method, its circumstance and its series.
 
-    `rank` is the kind of setting, `what` error or drift where it is either.
+    `kind` is the part of the circumstance before its first number. `rank` is the kind of setting.
+    `what` is error or drift, if it is one of them.
     """
 
     method: str
@@ -44,7 +45,7 @@ class _Mark(NamedTuple):
 
     @property
     def style(self) -> dict[str, Any]:
-        """Of the marker."""
+        """Return the style of the marker."""
         marker = _MARKERS.get(self.what, "s" if self.rank else "D")
         return {"marker": marker, "color": _COLORS.get(self.rank, "black"), "linestyle": "none"}
 
@@ -54,16 +55,16 @@ def _mark(check: Check) -> _Mark:
     kind = re.split(r"[-^]?\d", name.circumstance, maxsplit=1)[0].rstrip("-")
     rank = name.setting or name.quantity
     with suppress(ValueError):
-        # Tolerances that vary are one series.
+        # Tolerances that differ form one series.
         rank = "coarse" if float(rank) >= _COARSE else "fine"
     what = name.quantity if name.quantity in _MARKERS else ""
     return _Mark(name.subject, kind, name.circumstance, rank, what, check)
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Draw a panel for each method.
+    """Draw the checks of a trial, with a panel for each method.
 
-    Circumstances whose names begin alike stand together, in the order in which they were tried.
+    Circumstances whose names begin alike are drawn together, in the order in which they were tried.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -85,7 +86,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         _panel(axes, name, [mark for mark in marks if mark.method == name], places)
     for axes in grid.flat[len(methods) :]:
         axes.set_visible(False)
-    # What tells a circumstance from others of its kind.
+    # Label each circumstance by the part of its name that differs within its kind.
     labels = [name[len(kind) :].lstrip("-") or name for kind, name in places]
     for axes in grid[-1]:
         axes.set_xticks(list(places.values()), labels, rotation=90)
@@ -103,7 +104,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         f"Coarse: tolerances of {_COARSE:g} and more, fine: below.",
     )
     lines = [line for each in told for line in textwrap.wrap(each, int(13.0 * inches))]
-    # The title is the key's: they would not make room for each other.
+    # The title belongs to the legend, because a separate title and the legend would overlap.
     figure.legend(
         handles=handles, loc="outside upper center", ncols=min(len(handles), int(inches)),
         frameon=False, fontsize=8, title="\n".join(lines), title_fontsize=9,
@@ -117,7 +118,7 @@ def _label(rank: str, what: str) -> str:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return where each circumstance stands: kinds side by side, with room for their names."""
+    """Return the position of each circumstance: kinds side by side, spaced for their names."""
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places = {}
     place = 0.0
@@ -155,7 +156,7 @@ def _panel(
                 linewidth=0.8, linestyle=(0, (1, 1.2)) if what == "drift" else "-",
             )  # fmt: skip
     axes.set_yscale("log")
-    # Above the names of the kinds.
+    # Place the title above the names of the kinds.
     axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
     axes.grid(visible=True, axis="y", linewidth=0.3)
     axes.tick_params(labelsize=7)
@@ -180,7 +181,7 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Draw energy and phase of each motion."""
+    """Draw the errors of energy and phase of each motion against the number of steps."""
     from matplotlib.figure import Figure
 
     motions = list(dict.fromkeys(each.motion for each in found))
@@ -195,7 +196,8 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
                 many = each.starts > 1
                 marked = {"label": each.method, "markersize": 4, **style}
                 one.loglog(each.steps[many], each.error[many], **marked)
-                # One start alone: open, and not joined to what twelve came to.
+                # Errors of a single start have open markers, and are not joined to errors over
+                # several starts.
                 alone = style | {"linestyle": "", "markerfacecolor": "none"}
                 one.loglog(each.steps[~many], each.error[~many], markersize=5, **alone)
                 one.loglog(each.steps, each.limits, color=style["color"], linewidth=0.5)
@@ -222,7 +224,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
     return Picture(figure, numbers("motion method what steps error limit starts", rows))
 
 
-# Told apart without colour: by dash and width.
+# The curves can be told apart without colour, by dashes and line width.
 _OF_REGIONS: tuple[dict[str, Any], ...] = (
     {"color": "#000000", "linestyle": "solid", "linewidth": 2.2},
     {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.2},
@@ -234,7 +236,7 @@ _LEAST = 1e-13
 
 
 def regions_picture(found: Regions) -> Picture:
-    """Draw the regions beside the growth along the imaginary axis."""
+    """Draw the regions of stability, beside the growth along the imaginary axis."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")

@@ -1,6 +1,6 @@
-"""A port of the programs by anyone, in any language, against the twins: bit for bit in all cells.
+"""Checks of a port of the programs, in any language, against the twins, bit for bit in all cells.
 
-`docs/ports.md` tells the protocol.
+`docs/how-to/ports.md` describes the protocol.
 """
 
 import math
@@ -27,7 +27,7 @@ Cell = tuple[str, Listing, int]
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return name, listing and case of the cells asked for, `cells` by leading parts of names."""
+    """Return name, listing and case of the requested cells; `cells` are leading parts of names."""
     return [
         (cell_name(listing, case), listing, case)
         for listing, case in all_cells()
@@ -38,9 +38,10 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[Check]:
-    """Hold a port against the twins; what is no answer fails, and ends the checks.
+    """Compare a port with the twins; an invalid answer fails and ends the checks.
 
-    `patience`: how long to wait for an answer (s). InputError for no command.
+    `patience` is the longest time to wait for an answer (s). Raise InputError if there is no
+    command.
     """
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     name, again = Name("port", "start"), verb
@@ -64,7 +65,7 @@ def _held(name: Name, process: PortProcess, listing: Listing, scene: Scene) -> C
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Say where an answer first differs from the twin, and all that differs in how it ended."""
+    """Describe an answer's first difference from the twin, and all differences in its ending."""
     wanted, given = _rows(twin), answer.rows
     found = []
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):

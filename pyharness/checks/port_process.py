@@ -1,4 +1,4 @@
-"""A port as a process: a line in, a line out, each within a time limit, and always ended."""
+"""A port as a process: it reads and writes lines within a time limit, and is always ended."""
 
 import contextlib
 import os
@@ -13,21 +13,22 @@ from typing import Self
 
 from pyharness.model.errors import InputError, printable
 
-PATIENCE = 60.0  # s for a run, the start of an interpreter that compiles included
+PATIENCE = 60.0  # s for a run, including the start of an interpreter that compiles
 _LARGEST = 1 << 26  # bytes of an answer
 _PIECE = 1 << 16
-_TO_END = 1.0  # s to end, once the output is closed
-# Of looking for what a port started, and of reading what it has left: each has an end.
+_TO_END = 1.0  # s to end after closing its output
+# Limit on the rounds of searching for processes that a port has started, and of reading its last
+# output.
 _ROUNDS = 100
-_MARK = "PYHARNESS_PORT"  # of every process that a port starts, in its environment
+_MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a port
 
 
 class PortError(Exception):
-    """What a port did that is no answer, in a line."""
+    """A port did something that is no valid answer; the message is one line."""
 
 
 def split_command(command: str) -> list[str]:
-    """Return the words of a command, as a shell has them; InputError where there is none."""
+    """Return the words of a command, split as by a shell; raise InputError if there is none."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -38,11 +39,11 @@ def split_command(command: str) -> list[str]:
 
 
 def _processes_with(mark: str) -> list[int]:
-    """Return the processes alive with `mark` in their environment; none where there is no /proc."""
+    """Return the live processes with `mark` in their environment; none if there is no /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
-        # One may have ended meanwhile, or be another user's. One that has ended, and waits for its
-        # parent, has no environment any more.
+        # A process may have ended meanwhile, or belong to another user. A process that has ended
+        # and waits for its parent has no environment any more.
         with contextlib.suppress(OSError):
             if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
                 found.append(int(folder.name))
@@ -50,17 +51,17 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """A port from its start to its end, as a context; PortError where it can't be started."""
+    """A port from its start to its end, as a context manager; PortError if it can't be started."""
 
     def __init__(self, command: str, patience: float = PATIENCE) -> None:
-        """Say what to start, and how long to wait for an answer (s)."""
+        """Store the command to start, and the longest time to wait for an answer (s)."""
         self._words = split_command(command)
         self._patience = patience
 
     def __enter__(self) -> Self:
-        """Start it, in a group of its own: a shell's children end with it."""
+        """Start the port in its own process group, so that the children of a shell end with it."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
-        self._told = b""  # the last of what it wrote to stderr
+        self._told = b""  # the last part of what it wrote to stderr
         try:
             self._process = subprocess.Popen(
                 self._words,
@@ -78,7 +79,7 @@ class PortProcess:
         assert self._process.stderr is not None
         self._in, self._out = self._process.stdin, self._process.stdout
         self._errors = self._process.stderr
-        self._heard = [self._errors]  # empty once it is closed
+        self._heard = [self._errors]  # empty once stderr is closed
         os.set_blocking(self._in.fileno(), False)
         os.set_blocking(self._errors.fileno(), False)
         return self
@@ -89,11 +90,12 @@ class PortProcess:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End it and all that it started, whatever they are doing."""
-        # Where all of the group have ended there is none; macOS says so by the second.
+        """End the port and all processes that it started, whatever they are doing."""
+        # If all processes of the group have ended, the group is not found. macOS reports this as
+        # PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
-        # One that has left the group, for a session of its own; it may be starting another.
+        # A process may have left the group for its own session, and may be starting another.
         for _ in range(_ROUNDS):
             marked = _processes_with(self._mark)
             if not marked:
@@ -107,7 +109,7 @@ class PortProcess:
             file.close()
 
     def ask(self, line: bytes) -> bytes:
-        """Return the line that answers a line; PortError where none comes, or more than one."""
+        """Return the line that answers a line; raise PortError if none or more than one comes."""
         end = time.monotonic() + self._patience
         rest = line + b"\n"
         found = bytearray()
@@ -140,7 +142,7 @@ class PortProcess:
         return answer
 
     def _hear(self) -> bool:
-        """Read what comes from stderr, and keep the last of it; whether there was anything."""
+        """Read from stderr and keep the last part; return whether there was anything."""
         try:
             piece = os.read(self._errors.fileno(), _PIECE)
         except BlockingIOError:
@@ -156,12 +158,14 @@ class PortProcess:
         except subprocess.TimeoutExpired:
             return "it closed its input or output before it had answered"
         how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
-        # What is still in the pipe, once its writer has ended; a child of it may go on writing.
+        # Read what is still in the pipe after its writer has ended. A child process may continue to
+        # write.
         for _ in range(_ROUNDS):
             if not self._hear():
                 break
         said = self._told.decode(errors="replace").split("\n")
         told = [printable(each.strip()) for each in said if each.strip()]
-        # The last that names an error: some interpreters say their version after it.
+        # Take the last line that names an error, because some interpreters print their version
+        # after it.
         told = [each for each in told if "rror" in each] or told
         return f"it ended {how} before it had answered{f': {told[-1][:200]}' if told else ''}"

@@ -1,4 +1,4 @@
-"""The lines that a port reads and writes (docs/ports.md has every field)."""
+"""The lines that a port reads and writes; docs/how-to/ports.md describes every field."""
 
 import json
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop
 from pyharness.original.equations import card_torque
 
 VARIABLES = ("TIME", "U1", "U2", "U3", "V1", "V2", "V3")
-"""Of a row, as TAPE5 has them: s, rad/s and m/s."""
+"""Columns of a row, in the order of TAPE5: s, rad/s and m/s."""
 ENDINGS = ("complete", "stopped", "overflow")
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A run as a port has it.
+    """The result of a run by a port.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Answer:
     ended : str
         One of `ENDINGS`.
     stop : Stop or None
-        What the Lipschitz test found.
+        The step, variable and quotient at which the Lipschitz test stopped the run.
     ier : list of int, or None
         IER of each step; None for a program that prints none.
     """
@@ -46,9 +46,10 @@ class Answer:
 def request(
     scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
 ) -> bytes:
-    """Return the line that asks for a run; its decimals give the floats back.
+    """Return the line that requests a run; its decimals reproduce the floats exactly.
 
-    `lipschitz` in 1/s, by default that of the decks; without `may_stop` no test ends the run.
+    `lipschitz` is in 1/s, by default the value of the decks. Without `may_stop` no test ends the
+    run.
     """
     asked = {
         "schema": SCHEMAS["port request"],
@@ -62,7 +63,7 @@ def request(
 
 
 def asked_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as a port reads it."""
+    """Return the record of a scene that a port reads."""
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -72,7 +73,7 @@ def asked_scene(scene: Scene) -> dict[str, Any]:
 
 
 def read_answer(line: bytes, steps: int) -> Answer:
-    """Return what a port answered to a scene of so many steps; PortError for what is no answer."""
+    """Return a port's answer to a scene with `steps` steps; raise PortError if it is invalid."""
     try:
         given = json.loads(line)
     except (ValueError, RecursionError) as error:
@@ -132,7 +133,7 @@ def _whole(where: str, value: object) -> int:
 
 
 def _number(where: str, value: object) -> float:
-    """Return a number that JSON has as such, or as text: hexadecimal, decimal, inf, nan."""
+    """Return a JSON number, or one in text form: hexadecimal, decimal, inf, nan."""
     if type(value) is float:
         return value
     try:

@@ -1,8 +1,8 @@
-"""Methods in scenes drawn from a seed, by every entrance, against the second reference.
+"""Checks of methods in scenes drawn from a seed, against the second reference.
 
-A tolerance is on the error at the times requested, relative to the largest omega from 0 to the last
-of them, or on the angle. Where the motion amplifies perturbations K times, rounding alone makes
-2e-15 K.
+Methods are run through every entry point. A tolerance applies to the error at the requested times,
+or to the angle. The error is relative to the largest omega from 0 to the last of these times. If
+the motion amplifies perturbations K times, rounding alone causes errors of 2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -37,24 +37,25 @@ from pyharness.scenes.random_scenes import Draw, draw
 from pyharness.theory.conditioning import along
 from pyharness.truth.integer_series import integer_series
 
-# Of so many pairs of draws, a plain and a nasty one, methods are tried in one: the truth costs more
-# than they do. Those of Python and decimals, which cost more than the truth, in fewer; attitudes in
-# one of so many draws.
+# A pair of draws has a plain scene and one of the kinds in `NASTY`. Methods are tried in one of 4
+# pairs, because the true solution costs more than the methods. Methods in Python or in decimal
+# arithmetic cost more than the true solution, and are tried in one of 60 pairs. Attitudes are tried
+# in one of 20 draws.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
-_EFFORT = 0.05  # of the reference, for an attitude
-ROUNDING = 2e-15  # relative, for each factor of growth
-_CALM = 10.0  # growth of perturbations where the series has no reason to refuse
-# Random scenes that may run away, or be too fast for any truth and any series.
+_EFFORT = 0.05  # work limit of the reference, for an attitude
+ROUNDING = 2e-15  # relative, for an error amplification of 1
+_CALM = 10.0  # error amplification below which the series has no reason to refuse
+# Kinds of random scenes that may diverge, or be too fast for any true solution and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 _FINE = 1e-9
 _MORE_WORK = "allow more work"
-_EARLIER = 0.4  # of the last time: intermediate output is judged too
+_EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
 
 Entrances = Mapping[str, Callable[[], Tried]]
 
 
 def truth_of(drawn: Draw) -> Truth:
-    """Return the truth of a draw; InputError where there is none."""
+    """Return the true solution of a draw; raise InputError if there is none."""
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
     flow = along(drawn.scene, path.nodes, path.way)
@@ -65,22 +66,24 @@ def truth_of(drawn: Draw) -> Truth:
 
 
 def may_refuse(tried: Tried, truth: Truth, why: str) -> bool:
-    """Whether a method may say that such a scene would take too long or leave too few digits.
+    """Return whether a method may refuse a scene that takes too long or leaves too few digits.
 
-    The choice of a method for a scene may not, and a closed form but where numbers end.
+    The automatic choice of a method may not refuse. A closed form may refuse only near the limits
+    of the range of numbers.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
         return False
     if method == "closed-form":
-        # A perturbation too faint to square, far from every ordinary number.
+        # A perturbation may be too small for its square to be a number, far from every ordinary
+        # scale.
         return kind == "extreme"
     if kind in _MAY_REFUSE or truth.flow.amplification > _CALM or method == "quick":
         return True
     if method not in SCIPY_METHODS:
         return False
     tolerance = tolerance_of(tried)
-    # Radau's order is low for its finest tolerances.
+    # Radau's order is too low for its finest tolerances.
     if tolerance < _FINE and _MORE_WORK in why:
         return True
     return finest(method, tried.scene, truth.end) > tolerance
@@ -92,11 +95,11 @@ def _limit(truth: Truth, tried: Tried) -> float:
 
 
 POLICY = Policy(_limit, may_refuse)
-"""As `IF_CALM`, with so much rounding for each factor of growth."""
+"""Policy like `IF_CALM`, with `ROUNDING` for each factor of the error amplification."""
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Judge every entrance in scenes drawn from the seed."""
+    """Judge every entry point in scenes drawn from the seed."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -107,7 +110,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         try:
             truth = truth_of(drawn)
         except InputError as refusal:
-            # Nothing to judge by: a run-away, or too fast a motion for any truth.
+            # There is no true solution to compare with: the motion diverges, or is too fast.
             may = drawn.scene.name in _MAY_REFUSE
             none = chosen.drawn(number, "no-truth")
             again = chosen.drawn(number).replay
@@ -117,7 +120,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Judge the attitude of the automatic choice and of the series in scenes from the seed."""
+    """Judge the attitude of the automatic choice and of the series, in random scenes."""
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
@@ -135,7 +138,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
         try:
             truth = reference_truth(scene, times, _EFFORT) if asked else None
         except InputError:
-            # Too fast or too long a motion for any truth, or one that runs away.
+            # The motion is too fast or too long for any true solution, or it diverges.
             continue
         if truth and allowed(truth, 0.0, 1.0) < 1.0:
             yield from _sampled(chosen, number, asked, truth, IF_CALM)
@@ -146,7 +149,7 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return what is tried in a draw, by the name of its check; where `thin`, what is compiled."""
+    """Return the methods to try in a draw, by name of the check; if `thin`, compiled ones."""
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:
@@ -166,7 +169,7 @@ def _prepared(name: str, drawn: Draw) -> Tried:
 
     def ask() -> Answer:
         end = prepared_candidate(name, tolerance, primed=True).end(drawn.scene, drawn.time)
-        # Every end before the last time is as good as a refusal.
+        # Every end before the last time counts as a refusal.
         return of_end(name, end) if end.has_result else Answer(refusal=f"{name}: {end.ended}")
 
     return Tried(name, tolerance, drawn.scene, ask)
@@ -180,7 +183,7 @@ def _sampled(
 
 
 def _sample(tried: Callable[[], Tried], truth: Truth, policy: Policy, name: Name) -> Sample:
-    """Judge an entrance, and tell what its limit is made of."""
+    """Judge an entry point, and record the quantities that determine its limit."""
     one = tried()
     found, tolerance = judge(name, one, truth, policy), tolerance_of(one)
     growth = truth.flow.amplification

@@ -1,4 +1,4 @@
-"""The report of checks: each failure, a summary by kind, the record, the cases of JUnit."""
+"""The report of checks: each failure, a summary by kind, the JSON record, the JUnit cases."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from pyharness.model.records import build_record
 from pyharness.model.report import Column, Line, Report, Section, Table, counted, short, words
 
 _MOST_FAILURES = 50
-_FEW = 10  # checks, each of which is told
+_FEW = 10  # number of checks up to which each one is shown
 _GROUPS = (
     *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
 )  # fmt: skip
@@ -18,7 +18,7 @@ _GROUPS = (
 def checks_report(
     verb: str, checks: Sequence[Check], text: Sequence[Section], **extra: Any
 ) -> Report:
-    """Report checks: told in `text`, with `extra` in the record."""
+    """Return the report of checks: `text` is printed, `extra` is added to the record."""
     return Report(
         verb,
         text,
@@ -44,7 +44,7 @@ def summary(
 ) -> list[Section]:
     """Return the failures, then a row for each group of checks that share `depth` parts.
 
-    `more` stands between these rows and the verdict.
+    `more` is printed between these rows and the verdict.
     """
     groups: dict[str, list[Check]] = {}
     for check in checks:
@@ -57,11 +57,11 @@ def summary(
 
 
 def told_singly(checks: Sequence[Check]) -> list[str]:
-    """Return each check that failed with its replay, and each that passed where there are few."""
+    """Return each failed check with its replay; if the checks are few, also those that passed."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
-        # The replay whole, however long: it is there to be copied.
+        # The replay is never shortened, because it is there to be copied.
         lines += [f"FAILED {check.id}{_seen(check, ' > ')}", Line(f"  {check.replay}")]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")
@@ -85,10 +85,11 @@ _SAMPLES = (
 
 
 def samples(checks: Sequence[Check], rounding: float) -> Section:
-    """Return a row for each entrance and band of tolerances: the worst error over the tolerance.
+    """Return a table of the worst error over the tolerance, by entry point and band of tolerances.
 
-    What rounding makes, `rounding` for each factor of growth, is taken off the error. Columns are
-    the growth of small differences: checks with a result, and the worst of them.
+    Rounding, `rounding` times the error amplification, is subtracted from the error first. There
+    are columns for three ranges of the error amplification: the number of checks with a result, and
+    the worst of them.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -109,7 +110,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def verdict(checks: Sequence[Check]) -> str:
-    """Say in a line how many checks were made and how many failed."""
+    """Return a line with the number of checks and of failures."""
     failed = sum(not check.passed for check in checks)
     made = counted(len(checks), "check")
     return f"{made}, {failed} failed" if failed else f"{made}, all well"

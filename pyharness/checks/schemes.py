@@ -1,7 +1,7 @@
-"""The corrected programs against the schemes that they are, every step worked out anew.
+"""Checks of the corrected programs against their schemes, by recomputing every step.
 
-Both languages could be wrong alike, by less than an order shows. Here each step starts from what
-the program had before it, so that only the rounding of one step may differ.
+Both languages could be wrong alike, by less than an order shows. Here each step starts from the
+program's own state before it, so that only the rounding of one step may differ.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,24 +21,24 @@ from pyharness.original.programs import PROGRAM_REGISTRY
 from pyharness.theory.collocation_matrices import PARTS
 from pyharness.theory.conditioning import ROUNDING, magnitudes
 
-# Of a rate, with the stages that lead to it, and of the sum that it goes into.
+# Roundings of a rate, including the stages that lead to it, and of the sum to which it is added.
 _ROUNDINGS = 32.0
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One stage of every step; columns are U1 ... U3, V1 ... V3."""
+    """One stage, or collocation point, of every step; columns are U1 ... U3, V1 ... V3."""
 
-    # shape (n, 6); where the right-hand sides are taken (rad/s, m/s), and what they are
+    # shape (n, 6); the arguments of the right-hand sides (rad/s, m/s), and their values per second
     state: Array
     rate: Array
-    rounding: Array  # shape (n, 6); by how much the rate of another who computes it may differ
+    rounding: Array  # shape (n, 6); bound on the difference of two computations of the rate
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Hold every step of the corrected programs against its scheme, omega and velocity.
+    """Compare every step of the corrected programs with its scheme, for omega and velocity.
 
-    The value is the largest share of what rounding may do.
+    The value of a check is the largest ratio of a difference to the rounding bound.
     """
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
@@ -61,7 +61,7 @@ def _held(scene: Scene, name: Name) -> Check:
 
 
 def is_whole(scene: Scene, run: Trajectory) -> bool:
-    """Whether a run has all its rows, with velocity."""
+    """Return whether a run has all its rows, with velocity."""
     return run.velocity is not None and len(run.omega) == len(run.velocity) == scene.steps
 
 
@@ -72,7 +72,7 @@ def rows(run: Trajectory) -> Array:
 
 
 def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
-    """Return those of W. Kutta (1901), of every step of a whole run."""
+    """Return the four stages of W. Kutta (1901) in every step of a complete run."""
     h = scene.step_size
     first = _beginning(scene, run)
     second = _stage(scene, 0.5, first.state + 0.5 * h * first.rate)
@@ -82,7 +82,7 @@ def stages(scene: Scene, run: Trajectory) -> tuple[Stage, Stage, Stage, Stage]:
 
 
 def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
-    """Return U and V after every step, and the rounding that is granted to them."""
+    """Return U and V after every step, and the rounding that is allowed for them."""
     if name not in PARTS:
         kutta = stages(scene, run)
         return _put_together(scene, kutta[0], kutta, (1 / 6, 1 / 3, 1 / 3, 1 / 6), 1.0)
@@ -90,12 +90,12 @@ def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
     parts = np.array([float(part) for part in PARTS[name]])
     powers = np.arange(1, len(parts) + 1)
     matrix = np.power.outer(parts, powers - 1)
-    # The integral over the step of the polynomial through the rates at the points.
+    # Integrate the polynomial through the rates at the points over the step.
     weights = np.linalg.solve(matrix.T, 1.0 / powers)
     points = [
         _stage(scene, part, first.state + part * scene.step_size * first.rate) for part in parts
     ]
-    # The programs solve for the coefficients of t, t**2, ... first.
+    # The programs first solve for the coefficients of t, t**2, ...
     condition = float(np.linalg.cond(powers * matrix, np.inf))
     return _put_together(scene, first, points, weights, condition)
 
@@ -120,12 +120,15 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 
 
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
-    """Return equations 16-18 and dV/dt = F/m - omega x V, `part` of a step after its beginning."""
+    """Return the rates of equations 16-18 and of dV/dt = F/m - omega x V in every step.
+
+    `part` is the fraction of a step at which they are taken.
+    """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)
     torque = np.array([scene.normalized_torque(time) for time in times.tolist()])
     products = scene.euler_coefficients * np.roll(omega, -1, axis=1) * np.roll(omega, -2, axis=1)
-    pull = np.divide(scene.forces, scene.masses[0])  # corrected: one mass
+    pull = np.divide(scene.forces, scene.masses[0])  # one mass, as in the corrected programs
     rate = np.hstack([torque + products, pull + np.cross(velocity, omega)])
     u, v = np.abs(omega), np.abs(velocity)
     crossed = np.roll(v, -1, axis=1) * np.roll(u, -2, axis=1)

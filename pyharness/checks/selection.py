@@ -1,4 +1,4 @@
-"""What to verify: which checks, which random draws, which record."""
+"""The selection of what `verify` checks: which checks, random draws and golden record."""
 
 import shlex
 from collections.abc import Sequence
@@ -18,22 +18,22 @@ RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 
 @dataclass(frozen=True)
 class Selection:
-    """What to verify."""
+    """The selection of what `verify` checks."""
 
-    only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; all where empty
+    only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # of the random draws; by default the week
-    draws: int = DRAWS  # how many of them
-    record: Path = RECORD  # the folder of the golden record, by default that of the checkout
-    # with published figures; None for those that come with the project
+    draws: int = DRAWS  # number of random draws
+    record: Path = RECORD  # folder of the golden record; by default the checkout's
+    # with published figures; None selects the problems of the package
     problems: Sequence["Problem"] | None = None
-    thin: bool = False  # a part that touches every kind, for `verify --self-test`
+    thin: bool = False  # a part of every kind, for `verify --self-test`
 
     def asks(self, id: str) -> bool:
-        """Whether the check of that id is requested."""
+        """Return whether the check with this id is requested."""
         return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
-        """Whether a check below that id may be requested."""
+        """Return whether a check below this id may be requested."""
         return may_hold(id, self.only)
 
     def drawn(self, number: int, subject: str = "") -> Name:

@@ -1,7 +1,8 @@
-"""The stop test of the Runge-Kutta program, against eq. 19 worked out anew along its own run.
+"""Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its own run.
 
-Both languages could test the wrong thing alike. Here the quotients of all steps are known before
-the program is run with constants just below and just above each that is larger than all before.
+Both languages could test the wrong quantity alike. Here the quotients of all steps are computed
+first. The program is then run with constants just below and just above each quotient that exceeds
+all earlier ones.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,18 +30,18 @@ Stages = tuple[Stage, Stage, Stage, Stage]
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """Change of K over change of U in every step, in the order in which the program looks."""
+    """Change of K over change of U in every step, in the order of the program's tests."""
 
     values: Array  # shape (n, m), 1/s
-    rounding: Array  # shape (n, m); by how much those of another who computes them may differ
-    names: list[str]  # what the m of a step are called
+    rounding: Array  # shape (n, m); bound on the difference of two computations
+    names: list[str]  # names of the m quotients of a step
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Hold where the program stops, why and at which quotient against the formula.
+    """Compare the program's stopping step, variable and quotient with the formula.
 
-    With every way of testing that a listing can have. The value is the largest share of what
-    rounding may do to a quotient.
+    This is done for every form of the test that a listing can have. The value of a check is the
+    largest ratio of a quotient's difference to its rounding bound.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -52,7 +53,7 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _run(scene: Scene) -> tuple[Trajectory, Stages | None]:
-    """Return a run that is not stopped, and the stages of its steps where it is whole."""
+    """Return a run that no test stops, and the stages of its steps if it is complete."""
     run = PROGRAM_REGISTRY[_PROGRAM].run(scene, corrected(_PROGRAM), may_stop=False)
     return run, stages(scene, run) if is_whole(scene, run) else None
 
@@ -89,7 +90,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -
     columns = [3, 4, 5, 0, 1, 2] if velocity else [0, 1, 2]
     k, u = np.abs(fourth.rate - first.rate)[:, columns], np.abs(after - first.state)[:, columns]
     k_rounding = (first.rounding + fourth.rounding)[:, columns]
-    # U4 and the result are the state before and an increment, each rounded.
+    # U4 and the result are the sum of the previous state and an increment, each rounded.
     stored = 2.0 * ROUNDING * (np.abs(first.state) + np.abs(after))
     u_rounding = (stored + scene.step_size * (first.rounding + fourth.rounding))[:, columns]
     names = [STOP_VARIABLES[column] for column in columns]
@@ -99,14 +100,17 @@ def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -
             np.linalg.norm(each, axis=1, keepdims=True) for each in (k, u, k_rounding, u_rounding)
         )
     with np.errstate(divide="ignore", invalid="ignore"):
-        # 0 over 0 stops nothing.
+        # A quotient of 0 over 0 never stops a run.
         values = np.where(k > 0.0, k / u, 0.0)
         relative = np.where(k > 0.0, k_rounding / k + u_rounding / u, 0.0)
     return Quotients(values, values * relative, names)
 
 
 def _constants(quotients: Quotients) -> list[float]:
-    """Return constants beside every quotient above all of the steps before, beyond rounding."""
+    """Return constants on both sides of each quotient that exceeds all quotients of earlier steps.
+
+    Each constant differs by more than rounding from all quotients of its step.
+    """
     constants = []
     below = 0.0
     for values, rounding in zip(quotients.values, quotients.rounding, strict=True):

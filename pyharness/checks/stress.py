@@ -1,4 +1,4 @@
-"""Stress: numerical stability tried to breaking, in named trials with bounds derived beforehand."""
+"""Stress trials of numerical stability up to its limits, with bounds derived beforehand."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ named = partial(Name, command="stress")
 
 @dataclass(frozen=True)
 class Trial:
-    """A named trial: what is tried, how the bound was derived, and the attempts `only` requests."""
+    """A named trial: its title, the origin of its bound, and the attempts that `only` requests."""
 
     name: str
     title: str
@@ -30,21 +30,21 @@ class Trial:
 
 
 def trial(name: str) -> Trial:
-    """Return the trial of a name in `TRIALS`."""
+    """Return the trial with a name of `TRIALS`."""
     found: Trial = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}").TRIAL
     return found
 
 
 def stress(only: Sequence[str] = ()) -> Iterator[Check]:
-    """Make the checks whose ids begin as in `only`, as in ``separatrix/taylor``; or all."""
+    """Make the checks whose ids begin as in `only`, as in ``separatrix/taylor``; by default all."""
     suites = {name: lambda name=name: trial(name).attempts(only) for name in TRIALS}
     return run_suites(suites, only, "stress")
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the check nearest to its limit, or furthest beyond, of each trial and subject.
+    """Return the check with the largest ratio to its limit, for each trial and subject.
 
-    Of those that have a limit and a scene.
+    Only checks with a limit and a scene are considered.
     """
     found: dict[str, Check] = {}
     for check in checks:

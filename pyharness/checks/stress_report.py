@@ -1,4 +1,4 @@
-"""The report of `stress`: for each trial what was tried, and a row for each method."""
+"""The report of `stress`: a description and a table for each trial, with a row for each method."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -20,7 +20,7 @@ _NOTE = (
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
-    """Report the failures, then a table for each trial; a trial is a picture."""
+    """Return the report: the failures, then a table for each trial; each trial has a figure."""
     text: list[Section] = [told_singly(checks)]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]

@@ -1,6 +1,7 @@
-"""Tolerances at which a method is tried, suite by suite, and what they may cost: no bounds.
+"""Tolerances at which methods are tried, by suite, and the work that they may take.
 
-A budget counts right-hand sides; it decides which tolerances are affordable, not which pass.
+A work limit counts right-hand sides. It decides which tolerances are affordable, and sets no bound
+on errors.
 """
 
 import math
@@ -14,16 +15,17 @@ from pyharness.model.scene import Scene
 from pyharness.scenes.extreme import speed
 from pyharness.theory.conditioning import Conditioning
 
-# In the cases; of solve_ivp no more is requested than it answers in a second.
+# Tolerances in the cases. Methods of solve_ivp are tried only at tolerances that take less than a
+# second.
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9
-# A middling tolerance; where a motion is violent, the next of the ladder.
+# A middling tolerance. If a motion is violent, the next one of the ladder is used.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
-# At their finest these take minutes for what the others do in seconds.
+# At their finest tolerances these methods take minutes, where the others take seconds.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
-# Right-hand sides; and so many times as many for the coarsest tolerance.
+# Work limits in right-hand sides, and the factor by which the coarsest tolerance may exceed them.
 _BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
 _PATIENCE = 10.0
 _ORDERS = {"dop853": 8, "lsoda": 8, "radau": 5, "rk45": 5}
@@ -31,7 +33,7 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return the tolerances at which a method is tried in a case; `thin` for the self-test."""
+    """Return the tolerances at which a method is tried in a case; `thin` is for the self-test."""
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
         return [_SCIPY_OF_CASES[0]] if thin else list(_SCIPY_OF_CASES)
@@ -43,7 +45,8 @@ def of_case(name: str, thin: bool) -> list[float]:
 def finest(name: str, scene: Scene, time: float) -> float:
     """Return the finest tolerance at which a method is tried until `time` (s).
 
-    The one that it claims; where `solve_ivp` can't meet that in the scene, the next of the ladder.
+    It is the finest that the method claims. If `solve_ivp` can't meet that in the scene, it is the
+    next one of the ladder.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
@@ -51,7 +54,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return two tolerances at which a method is tried: its finest, and one in the middle."""
+    """Return two tolerances at which a method is tried: its finest and a middling one."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)
@@ -59,9 +62,10 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
-    """Return the finest tolerance within the budget and a coarse one; None for the scene's steps.
+    """Return the tolerances to try: the finest within the work limit, and a middling one.
 
-    The scene's steps are for methods with a fixed step, and for Gauss collocation too.
+    None means the scene's own steps. They are used for methods with a fixed step, and also for
+    Gauss collocation.
     """
     if name in FIXED_STEP:
         return [None]
@@ -69,7 +73,8 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
         return [METHODS["closed-form"].finest]
     least = FEW_DIGITS if name == "quick" else finest(name, scene, time)
     if name in GAUSS:
-        # Two solutions that are to agree can't where rounding parts them: the next of the ladder.
+        # The two solutions that must agree can't if rounding separates them. Take the next
+        # tolerance of the ladder.
         meetable = [each for each in _LADDER if each >= 4.0 * flow.rounding]
         least = max(least, min(meetable, default=math.inf))
     radians = speed(scene, flow.largest) * abs(time)
@@ -91,10 +96,10 @@ def _within_budget(name: str, least: float, radians: float, amplification: float
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Estimate the right-hand sides that a tolerance takes."""
+    """Return an estimate of the right-hand sides that a tolerance takes."""
     if name in GAUSS:
         stages = int(name[-1])
-        # The error of steps of z radians each, amplified: radians z**order.
+        # Steps of z radians cause an amplified error of amplification times radians times z**order.
         z = math.pow(tolerance / (max(radians, 1.0) * amplification), 0.5 / stages)
         return 12.0 * stages * radians / min(z, 1.0)
     if name in SCIPY_METHODS:

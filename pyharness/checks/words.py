@@ -1,4 +1,4 @@
-"""Words: the vectors of the CDC, and our own arithmetic against the processor's and Fortran's."""
+"""Checks of machine words: CDC vectors; our arithmetic against the processor and Fortran."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,10 +21,11 @@ _THIN_CASE = 3
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Hold every vector, the twin in `Word(53)` against that in floats, and Fortran in its words.
+    """Check every CDC vector, the twin in `Word(53)` against floats, and Fortran in its words.
 
-    Bit for bit: in every cell where words are requested by name; else in those that have all
-    defects, one or none, of which Fortran has those of all and none.
+    Runs are compared bit for bit. If words are requested by name, every cell is checked. Otherwise
+    only the cells with all defects, one or none are checked. Of these, Fortran is run with all or
+    none.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -61,11 +62,11 @@ def _same(name: Name, one: Trajectory, other: Trajectory) -> Check:
 
 
 def _has_all_or_none(listing: Listing) -> bool:
-    """Whether a listing is the original or the corrected one."""
+    """Return whether a listing is the original or the corrected one."""
     return listing.label != "custom" and not listing.readings
 
 
 def _is_few(listing: Listing) -> bool:
-    """Whether a listing has no reading and all defects, one or none; or a reading alone."""
+    """Return whether a listing has all defects, one or none; or only a single reading."""
     few = len(listing.defects) + len(listing.readings) <= 1
     return few or _has_all_or_none(listing)

@@ -1,1 +1,1 @@
-"""Whatever can be run on a scene, held against each other and against the truth."""
+"""Comparison of programs, methods and prepared solvers with each other and with the reference."""

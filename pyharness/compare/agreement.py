@@ -1,4 +1,4 @@
-"""The two notions of agreement, kept apart: error against the truth, and bits between languages."""
+"""Two separate measures of agreement: errors against the reference, and bits between languages."""
 
 import math
 from dataclasses import dataclass, replace
@@ -14,27 +14,28 @@ from pyharness.truth.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """How far a trajectory is from the truth."""
+    """The errors of a trajectory against the reference solution."""
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
     velocity: float | None  # largest error of any component of V (m/s)
-    # Largest drifts of energy and of momentum squared, relative to the start; None where a torque
-    # acts or the moments are not known.
+    # Largest drifts of the energy and of the squared angular momentum, relative to the initial
+    # values; None if a torque acts or the moments are unknown.
     energy: float | None
     momentum: float | None
     error: Array  # largest error of any component of omega at each result (rad/s)
-    turned: Array | None = None  # error of the attitude at each result (rad); where it is known
-    # Largest drift of the angular momentum in space, relative to the start; None as of energy.
+    turned: Array | None = None  # error of the attitude at each result (rad), if it is known
+    # Largest drift of the angular momentum in space, relative to its initial norm; None as `energy`
+    # is.
     momentum_in_space: float | None = None
 
     @property
     def angle(self) -> float | None:
-        """Largest error of the attitude (rad); None where there is none."""
+        """Return the largest error of the attitude (rad); None if there is no attitude."""
         return None if self.turned is None else float(self.turned.max(initial=0.0))
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
-    """Hold a trajectory against the truth at the times that both have."""
+    """Return the errors of a trajectory against the reference at the times that both have."""
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
         errors = np.abs(trajectory.omega[:n] - truth.omega[:n])
@@ -76,9 +77,9 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:
-    """Return the largest distance in units in the last place over TIME, U and V.
+    """Return the largest distance of two trajectories in TIME, U and V, in units in the last place.
 
-    NaN agrees with NaN; a different number of rows is infinitely far.
+    Two NaNs have the distance 0. If the numbers of rows differ, the distance is infinite.
     """
     if len(first.time) != len(second.time):
         return math.inf
@@ -90,7 +91,11 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Name all in which two trajectories of a program differ: bits, counters, stop, IER."""
+    """Return the names of the results in which two trajectories of a program differ.
+
+    If the counters, the ending or the stop differ, only these are named. Otherwise the rows and IER
+    are compared bit for bit.
+    """
     counts = (
         ("steps", first.steps, second.steps),
         ("evaluations", first.evaluations, second.evaluations),
@@ -111,7 +116,7 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
         found.append("IER")
     if first.exact is not None and second.exact is not None:
         pairs = zip(first.exact.ravel().tolist(), second.exact.ravel().tolist(), strict=True)
-        # Of nan and of zeros too, which are no equal floats, or equal ones.
+        # As text, because nan is not equal to nan, and 0.0 is equal to -0.0.
         if any(x.m != y.m or str(x.e) != str(y.e) for x, y in pairs):
             found.append("numbers of the word")
     return found
@@ -122,7 +127,7 @@ def _velocity(trajectory: Trajectory) -> Array:
 
 
 def ulps(x: Array, y: Array) -> float:
-    """Return the largest number of representable values between two arrays of one shape."""
+    """Return the largest distance of two arrays of one shape, in representable values."""
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)
     if one_nan.any():
@@ -132,6 +137,6 @@ def ulps(x: Array, y: Array) -> float:
 
 
 def _ordinal(x: Array) -> NDArray[np.uint64]:
-    """Return the place of each value among all representable ones; -0 comes just before +0."""
+    """Return the rank of each value among all representable ones; -0 comes just before +0."""
     bits = np.ascontiguousarray(x).view(np.uint64)
     return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

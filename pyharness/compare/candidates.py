@@ -1,4 +1,4 @@
-"""Candidates: whatever can be run on a scene, and judged or timed."""
+"""Candidates: methods, prepared solvers and programs that are run on a scene, judged and timed."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -20,33 +20,33 @@ from pyharness.model.trajectory import STOP_VARIABLES, WITH_ALL_ROWS, Array, Tra
 from pyharness.original.compiled import program_arguments
 from pyharness.original.programs import BINARY64, PROGRAM_REGISTRY
 
-_SAME = 1e-9  # of a time, but for the rounding of its steps
+_SAME = 1e-9  # relative difference up to which two times are equal, because steps are rounded
 
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """What a candidate made of a scene at one time."""
+    """The result of a candidate for a scene at one time."""
 
-    omega: Array  # rad/s; NaN where it did not get there
-    ended: str = "complete"  # or why it is not
+    omega: Array  # rad/s; NaN if the candidate did not reach the time
+    ended: str = "complete"  # or why the result is not complete
     steps: int = 0  # as the candidate counts them
-    evaluations: int | None = None  # right-hand sides, where they are counted
-    attitude: Array | None = None  # shape (4,), scalar first, where it was carried
+    evaluations: int | None = None  # evaluations of the right-hand side, if they are counted
+    attitude: Array | None = None  # shape (4,), scalar first, if it was propagated
 
     @property
     def is_refused(self) -> bool:
-        """Whether the kernel of a prepared solver would not, or gave up."""
+        """Return whether the kernel of a prepared solver refused or exceeded its work limit."""
         return self.ended in ("refused", "gave up")
 
     @property
     def has_result(self) -> bool:
-        """Whether it got there, though it may be sensitive."""
+        """Return whether the candidate reached the time, though the result may be sensitive."""
         return self.ended in WITH_ALL_ROWS
 
 
 @dataclass(frozen=True)
 class Ready:
-    """A call that goes from time 0 to T and does nothing else; and how to read it."""
+    """A call that only integrates from time 0 to T, and a function that reads its result."""
 
     run: Callable[[], Any]
     read: Callable[[Any], End]
@@ -57,21 +57,24 @@ class Candidate:
     """A method with its tolerance, a prepared solver, or a program with its listing."""
 
     name: str
-    # From a scene and a time (s); InputError where it can't take them, as a program whose steps
-    # end elsewhere.
+    # Takes a scene and a time (s). Raises InputError if the candidate can't take them, as a program
+    # whose steps end at another time.
     ready: Callable[[Scene, float], Ready]
-    # From a scene, at the scene's own times; of methods also at other ones, given as second
-    # argument; a prepared solver has none.
+    # Takes a scene, and returns rows at the scene's own times. A method also takes other times as
+    # second argument. A prepared solver has no rows and raises InputError.
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
-        """Run it to one time (s); InputError where it refuses the scene."""
+        """Run the candidate to one time (s); raise InputError if it refuses the scene."""
         ready = self.ready(scene, time)
         return ready.read(ready.run())
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a method of the registry, as `solve` runs it; an attitude of the scene is wanted."""
+    """Return a method of the registry as a candidate, run by `solve`.
+
+    Its rows include the attitude if the scene has one.
+    """
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
         times = scene.times() if times is None else times
@@ -84,9 +87,10 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a prepared solver; `primed` by a call from another start, of which nothing may stay.
+    """Return a prepared solver as a candidate.
 
-    A method with a fixed step, and Gauss collocation, go in the scene's steps.
+    If `primed`, the solver is first called with another initial omega, which must have no effect on
+    the run. A method with a fixed step, and Gauss collocation, use the scene's step size.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -99,7 +103,7 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a prepared solver with attitude; `primed` as in `called`."""
+    """Return a prepared solver with attitude as a candidate; see `prepared_candidate`."""
 
     def ready(scene: Scene, time: float) -> Ready:
         solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)
@@ -128,7 +132,7 @@ def program_candidate(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Candidate:
-    """Return a program with its listing; what it takes is told at `Program.run`."""
+    """Return a program with its listing as a candidate; the options are those of `Program.run`."""
     options = lipschitz, may_stop, velocity
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -148,17 +152,17 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a compiled program whose stop test ends nothing, for its omega alone."""
+    """Return a compiled program as a candidate, without its stop test and without velocity."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
 def plain(values: Iterable[float]) -> Array:
-    """Return omega in an array of its own: a buffer is used again by the next call."""
+    """Return a copy of the values in an array, because the next call reuses the buffer."""
     return np.array([float(x) for x in values])
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return the end of a call that got nowhere."""
+    """Return the end of a call without a result."""
     return End(np.full(3, math.nan), why)
 
 
@@ -173,12 +177,12 @@ def _answered(solver: Solver, omega: Array) -> End:
         counted = solver.steps * METHODS[method].evaluations
     elif method.startswith("gauss-"):
         counted = solver.steps
-    # A Taylor series evaluates no right-hand side, it expands one.
+    # A Taylor series expands the right-hand side and does not evaluate it.
     return End(plain(omega), solver.status, solver.steps, None if method == "taylor" else counted)
 
 
 def _printed(result: Any) -> End:
-    """Read what the compiled program gives: the last of its rows."""
+    """Return the end of a compiled program's run, from its last row."""
     rows, _, n_rows, status, evaluations, variable, _ = result
     if status == STOPPED:
         return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")

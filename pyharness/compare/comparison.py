@@ -1,7 +1,8 @@
-"""Original against corrected, Fortran against twin, everything against the reference.
+"""Comparisons of original and corrected, of Fortran and twin, and of all with the reference.
 
-Two notions of agreement, never mixed: bits between languages (in units in the last place), and
-error against the truth (in rad/s, never below what the reference itself may be wrong by).
+Two measures of agreement are never mixed. One is the distance between languages, in units in the
+last place. The other is the error against the reference, in rad/s, which has no meaning below the
+error bound of the reference itself.
 """
 
 import itertools
@@ -41,12 +42,12 @@ _TIMING_SECONDS = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """One program with one listing."""
+    """The results of one program with one listing."""
 
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
-    ulps: float | None  # between the languages; None where there is one alone, of another word
+    ulps: float | None  # between Fortran and the twin; None if another word runs in the twin alone
     differences: tuple[str, ...]
     order: Order | None
     seconds_per_step: float
@@ -55,13 +56,13 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """The program and its listing."""
+        """Return the program and its listing."""
         return f"{self.listing.program} {self.listing.label}"
 
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
-    """One method of `solve_ivp`; `failure` says why there is no trajectory."""
+    """The results of one method of `solve_ivp`; `failure` says why there is no trajectory."""
 
     method: str
     tolerance: float
@@ -75,36 +76,62 @@ class MethodFinding:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """All that was found about one scene."""
+    """The results of `compare_programs` for one scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene, with the attitude that was integrated, if one was requested.
+    lipschitz : float
+        Constant of the stop test, 1/s.
+    reference : Reference
+        The reference solution and its error bound.
+    programs : tuple of ProgramFinding
+        The results of the programs, one for each listing.
+    methods : tuple of MethodFinding
+        The results of the methods of `solve_ivp`.
+    growth : float or None
+        Error amplification: the largest norm of the state-transition matrix of omega from any time
+        to the last; None if it is unknown.
+    word : str
+        The arithmetic of the programs.
+    """
 
     scene: Scene
     lipschitz: float
     reference: Reference
     programs: tuple[ProgramFinding, ...]
     methods: tuple[MethodFinding, ...]
-    growth: float | None  # of a small difference on the way, where it is known
-    word: str = BINARY64  # of the programs
+    growth: float | None
+    word: str = BINARY64
 
     __repr__ = short_repr
 
     @property
     def digits(self) -> float | None:
-        """Decimal digits that the motion leaves of rounding, whoever solves it."""
+        """Return the decimal digits left when the motion amplifies rounding, for any method.
+
+        None if the error amplification is unknown.
+        """
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property
     def tolerance(self) -> float:
-        """The finest tolerance of the methods."""
+        """Return the smallest tolerance of the methods."""
         return min(each.tolerance for each in self.methods)
 
     @property
     def is_sensitive(self) -> bool:
-        """Whether the motion makes more of rounding than the methods are allowed."""
+        """Return whether the motion amplifies rounding beyond what the tolerance allows."""
         return is_sensitive(self.growth, self.tolerance)
 
     @property
     def unexpected(self) -> tuple[str, ...]:
-        """What is not as it should be, one sentence each; empty if all is well."""
+        """Return one sentence for each unexpected result; empty if there is none.
+
+        A result is unexpected if Fortran and the twin differ, or if the error of a corrected
+        program does not decrease with its order.
+        """
         found = []
         for each in self.programs:
             if each.differences:
@@ -117,7 +144,7 @@ class Comparison:
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Of which corrected programs the scene can't tell whether they are right, and why."""
+        """Return the corrected programs that this scene can't judge, each with the reason."""
         return tuple(
             f"{each.who}: {each.order}"
             for each in self.programs
@@ -135,42 +162,52 @@ def compare_programs(
     attitude: bool = False,
     word: str = BINARY64,
 ) -> Comparison:
-    """Compare programs and methods on one scene.
+    """Compare programs and methods on one scene, with each other and with the reference solution.
 
     Parameters
     ----------
     scene : Scene
-        What to integrate.
+        The body, the initial condition, the torque and the steps.
     listings : sequence of Listing, optional
-        The programs to run, each with its active defects; by default all three, original and
-        corrected.
+        The programs to run, each with its active defects; by default all three programs, original
+        and corrected.
     lipschitz : float
-        Constant of the stop test (1/s).
+        Constant of the stop test (1/s), which only the Runge-Kutta program has.
     may_stop : bool
         Whether the stop test may end a run.
     tolerance : float, optional
         The tolerance of each method of `solve_ivp`, relative to the largest component of omega; by
         default the method's own, as in `solve`.
     effort : float
-        Factor on the work of each of them after which it gives up.
+        Factor on the work limit of each program, of each method and of the reference.
     attitude : bool
-        Whether attitudes are compared too, from that of the scene, or from the axes of space where
-        it has none; beside the rows of a program by a step of order 4 from row to row.
+        Whether attitudes are compared too. They start from the scene's attitude, or from the axes
+        of space if the scene has none. A program's attitude is integrated from row to row by a
+        method of order 4.
     word : str
-        The arithmetic of the programs. Where the compiled programs have it not the twins run alone:
-        there are no bits to agree. Orders are those of binary64.
+        The arithmetic of the programs, one of `pyharness.original.programs.WORD_NAMES`. If the
+        compiled programs do not support it, the twins run alone, and no bits are compared. Orders
+        are measured in binary64 only.
 
     Returns
     -------
     Comparison
-        `unexpected` is empty where all is as it should be.
+        The results of all programs and methods. Its `unexpected` is empty if every result is as
+        expected.
 
     Raises
     ------
     NotBuiltError
-        Where the extension is not built.
+        If the extension is not built.
     InputError
-        Where the reference or a program would need too many steps.
+        If a program or the reference would exceed its work limit, or if the scene or the word is
+        not valid.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, compare_programs
+    >>> compare_programs(case_scene(2)).unexpected
+    ()
     """
     listings = listings_for() if listings is None else listings
     in_floats = checked_word(word, "python") == BINARY64
@@ -218,10 +255,11 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return what to compare: original and corrected, and the subset asked for between them.
+    """Return the listings to compare: for each program the original and the corrected one.
 
-    A defect, reading or conjecture applies to the programs that have it; one that no program has
-    is a mistake. With `base` and nothing else, only that listing is shown.
+    If `fix` or `keep` applies to a program, its requested subset comes between the two. A defect,
+    reading or conjecture applies to the programs that have it; raise InputError if no program has
+    it. With `base`, and without `fix` and `keep`, only that listing is returned.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]

@@ -1,4 +1,4 @@
-"""Orders: the power with which an error against the truth falls as the step is halved."""
+"""Measured orders: the power of the step with which the error against the reference decreases."""
 
 import itertools
 import math
@@ -18,21 +18,21 @@ from pyharness.original.programs import Program
 from pyharness.theory.conditioning import ROUNDING, conditioning
 from pyharness.truth.reference import Reference
 
-# An order must come within half an order of the one that is due.
+# A measured order may be below the expected one by at most this.
 ORDER_SLACK = 0.5
-# It is measured where halving the step moves the result by less than this, relative to the
-# largest, and a step turns body and torque by fewer radians: steps that skip periods of the torque
-# seem to have settled too.
+# The order is measured once halving the step changes the result by less than this, relative to the
+# largest value, and a step turns body and torque by less than this angle (rad). The angle is
+# limited because steps that skip periods of the torque seem to converge too.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
-# Steps are halved until this many are taken, and eight times at least.
+# The step is halved until this many steps are taken, and at least eight times.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
-# Where a textbook method of its order settles with so many times fewer steps, it is the program's
-# fault that it does not.
+# If a textbook method of the same order converges with this many times fewer steps, a program that
+# does not converge is at fault.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
-# Roundings of a step.
+# Rounding errors in a step.
 _ROUNDINGS = 8.0
 # A matrix with a larger condition number may be found singular.
 _CONDITION = 1e15
@@ -42,26 +42,28 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 
 @dataclass(frozen=True)
 class Order:
-    """What became of the error as the step was halved."""
+    """The order that was measured by halving the step, or the reason why it is unknown."""
 
-    due: int  # the order that the method has
-    # Whether it showed. `rounding`: the error was that of rounding before it could. The last four:
-    # it can't be told, for no step was small enough, the program found its matrix singular, the
-    # motion multiplies rounding too much, or the solution leaves every bound.
+    due: int  # the expected order, which the method has
+    # `as due`: the order was observed. `rounding`: the error was rounding error before the order
+    # could be observed. `misses`: the error decreases more slowly. The last four leave the order
+    # undecided: no step was small enough (`unsettled`), the program found its matrix singular
+    # (`singular`), the motion amplifies rounding too much (`sensitive`), or the solution is
+    # unbounded (`unbounded`).
     state: State
-    value: float | None  # as measured, if it could be
-    step_size: float  # the finest that was tried (s); of `singular` the longest that makes it so
-    steps: int = 0  # taken in the finest run that could be held against the truth
-    error: float = math.inf  # the largest of that run (rad/s)
-    time: float = math.nan  # when it had it (s)
+    value: float | None  # the measured order, if there is one
+    step_size: float  # the smallest that was tried (s); if `singular`, the longest singular one
+    steps: int = 0  # of the finest run that could be compared with the reference
+    error: float = math.inf  # the largest error of that run (rad/s)
+    time: float = math.nan  # the time of that error (s)
 
     @property
     def is_judged(self) -> bool:
-        """Whether it is known if the method has its order."""
+        """Return whether the measurement decides if the method has its order."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
-        """Return what was seen, in a few words."""
+        """Return the result of the measurement in a few words."""
         if self.value is not None:
             return f"order {self.value:.2f}"
         return {
@@ -73,7 +75,7 @@ class Order:
 
 
 class _SingularError(Exception):
-    """A matrix was found singular that has to be: the program is another method then."""
+    """A collocation matrix was rightly found singular, so that the program is another method."""
 
 
 def measured_order(
@@ -81,8 +83,8 @@ def measured_order(
 ) -> Order:
     """Measure the order of a compiled program's omega; see `order_of`.
 
-    An error that rounding may have grown to is no miss. That it does not settle is one, if a
-    textbook method of its order does.
+    An error that may be amplified rounding counts as `sensitive`, not as `misses`. Failure to
+    converge counts as `misses` if a textbook method of the same order converges.
     """
 
     def omega(finer: Scene) -> Array:
@@ -114,12 +116,12 @@ def order_of(
     pairs: int = 2,
     most_steps: int | None = None,
 ) -> Order:
-    """Halve the step until it is small, and measure the power with which the error falls.
+    """Measure the order of a solution by halving the step until it is small.
 
-    The scene has the longest step, the truth its times. `solution` returns what is judged after
-    each step of the scene that it is given, shape (n, 3); fewer rows where it overflows. In `pairs`
-    halvings, one after another, the order has to show, or not to; by default they go on to 2**18
-    steps, or eight times.
+    `scene` has the longest step, and `truth` has results at its times. `solution` returns the
+    judged quantity after each step of the scene that it is given, shape (n, 3), with fewer rows if
+    it overflows. The order is decided if it appears, or fails to appear, in `pairs` consecutive
+    halvings. By default the step is halved until there are 2**18 steps, and at least eight times.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -176,7 +178,7 @@ def _shows(order: float, due: int) -> bool:
 
 
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
-    """Yield the scene in its own steps, in half of them, and so on."""
+    """Yield the scene with its own step size, with half of it, and so on."""
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
     for halvings in itertools.count():
         parts = 2**halvings
@@ -191,7 +193,7 @@ def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
 
 
 def _fastest(scene: Scene, omega: Array) -> float:
-    """Return a rate (rad/s) above those of small disturbances of omega, and of the torque."""
+    """Return an upper bound (rad/s) for the rates of perturbations of omega and of the torque."""
     sizes = np.abs(np.vstack([scene.omega, omega]))
     others = np.roll(sizes, -1, axis=1) + np.roll(sizes, -2, axis=1)
     waves = scene.torque.sines + scene.torque.cosines
@@ -200,7 +202,7 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Whether the motion may have made the error of roundings on the way; if unknown, it may."""
+    """Return whether the error may be amplified rounding; True if that can't be computed."""
     if not found.steps or not math.isfinite(found.error):
         return False
     try:
@@ -211,7 +213,7 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Whether the matrix of collocation at such steps (s) may be found singular."""
+    """Return whether the collocation matrix at a step size (s) may be found singular."""
     from pyharness.theory.collocation_matrices import PARTS
 
     if program not in PARTS:

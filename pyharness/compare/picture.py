@@ -1,4 +1,4 @@
-"""The picture of a comparison: components over time above the error, a column for each program."""
+"""The picture of a comparison: omega over time, and its error below, in a column per program."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +12,14 @@ from pyharness.model.scene_report import heading
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Told apart without colour: by dash and width.
+# Distinguishable without colour, by dash and width.
 _STYLES: dict[str, dict[str, Any]] = {
     "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
     "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# Of what has one row, which no line shows; those of one place can all be seen.
+# For a single row, which a line does not show. Markers at one place can all be distinguished.
 _MARKERS: dict[str, dict[str, Any]] = {
     "reference": {"marker": "s", "markersize": 11.0},
     "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
@@ -29,13 +29,13 @@ _MARKERS: dict[str, dict[str, Any]] = {
 
 
 def comparison_picture(comparison: Comparison) -> Picture:
-    """Draw what was run, what is true, and how far they are apart."""
+    """Return the picture of the trajectories, the reference and the errors."""
     from matplotlib.figure import Figure
 
     names = list(dict.fromkeys(each.listing.program for each in comparison.programs))
     figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
     truth = comparison.reference
-    # Below the error of omega that of the attitude, where it was asked for.
+    # The error of the attitude, if it was requested, is drawn below the error of omega.
     bounds = [truth.error] if truth.attitude is None else [truth.error, truth.angle_error]
     shape = 3 + len(bounds), len(names)
     axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
@@ -103,7 +103,7 @@ def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> Non
 
 
 def _frame(axes: "Axes", truth: np.ndarray) -> None:
-    """Keep the frame near the truth: a program that diverges leaves the picture."""
+    """Limit the vertical range to values near the reference; a program that diverges leaves it."""
     if not len(truth):
         return
     low, high = float(truth.min()), float(truth.max())

@@ -31,7 +31,7 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison) -> Report:
-    """Report what `compare` found: programs, then methods of `solve_ivp`, then the verdict."""
+    """Return the report of a comparison: programs, methods of `solve_ivp`, and our verdict."""
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
     reference = (
@@ -81,7 +81,10 @@ def comparison_report(comparison: Comparison) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return the verdict: one sentence, or one for each thing that is not as it should be."""
+    """Return our verdict: one sentence if all is as expected, else one for each unexpected result.
+
+    Further sentences say whether the scene is sensitive, and which programs are not judged.
+    """
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
         told.append(sensitive(comparison.growth, comparison.digits))
@@ -143,7 +146,7 @@ def _methods(comparison: Comparison) -> Table:
 
 
 def _attitudes(comparison: Comparison) -> list[list[Table]]:
-    """Return the table of attitudes, where they were asked for."""
+    """Return the table of attitudes in lists; an empty list if attitudes were not requested."""
     if comparison.reference.attitude is None:
         return []
     columns = (
@@ -182,7 +185,7 @@ def _data(comparison: Comparison) -> Table:
         }
         rows.append(each | row)
     for each in map(_method, comparison.methods):
-        # The steps of a method are its own, its failure is how it ended.
+        # A method chooses its own steps, so none are listed. A failure is listed as its ending.
         row = {"steps": None, "ended": each["failure"] or each.get("ended", "")}
         rows.append(each | row | ({"seconds": None} if each["failure"] else {}))
     for each in rows:

@@ -1,4 +1,4 @@
-"""Timing: calls in interleaved batches, so that what else the machine does hits all alike."""
+"""Timing of calls in interleaved batches, so that other load on the machine affects all alike."""
 
 import contextlib
 import gc
@@ -24,10 +24,10 @@ def seconds(
     clocks: Sequence[Clock] | None = None,
     slow: float = SLOW,
 ) -> list[float]:
-    """Return the seconds of a call of each run, in rounds of batches of `length` seconds.
+    """Return the time of one call of each run (s), measured in rounds of batches of `length` (s).
 
-    They are the median over the rounds, or another `statistic`. `clocks` has the clock of each run,
-    by default that on the wall.
+    It is the median over the rounds, or another `statistic`. `clocks` has a clock for each run; by
+    default it is the wall clock.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -41,7 +41,7 @@ def seconds(
                 say(f"round {number} of {rounds}")
                 for (run, clock), times, most in zip(timed, seen, due, strict=True):
                     if number <= most:
-                        # The last time, for a first call may have been a slow one.
+                        # The latest time counts, because the first call may have been slow.
                         calls = max(1, round(length / max(times[-1], 1e-9)))
                         times.append(batch_seconds(run, calls, clock))
     finally:
@@ -51,7 +51,7 @@ def seconds(
 
 
 def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> float:
-    """Return the seconds of a call, averaged over some in a row."""
+    """Return the time of one call (s), averaged over consecutive calls."""
     if calls > 1:
         run()
     begin = clock()
@@ -62,7 +62,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """Ignore warnings, and numbers that leave the range of floats, as those who are timed do."""
+    """Suppress warnings and floating-point errors while calls are timed."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

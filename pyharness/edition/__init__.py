@@ -1,1 +1,1 @@
-"""The edition as pages: a static site from the project's data and findings."""
+"""The edition as a static web site, built from the project's data and findings."""

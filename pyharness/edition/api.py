@@ -1,4 +1,4 @@
-"""What the package offers in Python, from its docstrings."""
+"""The data of the API page: the public names of the package with their docstrings."""
 
 import inspect
 import re
@@ -12,7 +12,7 @@ from pyharness.edition.markdown import inline
 
 
 class Item(NamedTuple):
-    """A name with its type and what is said of it."""
+    """A parameter, attribute, result or exception: its name, its type and its description."""
 
     name: str
     type: str
@@ -80,7 +80,7 @@ def _signature(of: Any) -> str:
             told = re.sub(r" -> \w+$", "", told)
     except (TypeError, ValueError):
         return ""
-    # The names alone, and arrays as the sources write them.
+    # Write types without their modules, and arrays as the sources write them.
     told = re.sub(r"<class '(.*?)'>", r"\1", told).replace("NoneType", "None")
     told = re.sub(r"numpy\.ndarray\[tuple\[.*?\], numpy\.dtype\[(.*?)\]\]", _array, told)
     return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Za-z])", "", told)

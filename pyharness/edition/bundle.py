@@ -1,7 +1,7 @@
-"""ES modules as one classic script: browsers refuse to import modules where a page is a file.
+"""ES modules as one classic script, because browsers do not import modules into a page from a file.
 
-Every module becomes a function that returns what the module exports, in order of dependency.
-Known are the forms that the project's modules use; any other is refused.
+Every module becomes a function that returns the exports of the module, in order of dependency.
+Only the forms of import and export that the project's modules use are known; any other is an error.
 """
 
 import re
@@ -12,15 +12,15 @@ _IMPORT = re.compile(
     r'^import (?:\{(?P<names>[^}]*)\}|\* as (?P<all>\w+)) from "(?P<path>\.\.?/[\w./-]+)";$', re.M
 )
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
-# What is left of another form, once those are taken.
+# Any other form of import or export that remains when the known forms are replaced.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
 
 
 def bundle(entry: Path) -> str:
-    """Return a module, and all that it imports, as one script in a function of its own.
+    """Return a module and all its imports as one script, inside a function.
 
-    ValueError, with file and line, for a form of import or export that is not known, an import of
-    what is not exported, and modules that import each other.
+    Raise ValueError, with file and line, for an unknown form of import or export, an import of a
+    missing file or name, and modules that import each other.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -31,7 +31,7 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Add a module behind those that it imports; `importing` are on the way to it."""
+    """Append a module after its imports; `importing` is the chain of modules that import it."""
     text = path.read_text(encoding="utf-8")
     for found in _IMPORT.finditer(text):
         needed = (path.parent / found["path"]).resolve()
@@ -45,7 +45,7 @@ def _add(
             if name not in exports[needed]:
                 raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
     names = [found["name"] for found in _EXPORT.finditer(text)]
-    # What replaces a statement has as many lines, for what is told of others.
+    # Replacements keep the number of lines, so that error messages name the right line.
     body = _IMPORT.sub(lambda found: _as_constant(found, path, list(exports)), text)
     body = _EXPORT.sub("", body)
     unknown = _UNKNOWN.search(body)
@@ -65,7 +65,7 @@ def _add(
 
 
 def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
-    """Yield what an import names there, and here."""
+    """Yield the exported and the local name of everything that an import names."""
     for each in (found["names"] or "").split(","):
         name, _, alias = each.strip().partition(" as ")
         if name:
@@ -73,7 +73,7 @@ def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
 
 
 def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
-    """Return an import as a declaration, over as many lines."""
+    """Return an import as a declaration with the same number of lines."""
     number = modules.index((path.parent / found["path"]).resolve())
     renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))
     lines = "\n" * found[0].count("\n")

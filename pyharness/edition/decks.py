@@ -1,4 +1,4 @@
-"""The listing card by card, for its pages: scan, card, port, twin, and the apparatus beside."""
+"""The data of the listing's pages: each card with its scan, port, twin and apparatus entries."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from pyharness.history.ablation import entries
 from pyharness.original.cards import Card, Place, deck, parallels, tight
 
-# Whose colour a card takes where it has entries of several kinds.
+# Kinds by precedence: a card with entries of several kinds has the colour of the first.
 _ORDER = (
     "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
     "dialect", "normalization", "misreading",
@@ -14,14 +14,14 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """Characters in a row, and the entry that says why they differ; None where they do not."""
+    """A run of characters, and the entry that explains why card and scan differ here, or None."""
 
     text: str
     entry: str | None = None
 
 
 class CardView(NamedTuple):
-    """A card as a page shows it: `card` and `scan` in runs, the scan's None where it has none."""
+    """A card as a page shows it: `card` and `scan` are runs; `scan` is None for a lost card."""
 
     number: int
     card: list[Run]
@@ -36,7 +36,7 @@ class CardView(NamedTuple):
 
 
 def card_views(program: str) -> list[CardView]:
-    """Return the cards of a program in their order."""
+    """Return the views of a program's cards, in the order of the cards."""
     by_name = {each["id"]: each for each in entries()}
     found = deck(program)
     return [
@@ -57,7 +57,7 @@ def card_views(program: str) -> list[CardView]:
 
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
-    """Return the number of cards by kind of their entries, those with a say first."""
+    """Return the number of cards for each kind of entry, in the order of precedence."""
     counts = dict.fromkeys(_ORDER, 0)
     for view in views:
         for kind in view.kinds:
@@ -66,7 +66,7 @@ def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
 
 
 def _scan(card: Card) -> list[Run] | None:
-    """Return the line of the scan in runs, its number among them."""
+    """Return a card's line of the scan as runs, with the card number; None for a lost card."""
     if card.lost:
         return None
     number = Run(*card.printed) if card.printed else Run(str(card.number))

@@ -9,16 +9,16 @@ from pyharness.edition.markdown import Document, document
 from pyharness.model.errors import InputError
 from pyharness.model.facts import shipped
 
-# What the documents show.
+# Suffixes of the pictures in the documents.
 _PICTURES = (".png", ".svg")
-# Pages that the menu names.
+# Documents with an entry of their own in the menu.
 _OF_THE_MENU = ("findings.md", "methods.md")
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return the folder of the documents: the one that is given, or that of the checkout.
+    """Return the folder of the documents: `given`, or by default the folder of the checkout.
 
-    InputError where it has none: an installed package does not bring them along.
+    Raise InputError if it has no documents; an installed package does not include them.
     """
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _OF_THE_MENU if not (folder / name).is_file()]
@@ -33,7 +33,7 @@ def documents_folder(given: str | None = None) -> Path:
 
 
 def documents(folder: Path) -> Iterator[tuple[str, Document]]:
-    """Give the path of each page in the site, and what is on it."""
+    """Yield the path in the site and the rendered text of each document in a folder."""
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
         text = file.read_text(encoding="utf-8")
@@ -41,12 +41,12 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
 
 
 def page_of(name: str) -> str:
-    """Return where in the site a document of `docs/` is."""
+    """Return the path in the site of a document of `docs/`."""
     return f"docs/{name.removesuffix('.md')}.html"
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return by path in the site what the documents show."""
+    """Return the pictures of the documents, by their path in the site."""
     return {
         f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
         for file in sorted(folder.rglob("*"))
@@ -55,7 +55,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return what a target in a document becomes; None for what the site does not have."""
+    """Return the site's link for a target in a document; None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

@@ -1,4 +1,4 @@
-"""Pictures for the pages, drawn once: Figures 6 to 12, and Figure 7 with all that explains it."""
+"""The pictures of the pages, drawn once: Figures 6 to 12, and Figure 7 with its limit."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -20,7 +20,7 @@ class Drawn(NamedTuple):
 
 
 def drawn() -> dict[str, Drawn]:
-    """Compute and draw all figures; by the stem of their files."""
+    """Compute and draw all figures; return them by the stem of their files."""
     return {
         each.plan.stem: Drawn(each, saved(figure_picture(each), f"{each.plan.stem}.svg"))
         for each in findings()
@@ -28,6 +28,6 @@ def drawn() -> dict[str, Drawn]:
 
 
 def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
-    """Draw Figure 7, original and corrected, with its limit: what happened, in one picture."""
+    """Draw Figure 7, original and corrected, with its limit in one picture; return its files."""
     original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))
     return saved(together_picture(original, corrected), "figure-07-together.svg")

@@ -1,4 +1,4 @@
-"""What the laboratory's page is made of: data of the programs, and a run for who has no script."""
+"""The data of the laboratory page: the programs, and one run for readers without JavaScript."""
 
 from functools import cache
 from typing import Any
@@ -18,9 +18,9 @@ from pyharness.original.programs import run_program
 from pyharness.truth.reference import reference
 
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
-"""What the page shows whose address says nothing."""
+"""The run that the page shows if its address specifies none."""
 MOST_STEPS = 3000
-"""What a page draws without a pause: a tenth of the decks' step over the same 3 s."""
+"""The most steps that a page draws without a pause: 3 s with a tenth of the decks' step."""
 _KINDS = {
     "defect": "Defects left in",
     "reading": "Readings not adopted",
@@ -31,10 +31,10 @@ _SHOWN = 3
 
 @cache
 def context() -> dict[str, Any]:
-    """Return what the template of the laboratory needs.
+    """Return the values for the template of the laboratory.
 
-    `data` is what the script reads as `window.laboratoryData`; `switches` are the flags under the
-    heads of their kinds; `first` is the default state, run here.
+    `data` is the object that the script reads as `window.laboratoryData`. `switches` has the flags
+    of each kind with a heading. `first` is the run of the default state, computed here.
     """
     given = data()
     kinds = [
@@ -51,7 +51,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return what the script needs to run any state, as JSON can have it."""
+    """Return the data with which the script can run any state, as JSON values."""
     return {
         "scenes": [asked_scene(case_scene(number)) for number in case_numbers()],
         "headings": {number: _told(case_scene(number)) for number in case_numbers()},
@@ -77,7 +77,7 @@ def data() -> dict[str, Any]:
 
 
 def _told(scene: Scene) -> list[str]:
-    """Return body and torque, and what else there is to say of the case, but not the start."""
+    """Return a case's body, torque and further remarks, without the initial omega."""
     lines = heading(scene)
     body, torque, *_ = lines[1].split("; ")
     return [f"{body}; {torque}", *lines[2:]]
@@ -110,5 +110,5 @@ def _row(run: Trajectory, number: int, error: float) -> list[str]:
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]
     values.append(run.recorded_time[number])
-    # The program has no IER.
+    # The Runge-Kutta program has no IER.
     return [str(number + 1), *(repr(float(x)) for x in values), "", short(error)]

@@ -1,4 +1,4 @@
-"""Claims, sentences and apparatus for their pages: verdicts as computed, reports as they are."""
+"""The data of the pages on claims, sentences and apparatus: computed verdicts and reports."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from pyharness.views import html
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis with the verdicts of the claims that it makes."""
+    """A sentence of the thesis with the verdicts on the claims that it makes."""
 
     sentence: Sentence
     judged: list[Judgement]
@@ -26,17 +26,17 @@ class SentenceVerdicts(NamedTuple):
 
     @property
     def statements(self) -> str:
-        """What its claims say."""
+        """Return the statements of the sentence's claims."""
         return " ".join(each.claim["statement"] for each in self.judged)
 
 
 def judgements() -> list[Judgement]:
-    """Judge every claim."""
+    """Return the judgement of every claim."""
     return [judgement(entry["id"]) for entry in claims()]
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return by verdict how many results have it: of the original programs, and corrected."""
+    """Return, by verdict, the number of `result` claims, for original and corrected programs."""
     judged = [each for each in judged if each.claim["kind"] == "result"]
     found: dict[str, tuple[int, int]] = {}
     for each in judged:
@@ -51,25 +51,25 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def kinds(judged: Sequence[Judgement]) -> Markup:
-    """Return the verdicts by kind of claim as a table."""
+    """Return an HTML table of the verdicts by kind of claim."""
     return Markup(html.table(kinds_table(judged), "verdicts by kind of claim"))
 
 
 def account() -> dict[str, Markup]:
-    """Return the statements that pages and documents share, and what each defect does in them."""
+    """Return the statements that pages and documents share, and the effect of each defect."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}
 
 
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:
-    """Return the ledger as a table, the story of each claim, and the evidence that they are."""
+    """Return the data of the claims page: the table, each claim in detail, and the evidence."""
     table = claims_report(judged).data
     assert table is not None
     links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
     stories = []
     for each in judged:
-        # The first section is the heading, which the page has as one.
+        # Skip the first section, because the page writes it as its own heading.
         story = explanation(each).text[1:]
         stories.append((each, Markup(html.sections(story))))
     return {
@@ -81,18 +81,18 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:
-    """Return each entry of the apparatus, and its report with its effect in every case."""
+    """Return each entry of the apparatus with its report, which shows its effect in every case."""
     found = []
     for entry in entries():
         effects = list(effects_of(entry["id"])) if "flag" in entry else []
-        # The page has the cards as links.
+        # Leave out the cards, because the page shows them as links.
         report = entry_report(entry, effects, [name for name in FIELDS if name != "cards"])
         found.append((entry, Markup(html.sections(report.text[1:]))))
     return found
 
 
 def thesis(judged: Iterable[Judgement]) -> dict[str, list[SentenceVerdicts]]:
-    """Return the sentences by the section that they stand in, in the thesis's order."""
+    """Return the sentences and their verdicts by section, in the order of the thesis."""
     by_name = {each.claim["id"]: each for each in judged}
     found: dict[str, list[SentenceVerdicts]] = {}
     for number, each in enumerate(sentences(), 1):

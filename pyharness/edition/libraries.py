@@ -1,4 +1,4 @@
-"""What writes the pages: libraries that are not there unless they are asked for."""
+"""The libraries that write the pages; they are optional and installed on request."""
 
 from importlib import import_module
 
@@ -12,7 +12,7 @@ LIBRARIES = (
 
 
 def check_libraries() -> None:
-    """Refuse to build where one is missing."""
+    """Raise InputError if one of the libraries is missing."""
     for name in LIBRARIES:
         try:
             import_module(name)

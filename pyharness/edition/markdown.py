@@ -1,4 +1,4 @@
-"""The project's Markdown as HTML: anchors as on GitHub, formulas as MathML, links of the site."""
+"""The project's Markdown as HTML, with GitHub's anchors, MathML formulas and the site's links."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Part(NamedTuple):
-    """What stands under a heading, for the search."""
+    """The text under one heading of a document, for the search."""
 
     anchor: str
     title: str
@@ -32,13 +32,14 @@ class Document(NamedTuple):
 def document(text: str, link: Callable[[str], str | None]) -> Document:
     """Render a document that begins with its title.
 
-    `link` gives what a target in the text becomes, None where the site has no such page.
+    `link` maps a target in the text to a link of the site, or to None if the site lacks the target.
+    Raise ValueError if the site lacks a picture.
     """
     tokens = _parser().parse(text)
     for token in _all(tokens):
         if token.type == "link_open":
             target = link(str(token.attrs["href"]))
-            # Without a target it is a name, and no link.
+            # Without a target the text remains, but is no link.
             token.attrs = {} if target is None else {"href": target}
         elif token.type == "image":
             source = link(str(token.attrs["src"]))
@@ -48,18 +49,18 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     _anchor(tokens)
     title = tokens[1].content
     html = _parser().renderer.render(tokens[3:], _parser().options, {})
-    # An empty corner is no head of a column.
+    # An empty corner cell is not the head of a column.
     html = html.replace("<th></th>", "<td></td>")
     return Document(_plain(title), Markup(html), list(_parts(tokens)))
 
 
 def inline(text: str) -> Markup:
-    """Render a line of Markdown: code, emphasis, formulas."""
+    """Render one line of Markdown, with code, emphasis and formulas."""
     return Markup(_parser().renderInline(text))
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return a formula of LaTeX as MathML."""
+    """Return a LaTeX formula as MathML."""
     from latex2mathml.converter import convert
 
     return Markup(convert(tex, display="block" if display else "inline"))
@@ -79,7 +80,7 @@ def _parser() -> "MarkdownIt":
     )
     renderer: Any = parser.renderer
     rules = renderer.rules
-    # What may be wider than the page scrolls by itself, by keyboard too.
+    # Elements that may be wider than the page scroll separately, by keyboard too.
     rules["table_open"] = lambda *_: f"{_OPEN}<table>\n"
     rules["table_close"] = lambda *_: "</table></div>\n"
     rules["math_block"] = _block
@@ -112,7 +113,7 @@ def _all(tokens: Sequence["Token"]) -> Iterator["Token"]:
 
 
 def _anchor(tokens: Sequence["Token"]) -> None:
-    """Name headings as GitHub does: links between documents hold here too."""
+    """Give headings the same anchors as GitHub, so that links between documents work here too."""
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
         if opening.type == "heading_open":
@@ -122,12 +123,12 @@ def _anchor(tokens: Sequence["Token"]) -> None:
 
 
 def slug(title: str) -> str:
-    """Return the anchor of a heading."""
+    """Return the anchor that GitHub gives a heading."""
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
 def _plain(text: str) -> str:
-    """Return a line of Markdown as words alone."""
+    """Return a line of Markdown as plain text."""
     return re.sub(r"[`*$\\]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text))
 
 

@@ -1,4 +1,4 @@
-"""The report of `edition`: how much was written, by kind."""
+"""The report of `edition`: the number and size of the written files, by kind."""
 
 from collections.abc import Mapping
 from pathlib import PurePosixPath
@@ -7,18 +7,18 @@ from typing import Any
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Report, Section, Table, digits, words
 
-# A folder that has it was made by `edition`; it lists the files that were written.
+# The file that marks a folder as made by `edition`; it lists the files that were written.
 MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return what JSON says of files: their sizes, and what built them."""
+    """Return the JSON record of files: their sizes in bytes, and the build that wrote them."""
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Report the files of a site that stands in a folder."""
+    """Report the files of a site that was written to a folder."""
     sizes: dict[str, list[int]] = {}
     for name, each in content.items():
         sizes.setdefault(PurePosixPath(name).suffix.lstrip("."), []).append(len(each))

@@ -1,7 +1,8 @@
-"""The site: which pages there are, and what they are made of. Nothing is fetched or computed twice.
+"""The pages of the site and their content.
 
-Every page is a template filled with data and with what the reports of findings say. A page works
-from a file, under any path, and without JavaScript.
+Nothing is fetched from a network, and nothing is computed twice. Every page is a template filled
+with data and with the text of reports. A page works from a file, under any path, and without
+JavaScript.
 """
 
 import json
@@ -27,7 +28,7 @@ from pyharness.views.json import json_text
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-# The menu: title and path, in its order.
+# Title and path of each entry of the menu, in order.
 MENU = (
     ("Listing", "listing/index.html"),
     ("Laboratory", "laboratory.html"),
@@ -46,7 +47,7 @@ _DECKS = {"two-term": "Two-term collocation", "four-term": "Four-term collocatio
 
 
 class Found(NamedTuple):
-    """What the search knows of a place: where it is, its title, its kind, and its words."""
+    """An entry of the search index: the link to a place, its title, its kind and its text."""
 
     href: str
     title: str
@@ -55,22 +56,22 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page: where it is, what fills its template, and what the search finds on it."""
+    """A page: its path, its title, its template with the values, and its search entries."""
 
     path: str
     title: str
     template: str
     context: Mapping[str, Any] = {}
     found: Sequence[Found] = ()
-    menu: str = ""  # the entry of the menu that leads here; its own path where empty
+    menu: str = ""  # path of the page's menu entry; if empty, the page's own path
 
 
 def build_site(
     progress: Callable[[str], None] = lambda _: None, docs: Path | None = None
 ) -> dict[str, bytes]:
-    """Return the files of the site by path; `progress` is told what is being made.
+    """Return the files of the site by path; `progress` is called with the name of each part.
 
-    `docs` is the folder of the documents, that of the checkout by default.
+    `docs` is the folder of the documents, by default the folder of the checkout.
     """
     docs = docs or documents.documents_folder()
     progress("figures")
@@ -176,7 +177,7 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 
 def _rendered(page: Page) -> bytes:
-    # From a page in a folder the site's top is above it: links hold under any path.
+    # The relative path from the page to the top of the site, so that links work under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": page.menu or page.path,
@@ -206,13 +207,13 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return data as a script, for a page that may not fetch: it may come from a file."""
+    """Return data as a script, because a page opened from a file may not fetch data."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 
 
 def vendor() -> list[dict[str, Any]]:
-    """Return what the pages bring along of others: names, versions, checksums."""
+    """Return the third-party packages that the pages include: names, versions, checksums."""
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]
     return packages

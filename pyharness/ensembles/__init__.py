@@ -1,1 +1,1 @@
-"""Sweeps: many scenes on a grid, solved chunk by chunk, kept in a store that resumes."""
+"""Sweeps: many scenes on a grid, solved chunk by chunk and kept in a store that can be resumed."""

@@ -1,4 +1,4 @@
-"""Axes: what varies over a grid, and the values that it takes."""
+"""Axes of a sweep: the fields that vary over its grid, and their values."""
 
 import math
 import zlib
@@ -17,15 +17,15 @@ from pyharness.model.values import finite, integer
 
 Floats = NDArray[np.float64]
 
-# Of one axis: its values are held in memory.
+# Limit for one axis, because its values are held in memory.
 MOST_VALUES = 100_000_000
 SPACINGS = ("linear", "log")
-# Distributions, and the keys that say where they lie.
+# Distributions, and the keys of their parameters.
 DRAWS = {
     "uniform": ("from", "to"),
     "log-uniform": ("from", "to"),
     "normal": ("mean", "deviation"),
-    # Angles from an axis, of directions that prefer none.
+    # Angles between a fixed axis and directions that are uniform on the sphere.
     "sphere": (),
 }
 _KEYS = (
@@ -37,22 +37,23 @@ _SAMPLE = "sample"
 
 @dataclass(frozen=True)
 class Axis:
-    """What varies, and how; axes of one dimension go along it together.
+    """A field that varies over the grid, and its values; axes of one dimension vary together.
 
     Attributes
     ----------
     field : str
-        What of a scene, or of what solves it, takes the values.
+        The field of a scene, or of its solver, that takes the values.
     dimension : str
-        Of the store's arrays: the field's name where nothing else is said, `sample` where drawn.
+        The dimension of the store's arrays. By default it has the field's name, or the name
+        `sample` if the values are drawn from a distribution.
     count : int
-        How many values.
+        The number of values.
     how : str
-        `listed`, a spacing, or a distribution.
+        `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`.
     values : tuple of float or str
-        Those listed; else the two numbers of a spacing or a distribution.
+        The listed values, or the two parameters of a spacing or distribution; `sphere` has none.
     seed : int
-        Of a distribution.
+        The seed of a distribution.
     """
 
     field: str
@@ -64,11 +65,11 @@ class Axis:
 
     @property
     def is_choice(self) -> bool:
-        """Whether its values are words."""
+        """Return whether the values are words and not numbers."""
         return self.field in CHOICES
 
     def coordinates(self) -> NDArray[Any]:
-        """Return all values: floats, or words as objects. Callers must not change them."""
+        """Return all values, as floats or as words. Callers must not change the array."""
         return _coordinates(self)
 
 
@@ -93,7 +94,8 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
 
 
 def _drawn(axis: Axis) -> Floats:
-    # All at once, so that no chunk has a say in it; each field has numbers of its own.
+    # All values are drawn at once, so that they do not depend on the chunks. Each field has its own
+    # random numbers.
     seeds = np.random.SeedSequence([axis.seed, zlib.crc32(axis.field.encode())])
     source = np.random.Generator(np.random.Philox(seeds))
     if axis.how == "sphere":
@@ -105,22 +107,22 @@ def _drawn(axis: Axis) -> Floats:
     if axis.how == "uniform":
         return _between(low, high, lambda a, b: source.uniform(a, b, axis.count))
     drawn = np.exp(source.uniform(math.log(low), math.log(high), axis.count))
-    # Rounding may take a draw beyond the ends, and beyond the range of numbers there.
+    # Rounding may put a value beyond the ends, and even beyond the range of floats.
     return np.clip(drawn, low, high)
 
 
 def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
-    """Return the values made between two ends, even where the distance of these overflows."""
+    """Return the values that `made` returns between two ends, even if their distance overflows."""
     if math.isfinite(last - first):
         return made(first, last)
-    # Halves and doubles are exact: numbers of that size are far from the least.
+    # Halving and doubling are exact, because numbers of that size are far from underflow.
     with np.errstate(over="ignore"):
         doubled = 2.0 * made(0.5 * first, 0.5 * last)
     return np.clip(doubled, min(first, last), max(first, last))
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis that a table of a sweep file describes, the `number`-th, from 1."""
+    """Return the axis that a table of a sweep file describes; `number` counts tables from 1."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")
@@ -203,7 +205,7 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Refuse values that the field can't take; the ends say it, where there are any."""
+    """Return an axis; raise InputError if its field can't take the smallest or largest value."""
     field = NUMBERS[axis.field]
     if axis.how == "sphere":
         return axis

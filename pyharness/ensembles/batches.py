@@ -1,4 +1,4 @@
-"""The batches of a sweep: scenes that one call solves, as arrays."""
+"""Batches of a sweep: the scenes that one call solves, as arrays."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,7 +17,7 @@ Columns = dict[str, Array]
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
-    """Return a listing from the words of a sweep; InputError for names that it does not have."""
+    """Return the listing that the words of a sweep name; raise InputError for an unknown name."""
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
     if names and how == "fix":
@@ -28,7 +28,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the fields of which all scenes of a batch have the same value."""
+    """Return the fields on axes that have one value for all scenes of a batch."""
     fields = [axis.field for axis in sweep.axes]
     found = [name for name in fields if name in CHOICES or NUMBERS[name].looped]
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
@@ -36,7 +36,7 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Yield which of the scenes a batch has, and the batch."""
+    """Yield the batches of some scenes, each with the indices of its scenes among them."""
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
     for members, values in groups([columns[name] for name in looped], len(where[0])):
@@ -73,7 +73,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
-    """Return three numbers for each scene; None where the base has them for all."""
+    """Return three numbers for each scene; None if no axis varies any of them."""
     fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
     if not any(field in own for field in fields):
         return None
@@ -82,7 +82,10 @@ def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | 
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return by what the bodies are given, and how; nothing where it is the scene's for all."""
+    """Return the kind and the values of the bodies; an empty kind and None if no axis varies them.
+
+    The kind is `moments` or `coefficients`.
+    """
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)
         return ("coefficients", found) if found is not None else ("", None)
@@ -95,7 +98,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     if "body.square.1" in own or "body.square.2" in own:
         middle = own.get("body.square.1", np.ones(n))
         least = own.get("body.square.2", np.ones(n))
-        # Integrals of x^2, y^2, z^2 over the mass, the largest 1; every real body has three.
+        # Integrals of x^2, y^2, z^2 over the mass, of which the largest is 1. Every real body has
+        # three.
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
@@ -123,7 +127,7 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors at angles from the axis of the middle moment."""
+    """Return unit vectors by their angles from the middle moment's axis and about it (rad)."""
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
     sine = np.sin(tilt)
@@ -134,6 +138,9 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 
 
 def _on_sphere(height: Array, longitude: Array) -> Array:
-    """Return unit vectors by their third component; equal steps of it are equal areas."""
+    """Return unit vectors by their third component and their longitude (rad).
+
+    Equal intervals of the third component are equal areas of the sphere.
+    """
     across = np.sqrt(1.0 - height * height)
     return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

@@ -1,8 +1,8 @@
 """Checksums of a store: the SHA-256 of each file, bound to its place, its sweep and its version.
 
-A file of checksums is text as `sha256sum --check` reads it. Its first line names the sweep and what
-the file is about, and each further line has the path of a file in the store. So a file that was
-exchanged with another one, or that belongs to another store, does not have its checksum.
+A file of checksums is text that `sha256sum --check` reads. Its first line names the sweep and the
+part of the store. Each further line has the checksum and the path of a file in the store. A file
+that was exchanged with another one, or that belongs to another store, therefore fails the check.
 """
 
 import hashlib
@@ -17,37 +17,37 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """A file of a store is not as it was written; its text says which file, and what is wrong."""
+    """A file of a store is not as it was written; the message names the file and the damage."""
 
 
 class Label(NamedTuple):
     """The identity of a store: its schema, the version of pyharness, the SHA-256 of its sweep."""
 
-    schema: object  # a whole number, where it is a store that pyharness wrote
+    schema: object  # an integer, if pyharness wrote the store
     version: str
     fingerprint: str
 
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
-    """Return the checksums of files of a store as they are now.
+    """Return the content of a file of checksums, for files of a store as they are now.
 
     Parameters
     ----------
     label : Label
         The identity of the store.
     part : str
-        What the files are together, as in "chunk 0/1".
+        The part of the store that the files are, as in "chunk 0/1".
     folder : Path
-        The store.
+        The folder of the store.
     names : sequence of str
-        The paths of the files in it.
+        The paths of the files in the store.
     limit : int
-        The most bytes that one of them can have.
+        The largest size that one of the files can have, in bytes.
 
     Raises
     ------
     DamageError
-        Where a file can't be read, is no ordinary file, or is larger than `limit`.
+        If a file can't be read, is not a regular file, or is larger than `limit`.
     """
     lines = [
         f"# pyharness sweep store, schema {label.schema}, version {label.version}, "
@@ -60,7 +60,7 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Check files of a store against the file `checksums` in it; DamageError where they differ."""
+    """Raise DamageError if files of a store differ from their checksums in the file `checksums`."""
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
     if known != found:
@@ -72,7 +72,7 @@ def check_files(
 
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
-    """Return the content of a file of a store, which has `limit` bytes at the most."""
+    """Return the content of a file of a store; raise DamageError if it exceeds `limit` bytes."""
     handle = _opened(folder, name, limit)
     try:
         with open(handle, "rb") as file:
@@ -85,7 +85,7 @@ def _digest(folder: Path, name: str, limit: int) -> str:
     digest = hashlib.sha256()
     try:
         with open(_opened(folder, name, limit), "rb", buffering=0) as file:
-            # A file that grows meanwhile has no end to wait for.
+            # A limited loop, because a file that grows meanwhile might never end.
             for _ in range(limit // _PIECE + 2):
                 piece = file.read(_PIECE)
                 if not piece:
@@ -97,14 +97,17 @@ def _digest(folder: Path, name: str, limit: int) -> str:
 
 
 def _opened(folder: Path, name: str, limit: int) -> int:
-    """Open an ordinary file; DamageError for a folder, a device, a pipe, or one too large."""
+    """Return the open descriptor of a regular file.
+
+    Raise DamageError if it is a folder, a device or a pipe, or larger than `limit`.
+    """
     try:
-        # Without O_NONBLOCK, opening a pipe waits for someone who writes.
+        # Without O_NONBLOCK, opening a pipe waits for a writer.
         handle = os.open(folder / name, os.O_RDONLY | os.O_NONBLOCK)
     except FileNotFoundError:
         raise DamageError(f"'{name}' is missing") from None
     except PermissionError:
-        raise  # the user's to mend: nothing says that the content is wrong
+        raise  # for the user to correct: the content need not be damaged
     except OSError as error:
         raise DamageError(f"'{name}': {error.strerror or error}") from None
     status = os.fstat(handle)
@@ -122,7 +125,7 @@ def _opened(folder: Path, name: str, limit: int) -> int:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether there is anything by a name; DamageError where that can't be said."""
+    """Return whether a path in a store exists; raise DamageError if that can't be determined."""
     try:
         os.lstat(folder / name)
     except FileNotFoundError:
@@ -133,9 +136,9 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove whatever stands in a file's place, and in the place of the folders it is in.
+    """Remove whatever is at a file's path, and any file in the place of one of its parent folders.
 
-    A link is removed, and what it names stays.
+    A link is removed, but not its target.
     """
     path = folder
     for part in Path(name).parts[:-1]:
@@ -150,7 +153,7 @@ def clear(folder: Path, name: str) -> None:
 
 
 def place(folder: Path, name: str, content: bytes) -> None:
-    """Write a file of a store: it is there whole or not at all."""
+    """Write a file of a store atomically, so that it is either complete or absent."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")

@@ -1,4 +1,4 @@
-"""Processes that work for this one: they hear no Ctrl-C, and end when it does."""
+"""Child processes that do not receive Ctrl-C, and that end when this process ends."""
 
 import contextlib
 import multiprocessing
@@ -12,13 +12,13 @@ from multiprocessing import connection, resource_tracker
 
 @contextlib.contextmanager
 def deaf_children() -> Iterator[None]:
-    """Let no process or thread that this thread starts meanwhile ever hear a Ctrl-C.
+    """Block Ctrl-C (SIGINT) in all processes and threads that this thread starts meanwhile.
 
-    A terminal sends it to all processes, and what follows is the business of this one. This thread
-    hears it afterwards.
+    A terminal sends SIGINT to all processes, but only this one is to handle it. This thread
+    receives it when the context ends.
     """
-    # What is blocked is so in children too. This process of Python's own would be started with the
-    # first of them, and unblock it.
+    # Children inherit a blocked signal. Python would start its resource tracker with the first
+    # child, and would then unblock the signal.
     _start_tracker()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -28,9 +28,10 @@ def deaf_children() -> Iterator[None]:
 
 
 def _start_tracker() -> None:
-    """Start the process that removes semaphores, without its warnings of what was left to it.
+    """Start Python's resource tracker, which removes semaphores, without its warnings of leftovers.
 
-    After a Ctrl-C it outlives this process, and would write them below the line that ends it.
+    After a Ctrl-C the tracker outlives this process, and would write the warnings after this
+    process's last line.
     """
     warning = "ignore:resource_tracker"
     sys.warnoptions.append(warning)
@@ -41,13 +42,13 @@ def _start_tracker() -> None:
 
 
 def end_with_parent() -> None:
-    """End this process as soon as the one that started it has ended, however that came about."""
+    """End this process as soon as its parent process has ended, for any reason."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
 
     def watch() -> None:
-        # The other end of a pipe, which the system closes when the parent is gone.
+        # The sentinel is a pipe, whose other end the system closes when the parent has ended.
         connection.wait([parent.sentinel])
         os._exit(1)
 

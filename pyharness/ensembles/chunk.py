@@ -1,4 +1,4 @@
-"""Scenes of a sweep solved: a chunk of its grid, or any of its scenes."""
+"""Solution of the scenes of a sweep: of a chunk of its grid, or of any scenes."""
 
 from pyharness.ensembles.batches import batches
 from pyharness.ensembles.reductions import empty, reduced
@@ -6,7 +6,7 @@ from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Return the arrays of a chunk, by name: what a task of any executor is."""
+    """Return the arrays of a chunk by name. Every executor runs this function as its task."""
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
     found = solve_points(sweep, points(sweep, box))
@@ -14,7 +14,7 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Return the arrays of scenes, given by an array of indices for each dimension."""
+    """Return the arrays of some scenes by name; `where` has their indices for each dimension."""
     n = len(where[0])
     found = {asked.name: empty(asked, n) for asked in sweep.reductions}
     for members, batch in batches(sweep, where):

@@ -1,4 +1,4 @@
-"""Executors: who computes the chunks; all of them compute the same."""
+"""Executors, which compute the chunks of a sweep; all of them give the same results."""
 
 import asyncio
 import contextlib
@@ -24,27 +24,28 @@ from pyharness.model.errors import InputError
 EXECUTORS = ("here", "processes", "dask")
 Results = Iterator[tuple[int, Arrays]]
 
-_ATTEMPTS = 3  # of a chunk whose process dies
-_AHEAD = 2  # chunks for each process, so that none waits for the disk
-_ANSWER = 4.0  # s, until a scheduler must have answered, and until it must have a worker
+_ATTEMPTS = 3  # consecutive deaths of a process, without a finished chunk, that end the sweep
+_AHEAD = 2  # chunks submitted for each process, so that no process waits for the disk
+_ANSWER = 4.0  # s, in which a scheduler must answer, and in which it must have a worker
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
 
 
 class Engine(NamedTuple):
-    """Who computes: how many at once, and what yields chunks of a sweep as they are computed."""
+    """A started executor: its number of workers, and a function that yields computed chunks."""
 
     workers: int
     computed: Callable[[Sweep, list[int]], Results]
-    is_here: bool = False  # whether the process that keeps the results computes them too
+    is_here: bool = False  # whether the process that writes the results also computes them
 
 
 @contextlib.contextmanager
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start what computes, and end it; InputError where a scheduler's address has none.
+    """Start an executor, yield its engine, and end it.
 
-    Its results raise InputError where nobody is left to compute them.
+    Raise InputError if no scheduler answers at the address. The engine's results raise InputError
+    if no process or worker is left to compute them.
     """
     if executor == "here":
         yield Engine(1, _here, is_here=True)
@@ -57,7 +58,7 @@ def engine(
 
 
 def _processors() -> int:
-    # Those that this process may use, where the system tells.
+    # The processors that this process may use, if the system reports them.
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -77,7 +78,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
                 left.remove(chunk)
                 yield chunk, found
         except BrokenProcessPool:
-            # Someone killed a process: its chunks are lost, and those that waited beside it.
+            # A process was killed. Its chunks are lost, and so are those that were waiting.
             deaths = 1 if len(left) < before else deaths + 1
             if deaths == _ATTEMPTS:
                 raise InputError(
@@ -87,7 +88,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
 
 
 def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
-    # A fork of a process with threads, as those of NumPy and Zarr, may never wake up.
+    # Not by fork: the fork of a process with threads, as NumPy and Zarr start them, may hang.
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, context, end_with_parent)
     waiting: dict[Future[Arrays], int] = {}
@@ -95,7 +96,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
     try:
         while True:
             while len(waiting) < _AHEAD * workers and (chunk := next(rest, None)) is not None:
-                # It starts processes as long as there are too few.
+                # The pool starts a process here while it has too few.
                 with deaf_children():
                     waiting[pool.submit(solve_chunk, sweep, chunk)] = chunk
             if not waiting:
@@ -103,7 +104,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 yield waiting.pop(future), future.result()
     finally:
-        # What they still compute is lost; to wait for it may be to wait for ever.
+        # Chunks in computation are discarded, because waiting for them might never end.
         processes = list((pool._processes or {}).values())
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
@@ -111,7 +112,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
 
 
 def check_dask() -> None:
-    """Refuse where Dask is missing."""
+    """Raise InputError if Dask is not installed."""
     try:
         import distributed  # noqa: F401
     except ImportError:
@@ -121,7 +122,7 @@ def check_dask() -> None:
 @contextlib.contextmanager
 def _client(workers: int, address: str | None) -> Iterator[Any]:
     dask: Any = import_module("distributed")
-    # What it logs, of workers that come and go, is for those who look after a cluster.
+    # Its log of workers that come and go is meant for administrators of a cluster.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if address is not None:
         with _connected(dask, address) as client:
@@ -133,7 +134,7 @@ def _client(workers: int, address: str | None) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
-    """Yield a client of a cluster on this machine, which is started while Ctrl-C is heard."""
+    """Yield a client of a new cluster on this machine; Ctrl-C works while the cluster starts."""
     started: list[Any] = []
     errors: list[Exception] = []
     wanted = threading.Event()
@@ -153,7 +154,8 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
         except Exception as error:
             errors.append(error)
 
-    # It takes seconds. Threads and processes that it starts hear no Ctrl-C, as this thread does.
+    # The start takes seconds. The cluster's threads and processes do not receive Ctrl-C; this
+    # thread does.
     thread = threading.Thread(target=start, daemon=True)
     thread.start()
     try:
@@ -170,7 +172,7 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
 
 
 def _connected(dask: Any, address: str) -> Any:
-    """Return a client of the scheduler at an address; InputError where nobody answers."""
+    """Return a client of the scheduler at an address; raise InputError if none answers."""
     found = _ADDRESS.fullmatch(address)
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
     where = f"--scheduler '{address}'"
@@ -179,11 +181,11 @@ def _connected(dask: Any, address: str) -> Any:
     place = found["host"].strip("[]"), int(found["port"])
     answered: list[bool] = []
     try:
-        # Whoever is not there says so at once; Dask would ask again and again.
+        # A plain connection fails at once if nobody listens; Dask would retry again and again.
         socket.create_connection(place, timeout=_ANSWER).close()
         asyncio.run(asyncio.wait_for(_has_workers(dask, address, answered), _ANSWER))
         return dask.Client(address, timeout=_ANSWER, set_as_default=False)
-    except Exception as error:  # what answers there may make anything of the question
+    except Exception as error:  # a server that is no scheduler may send any answer
         reason = "no Dask scheduler answers there"
         if answered:
             reason = "it has no worker"
@@ -193,8 +195,8 @@ def _connected(dask: Any, address: str) -> Any:
 
 
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
-    """Return once a scheduler has workers, and say when it has answered; wait without end."""
-    # A client waits for half a minute where something takes the connection and says nothing.
+    """Wait without limit until a scheduler has workers; append to `answered` when it answers."""
+    # A client would wait for half a minute if a server accepts the connection and stays silent.
     async with dask.rpc(address) as scheduler:
         while not (await scheduler.identity())["workers"]:
             answered.append(True)
@@ -202,7 +204,10 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Keep every worker busy; what dies with one is computed again by another, as Dask does."""
+    """Yield the chunks that a cluster computes, and keep all of its workers busy.
+
+    Dask computes the chunks of a worker that has died again on another one.
+    """
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())
     rest = iter(chunks)
@@ -211,7 +216,8 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
 
     def submit() -> None:
         if (chunk := next(rest, None)) is not None:
-            # The sweep with each: what is sent once may be lost with the workers that have it.
+            # Each task has the sweep, because data sent once may be lost with the workers that
+            # have it.
             future = client.submit(solve_chunk, sweep, chunk, pure=False)
             chunk_of[future.key] = chunk
             running.add(future)
@@ -228,7 +234,7 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
             ) from None
         except InputError:
             raise
-        except Exception as error:  # of a worker that lacks something, or a scheduler that is gone
+        except Exception as error:  # a worker lacks something, or the scheduler is gone
             raise InputError(
                 f"--executor dask: chunk {chunk_of[future.key]}: {type(error).__name__}: {error}; "
                 "the same command goes on with what is missing"

@@ -1,9 +1,9 @@
-"""What an axis may vary: numbers of a scene or its solver, and words that choose a solver."""
+"""Fields that an axis may vary: numbers of a scene or solver, and words that select a solver."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-# Words: the program or method, and how the program reads.
+# Fields of words: the program or method, and the program's listing and readings.
 CHOICES = {
     "program": "a program of the appendix",
     "method": "a method",
@@ -14,9 +14,10 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a scene, or of what solves it.
+    """A number of a scene, or of its solver, that an axis may vary.
 
-    `looped` says that scenes of one call share it; programs take two of these as arrays.
+    If `looped`, all scenes of one call share the value. Programs take two of these fields as arrays
+    (`OF_PROGRAMS` in `pyharness.methods.batch`).
     """
 
     units: str
@@ -72,7 +73,7 @@ NUMBERS = {
         "1/s", "constant of the stop test", "a number from 0", lambda v: v >= 0.0, looped=True
     ),
 }
-# Ways to say one thing, of which a sweep takes one.
+# Alternative groups of fields for the same quantity; a sweep may use only one of each pair.
 RIVALS = (
     (
         ("omega.1", "omega.2", "omega.3"),
@@ -88,10 +89,10 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return all that an axis may vary."""
+    """Return the names of all fields that an axis may vary."""
     return [*NUMBERS, *CHOICES]
 
 
 def units_of(field: str) -> str:
-    """Return the unit of a field; nothing for words."""
+    """Return the unit of a field; an empty string for a field of words."""
     return NUMBERS[field].units if field in NUMBERS else ""

@@ -1,4 +1,4 @@
-"""Forecast of a sweep: how long it is going to take, by a sample of its scenes and of its files."""
+"""Forecast of a sweep's duration, measured on a sample of its scenes and of its files."""
 
 import math
 import time
@@ -13,21 +13,21 @@ from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import scratch
 from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread
 
-# Of a sample: scenes from all over the grid, first a few.
+# Numbers of scenes in the samples, which are taken from all over the grid, the smallest first.
 _SAMPLES = (8, 256, 2048, 8192)
-_ENOUGH = 0.2  # s
-# A larger sample is taken beyond that where it is a small part of the sweep, and takes at most so
-# long: what a batch takes whatever its size would else count as its scenes'.
+_ENOUGH = 0.2  # s, after which a sample is large enough
+# A larger sample is taken even then if it is at most this part of the sweep and takes at most this
+# long. In a small sample the constant cost of a batch would count as the cost of its scenes.
 _PART = 0.01
 _LONGEST = 60.0  # s
-_PLACES = 5  # of the sample, along what scenes of one batch share
+_PLACES = 5  # distinct values in a sample along a dimension whose value a batch shares
 _PACE = 3e8  # bytes that are compressed and written in a second
-_FILES = 20  # chunks that are written and read for a sample, at the most
+_FILES = 20  # largest number of chunks that are tried for a sample
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a sweep is going to take: bytes before compression, seconds of what is missing."""
+    """The expected cost of a sweep's missing chunks: bytes before compression, and seconds."""
 
     n_scenes: int
     n_chunks: int
@@ -38,9 +38,9 @@ class Estimate:
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the seconds that the missing chunks of a store take: to solve, write and read them.
+    """Return the seconds to solve and write the missing chunks of a store, and to read all chunks.
 
-    The process that writes computes nothing where others compute: the longer of the two counts.
+    If other processes compute, this process only writes. The longer of the two times counts then.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -49,9 +49,9 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the times to write and to read the files of a chunk, tried out beside a store.
+    """Return the seconds to write and to read the files of a chunk, measured next to a store.
 
-    Both are 0 where the disk takes no file: the sweep itself will say so.
+    Both are 0 if the disk refuses the files; the sweep itself then reports the error.
     """
     times = []
     try:
@@ -68,13 +68,13 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
                     break
     except OSError:
         return 0.0, 0.0
-    # The first has to import what Zarr needs.
+    # The first chunk does not count, because it imports what Zarr needs.
     write, read = np.mean(times[1:] or times, axis=0)
     return float(write), float(read)
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return arrays of a chunk that are not compressed to nothing."""
+    """Return arrays of a chunk with random values, which can't be compressed to almost nothing."""
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
     found = {}
@@ -87,12 +87,12 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:
-    """Return the time to solve a chunk, by a sample of scenes or of whole chunks."""
+    """Return the seconds to solve a chunk, measured on a sample of scenes or of whole chunks."""
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
     if seconds > _ENOUGH:
         return seconds
-    # What a chunk takes whatever its size is seen in whole chunks alone.
+    # Only whole chunks show the constant cost of a chunk.
     begin = time.perf_counter()
     count = min(_FILES, sweep.n_chunks)
     for i in range(count):
@@ -104,9 +104,9 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 
 
 def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the time of a scene, by a sample from all over the grid; of this process alone."""
+    """Return the seconds to solve a scene in this process, measured on samples of the grid."""
     seconds = math.nan
-    # The first has to import what solves.
+    # This call is not timed, because it imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
     for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
         where = places_of_a_chunk(sweep, spread(sweep, count))
@@ -121,7 +121,10 @@ def seconds_per_scene(sweep: Sweep) -> float:
 
 
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
-    """Move a sample to a few of the places that scenes of one batch share, as a chunk has many."""
+    """Return a sample moved to a few values of each dimension whose value a batch shares.
+
+    The batches of the sample then have many scenes, as those of a chunk do.
+    """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found = []
     for (name, count), places in zip(sweep.dimensions.items(), where, strict=True):
@@ -133,7 +136,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
 
 
 def format_estimate(estimate: Estimate) -> str:
-    """Say an estimate in a line."""
+    """Return an estimate as a line of text."""
     missing = estimate.n_missing
     rest = "" if missing == estimate.n_chunks else f", {short_count(missing)} of them missing"
     return (
@@ -144,7 +147,7 @@ def format_estimate(estimate: Estimate) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Say a time as people do."""
+    """Return a duration as text, in seconds, minutes, hours or days."""
     for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
         if seconds < limit:
             return (
@@ -156,12 +159,12 @@ def duration(seconds: float) -> str:
 
 
 def short_count(number: int) -> str:
-    """Write a count: all its digits, or four of a large one."""
+    """Return a count as text, with all its digits, or with four if it is large."""
     return str(number) if number < 10**7 else f"{float(number):.4g}"
 
 
 def byte_count(number: float) -> str:
-    """Write a number of bytes with its unit."""
+    """Return a number of bytes as text, with its unit."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if number < 1000.0:
             return f"{number:.3g} {unit}"

@@ -1,4 +1,4 @@
-"""The picture of a sweep: one reduction over one or two dimensions, the others panel by panel."""
+"""The picture of a sweep: a reduction over one or two dimensions, with panels for the others."""
 
 import itertools
 from typing import TYPE_CHECKING, Any
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MOST_PANELS = 6
-_MOST_PLACES = 200  # along an axis of a map; more would not be seen
+_MOST_PLACES = 200  # points along an axis of a map; more would not be visible
 _MOST_DOTS = 5000
 _COLUMNS = 3
-_ORDERS = 3.0  # of magnitude, from which numbers above 0 are shown by their logarithm
+_ORDERS = 3.0  # orders of magnitude above which positive values are shown on a logarithmic scale
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction to draw: the one named, or the first that is no word."""
+    """Return the reduction to draw: the named one, or the first whose values are not words."""
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
         raise unknown("reduction", name, names, "--quantity")
@@ -34,14 +34,18 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 
 
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
-    """Draw a reduction: a map where two dimensions have numbers, else a line or dots."""
+    """Return the picture of a reduction.
+
+    It is a map if two dimensions have numbers on a grid, else a line or dots.
+    """
     from matplotlib.figure import Figure
 
     sweep = store.sweep
     axis_of = {axis.dimension: axis for axis in reversed(sweep.axes)}
     long = [d for d, axis in axis_of.items() if axis.count > 1 and not axis.is_choice]
     ordered = [d for d in sweep.dimensions if d in long]
-    # A map of two grids; what was drawn has no order, and stands as dots.
+    # Two dimensions of a grid make a map. Values from a distribution have no order, and are shown
+    # as dots.
     shown = [d for d in ordered if not _is_drawn(axis_of[d])][-2:] or ordered[-1:]
     panels = _panels(store, asked, axis_of, shown)
     rows = -(-len(panels) // _COLUMNS)
@@ -83,7 +87,7 @@ Panel = tuple[str, list[Array], Array]
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
 ) -> list[Panel]:
-    """Return what is drawn: in words what stands still, the places along `shown`, the values."""
+    """Return the panels: the fixed values in words, the indices along `shown`, and the values."""
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
     places = [_thinned(axis_of[d].count, most) for d in shown]

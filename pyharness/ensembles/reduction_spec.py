@@ -1,4 +1,4 @@
-"""What a sweep file asks for, checked against what there is."""
+"""The reductions that a sweep file requests, checked against the available ones."""
 
 from collections.abc import Mapping
 
@@ -12,9 +12,10 @@ _MOST_SAMPLES = 10_000
 
 
 def reduction_spec_of(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
-    """Return the reduction that a sweep file asks for: its name, or a table of name and parameters.
+    """Return the reduction that an entry of a sweep file requests.
 
-    `claims` says where the function of each claim stands.
+    The entry is a name, or a table with a name and parameters. `claims` has the function of each
+    claim, as in ``package.module:name``.
     """
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:

@@ -1,4 +1,4 @@
-"""Reductions: what is kept of each scene. One function each, and what is so of it."""
+"""Reductions: the quantities that are kept for each scene, with their functions and properties."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -16,34 +16,34 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array
 from pyharness.theory.flips import flip_times
 
 Found = NDArray[Any]
-# The axes of a body, by their moments.
+# The axes of a body, in the order of their moments.
 RANKS = ("least", "middle", "largest")
-# What an integer array holds where no scene has been computed yet.
+# Value of an integer array where no scene has been computed yet.
 _NOT_YET = -1
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """What is kept of each scene, and who can give it.
+    """A quantity that is kept for each scene, and the conditions under which it is available.
 
     Attributes
     ----------
     title, units : str
-        In words; the unit of its numbers.
+        The description of the quantity in words, and its unit.
     compute : callable
-        From a batch, and the parameters by name, to n values.
+        A function of a batch and of the parameters by name, which returns n values.
     dtype : str
-        Of the array; NaN, or -1 in whole numbers, stands where nothing is computed yet.
+        The type of the array. NaN, or -1 in an integer array, marks values not computed yet.
     labels : tuple of str
-        Of the last dimension, `dimension`, where a scene has several values.
+        The labels of the last dimension, `dimension`, if a scene has several values.
     only : str
-        `program` or `method` where the other can't give it.
+        `program` or `method` if only one of these can give the quantity.
     needs : tuple of str
-        What of `moments` and `no torque` it needs.
+        The requirements, from `moments`, `no torque` and `attitude`.
     parameters : mapping
-        Names, and their default values.
+        The names of the parameters, with their default values.
     flags : mapping
-        Words for its values, by value.
+        The meaning of each value in words, if the values are codes.
     """
 
     title: str
@@ -59,7 +59,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """What stands where nothing is computed yet."""
+        """Return the value that marks a result not computed yet."""
         return np.nan if self.dtype == "f8" else _NOT_YET
 
 
@@ -78,7 +78,7 @@ def _error(batch: Batch, given: Mapping[str, Any]) -> Found:
     largest = np.abs(batch.omega0).max(axis=1)
     worst = np.zeros(len(rows))
     for i in range(samples):
-        # A program's rows lie at whole steps.
+        # A program has rows at whole steps only.
         part = batch.sample_steps(samples)[i] / steps if batch.is_program else (i + 1) / samples
         truth = batch.by_method(given["against"], given["tolerance"], part)
         largest = np.fmax(largest, np.abs(truth).max(axis=1))
@@ -96,7 +96,7 @@ def _stop_variable(batch: Batch, _: Mapping[str, Any]) -> Found:
 
 
 def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
-    # Of the first step that gave no finite row.
+    # The time of the first step without a finite row.
     time = (batch.n_rows + 1) * batch.step_sizes
     return np.where(batch.status == Statuses.OVERFLOW, time, np.nan)
 
@@ -120,7 +120,7 @@ def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
     start, rows = _unit(batch.omega0)[:, None, :], _unit(batch.rows(given["samples"]))
-    # Of two unit vectors; the arc cosine would lose half of the digits of a small angle.
+    # Angle of two unit vectors; the arc cosine would lose half of the digits of a small angle.
     angles: Found = 2.0 * np.arctan2(
         np.linalg.norm(rows - start, axis=2), np.linalg.norm(rows + start, axis=2)
     )
@@ -257,15 +257,15 @@ REDUCTIONS = {
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return the array of n scenes of which nothing is computed yet."""
+    """Return the array of a reduction for n scenes, none of which is computed yet."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return what is kept of a batch."""
+    """Return the values of a reduction for a batch."""
     given = {**dict(asked.parameters), "function": asked.function}
-    # What left the range of numbers stays what it is.
+    # Infinities and NaN are results like others.
     with np.errstate(all="ignore"):
         return REDUCTIONS[asked.reduction].compute(batch, given)

@@ -1,4 +1,4 @@
-"""The report of `sweep`: the axes, and what the reductions found, chunk by chunk from the store."""
+"""The report of `sweep`: the axes, and statistics of the reductions, read chunk by chunk."""
 
 from collections import Counter
 from typing import Any, NamedTuple
@@ -27,7 +27,10 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 
 
 class Found(NamedTuple):
-    """What a reduction, or a component of one, found: how many numbers, how many none."""
+    """Statistics of a reduction, or of a component of one.
+
+    `scenes` counts the scenes with a finite value, and `none` the others.
+    """
 
     name: str
     label: str
@@ -40,7 +43,7 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return what a reduction found, component by component; of one with words how many of each."""
+    """Return the statistics of a reduction by component; for codes, the count of each code."""
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
     count, none, total = (np.zeros(len(labels)) for _ in range(3))
@@ -76,7 +79,7 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
 
 
 def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
-    """Report what the store holds, and what this call had to do for it."""
+    """Return the report of a store's content, and of the work that this call did."""
     sweep = store.sweep
     found: list[Found] = []
     flags: list[tuple[str, str, int]] = []

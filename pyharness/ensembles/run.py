@@ -1,4 +1,4 @@
-"""Run a sweep: estimate, refuse, compute what is missing, keep it."""
+"""The run of a sweep: check its size, forecast its duration, and compute the missing chunks."""
 
 import contextlib
 import math
@@ -16,17 +16,17 @@ from pyharness.ensembles.store import Store, check_store, opened
 from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
 
-# Chunks that a process holds at once, with what it takes to compute them.
+# Memory of a process, in chunks: those that it holds at once, and what computing them takes.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a call did.
+    """The work that a call did.
 
-    `before` counts the chunks that were there, `computed` those that were computed in `seconds`,
-    and `repaired` those among them that were damaged.
+    `before` counts the chunks that existed before, `computed` those that were computed in
+    `seconds`, and `repaired` those of the computed ones that had been damaged.
     """
 
     estimate: Estimate | None
@@ -37,15 +37,15 @@ class Outcome:
 
 
 def bytes_per_scene(sweep: Sweep) -> int:
-    """Return what a scene takes in the store, before compression."""
+    """Return the number of bytes of a scene in the store, before compression."""
     return sum(empty(asked, 1).nbytes for asked in sweep.reductions)
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the bytes on disk of `missing` chunks, and in memory.
+    """Return the bytes that a sweep needs on disk, for `missing` chunks, and in memory.
 
-    InputError where either can't hold them. Nothing is allocated for it: a grid of any size is
-    refused at once.
+    Raise InputError if the disk or the memory can't hold them. The check allocates nothing, so that
+    a grid of any size is refused at once.
     """
     n_bytes = sweep.n_scenes * bytes_per_scene(sweep) * missing // sweep.n_chunks
     shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"
@@ -87,7 +87,7 @@ def swept(
     progress: Callable[[str], None] = lambda text: None,
     repair: bool = False,
 ) -> Iterator[tuple[Store, Outcome]]:
-    """Compute what a store lacks of a sweep, and yield the store, open, and what was done.
+    """Compute the missing chunks of a sweep, and yield the open store and the outcome.
 
     The parameters and errors are those of `run_sweep`.
     """
@@ -95,7 +95,7 @@ def swept(
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
     with contextlib.ExitStack() as stack:
         try:
-            # Whoever does not answer is found out before anything is made.
+            # A scheduler that does not answer is found before any file is written.
             with engine(executor, workers, address) as own:
                 store = stack.enter_context(opened(sweep, path, repair))
                 outcome = _completed(store, own, before, progress)
@@ -117,33 +117,34 @@ def run_sweep(
     progress: Callable[[str], None] = lambda text: None,
     repair: bool = False,
 ) -> Outcome:
-    """Compute what a store lacks of a sweep.
+    """Compute the chunks of a sweep that a store does not have yet.
 
     Parameters
     ----------
     sweep : Sweep
-        What to compute.
+        The sweep.
     path : str
-        Of the store, a folder, which is made if it is missing.
+        The path of the store, a folder, which is made if it is missing.
     executor : {"here", "processes", "dask"}
-        Who computes: this process, others on this machine, or a cluster.
+        The executor: this process, other processes on this machine, or a Dask cluster.
     workers : int, optional
-        How many processes; by default as many as there are processors.
+        The number of processes; by default the number of processors.
     address : str, optional
-        Of a scheduler, for `dask`.
+        The address of a scheduler, for `dask`.
     before : callable
-        Is told the estimate, before anything is computed.
+        A function that is called with the estimate before anything is computed.
     progress : callable
-        Is told how far it is.
+        A function that is called with a line of text after each chunk.
     repair : bool
-        Compute damaged chunks again, and write damaged metadata again, instead of an error.
+        Whether to compute damaged chunks again, and to write damaged metadata again, instead of
+        raising an error.
 
     Raises
     ------
     InputError
-        For a store of another sweep, a damaged store, a size that disk or memory can't hold, a disk
-        that is full, a cluster that does not answer. What was computed stays, and the next call
-        goes on from it.
+        If the store belongs to another sweep or is damaged, or if the cluster does not answer. Also
+        if the disk or the memory can't hold the sweep, or if the disk is full. Computed chunks stay
+        in the store, and the next call computes the remaining ones.
     """
     with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
         return outcome
@@ -173,7 +174,7 @@ def _completed(
             rest = spent / n * (len(missing) - n)
             progress(f"chunk {n_before + n} of {sweep.n_chunks}, {duration(rest)} left")
     finally:
-        # Processes and connections end here, not when the garbage is collected.
+        # Processes and connections end here, and not only at garbage collection.
         close = getattr(results, "close", None)
         if close is not None:
             close()

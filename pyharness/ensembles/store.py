@@ -1,9 +1,9 @@
 """The store of a sweep: a Zarr group in a folder, one array for each reduction.
 
 A chunk of the grid is one file of each array, and a file of their checksums, which is written last.
-Every file is written under another name and renamed, so that a chunk whose checksums are there is
-done, whenever and however the writing ended; and its checksums tell whether it still is what was
-written.
+Every file is written under another name and then renamed. A chunk with checksums is therefore
+complete, whenever and however the writing ended. The checksums show whether the files still are as
+they were written.
 """
 
 import contextlib
@@ -39,13 +39,13 @@ from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
 from pyharness.model.schema import check_schema
 
-_UNFINISHED = "*.partial"  # what Zarr calls a file that it has not renamed yet
+_UNFINISHED = "*.partial"  # Zarr's name for a file that is not renamed yet
 _SAME_SWEEP = "give another --out, or remove it"
 _REPAIR = "'pyharness sweep' with --repair"
 
 
 def check_zarr() -> None:
-    """Refuse to keep anything where Zarr is missing."""
+    """Raise InputError if Zarr is not installed."""
     try:
         import zarr  # noqa: F401
     except ImportError:
@@ -58,20 +58,20 @@ class Store:
     Attributes
     ----------
     sweep : Sweep
-        What it holds.
+        The sweep whose results it holds.
     folder : Path
-        Where it is.
+        The folder of the store.
     repaired : int
-        How many damaged chunks were removed when it was opened, to be computed again.
+        The number of damaged chunks that were removed at opening, to be computed again.
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
-        """Open what is there."""
+        """Open the arrays in an existing folder."""
         import zarr
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
         group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
-        # A chunk may hold nothing but what stands for nothing, and is kept all the same.
+        # Zarr must also write a chunk that holds only the fill value.
         with zarr.config.set({"array.write_empty_chunks": True}):
             self._arrays: dict[str, Any] = {
                 asked.name: group[asked.name] for asked in sweep.reductions
@@ -80,9 +80,9 @@ class Store:
         self._done = [False] * sweep.n_chunks
 
     def check(self, repair: bool = False) -> None:
-        """Find out which chunks are done, and compare each with its checksums.
+        """Find the chunks that are complete, and compare each of them with its checksums.
 
-        InputError where one is damaged; with `repair` it is removed instead.
+        Raise InputError if a chunk is damaged; with `repair` it is removed instead.
         """
         damages = {}
         for chunk in range(self.sweep.n_chunks):
@@ -106,11 +106,11 @@ class Store:
         self.repaired = len(damages)
 
     def done(self) -> list[bool]:
-        """Return for each chunk whether it is whole."""
+        """Return for each chunk whether it is complete."""
         return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
-        """Keep a chunk; OSError where the disk does not take it, and then it is not done."""
+        """Write a chunk. Raise OSError if the disk refuses it; the chunk is then not complete."""
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
         try:
@@ -121,20 +121,20 @@ class Store:
         self._done[chunk] = True
 
     def read(self, name: str, chunk: int) -> Any:
-        """Return a chunk of a reduction."""
+        """Return a chunk of a reduction's array."""
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:
-        """Return the array of a reduction, of which what is asked for is read."""
+        """Return the Zarr array of a reduction, which reads only the parts that are indexed."""
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:
-        """Return whether a chunk is whole; DamageError where it is not what was written."""
+        """Return whether a chunk is complete; raise DamageError if it is not as it was written."""
         checksums = self._checksums(chunk)
         if exists(self.folder, checksums):
             check_files(*self._described(chunk), checksums)
             return True
-        # It was not finished: what is there is written over, where that is possible.
+        # The chunk was not finished. Its files will be overwritten, so they must be regular files.
         for name in self._files(chunk):
             if exists(self.folder, name) and not (self.folder / name).is_file():
                 raise DamageError(f"'{name}' is no ordinary file")
@@ -157,11 +157,11 @@ class Store:
 
 @contextlib.contextmanager
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
-    """Make or open the store of a sweep, and check all of it; no other process has it meanwhile.
+    """Make or open the store of a sweep, lock it against other processes, and check all of it.
 
-    InputError for a store of another sweep, a folder that is none, or a store that is damaged; all
-    stay as they were. With `repair`, what is damaged is removed, and is as if it had not been
-    computed yet.
+    Raise InputError if the path is the store of another sweep, a folder that is no store, or a
+    damaged store; all of these stay as they are. With `repair`, damaged chunks are removed and
+    count as not computed yet, and damaged metadata are written again.
     """
     check_zarr()
     folder = Path(path)
@@ -172,7 +172,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            # A file system that knows no locks has none to respect.
+            # Other errors come from file systems without locks, and are ignored.
             if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
                 raise InputError(
                     f"--out '{path}': another sweep is writing to it; wait for its end, or give "
@@ -193,7 +193,10 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether a store is there; InputError where something is that is not this sweep's."""
+    """Return whether a path has the store of this sweep.
+
+    Raise InputError if the path has anything else, or if no store can be made there.
+    """
     folder = Path(path)
     if not path or "\0" in path:
         raise InputError(f"--out '{path}': give a folder, which is made if it is missing")
@@ -215,7 +218,7 @@ def check_store(sweep: Sweep, path: str) -> bool:
     ours, known = label(sweep), labels(folder)
     if not known:
         raise InputError(f"--out '{path}': is not empty, and no store of a sweep; give a new name")
-    # Either may be damaged, which is found out and said when the store is opened.
+    # Either identity may be damaged, which is found and reported when the store is opened.
     if any(type(each.schema) is int and each == ours for each in known):
         return True
     found = known[0]
@@ -232,7 +235,10 @@ def check_store(sweep: Sweep, path: str) -> bool:
 
 
 def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
-    """Compare what no chunk has with its checksums; write it anew where `repair` is given."""
+    """Compare the metadata with their checksums, and write damaged metadata again with `repair`.
+
+    Raise InputError if they are damaged and `repair` is not set.
+    """
     files = metadata_files(sweep)
     try:
         check_files(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)
@@ -249,12 +255,12 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make the store beside its place, and rename it: it is there whole or not at all."""
+    """Make the store under another name and rename it, so that it is either complete or absent."""
     with filled(sweep, folder) as new:
         try:
             os.rename(new, folder)
         except OSError as error:
-            # Another process was faster: that is a store as any other.
+            # Another process was faster, and its store is used as any other.
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or not check_store(
                 sweep, str(folder)
             ):
@@ -263,6 +269,6 @@ def _make(sweep: Sweep, folder: Path) -> None:
 
 @contextlib.contextmanager
 def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
-    """Yield an empty store of a sweep beside a path, to be tried out, and remove it."""
+    """Yield an empty store of a sweep next to a path, for trials, and remove it."""
     with filled(sweep, Path(path)) as new:
         yield Store(sweep, new)

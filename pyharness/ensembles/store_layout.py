@@ -1,4 +1,4 @@
-"""The layout of a store: its arrays, what describes them, and how it says whose it is."""
+"""The layout of a store: its arrays, their metadata, and the identity of the store."""
 
 import contextlib
 import json
@@ -26,7 +26,7 @@ from pyharness.ensembles.sweep import Sweep
 from pyharness.model.distribution import version
 from pyharness.model.schema import SCHEMAS
 
-CHECKSUMS = "checksums"  # the group in a store that holds them; no array may be called so
+CHECKSUMS = "checksums"  # the group of the checksums in a store; no array may have this name
 METADATA = f"{CHECKSUMS}/metadata"
 LARGEST_METADATA = 1 << 28  # bytes
 _HEAD = re.compile(
@@ -40,7 +40,7 @@ def label(sweep: Sweep) -> Label:
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identity of a store, as its metadata and as their checksums have it."""
+    """Return the identities of a store that its metadata and the checksums of these state."""
     found = []
     with contextlib.suppress(
         DamageError, OSError, ValueError, LookupError, TypeError, RecursionError
@@ -58,7 +58,7 @@ def labels(folder: Path) -> list[Label]:
 
 
 def metadata_files(sweep: Sweep) -> list[str]:
-    """Return the files of a store that no chunk has: descriptions, and the values of the axes."""
+    """Return the files of a store that belong to no chunk: metadata, and the values of the axes."""
     labels = {
         reduction.dimension
         for reduction in (REDUCTIONS[asked.reduction] for asked in sweep.reductions)
@@ -74,7 +74,7 @@ def metadata_files(sweep: Sweep) -> list[str]:
 
 @contextlib.contextmanager
 def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
-    """Yield a new store beside a folder, and remove what is left of it."""
+    """Yield a new store next to a folder, and remove what is left of it."""
     new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
     try:
         _fill(sweep, new)
@@ -99,7 +99,7 @@ def _fill(sweep: Sweep, folder: Path) -> None:
     with zarr.config.set({"array.write_empty_chunks": True}):
         _fill_group(zarr.create_group(folder, zarr_format=3, attributes=attributes), sweep)
     with warnings.catch_warnings():
-        # xarray looks for it, and warns where it is missing; Zarr warns where it is made.
+        # xarray warns if consolidated metadata are missing; Zarr warns if they are made.
         warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
         zarr.consolidate_metadata(folder)
     text = checksum_text(label(sweep), "metadata", folder, metadata_files(sweep), LARGEST_METADATA)
@@ -153,8 +153,8 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
         name,
         shape=shape,
         chunks=chunk,
-        # Not by Zarr's default, which another version may change: a chunk that is computed again
-        # has the same bytes.
+        # Not Zarr's default, which another version may change: a chunk that is computed again must
+        # have the same bytes.
         compressors=ZstdCodec(level=0, checksum=False),
         dtype=reduction.dtype,
         fill_value=reduction.fill,
@@ -164,6 +164,6 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return the most bytes that a file of a chunk can have, compressed or not."""
+    """Return the largest size of a chunk's file in bytes, compressed or not."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

@@ -1,4 +1,4 @@
-"""A sweep: a scene, the axes of a grid, what solves it, what is kept, and how it is cut."""
+"""A sweep: a scene, the axes of a grid, a solver, reductions, and the division into chunks."""
 
 import itertools
 import math
@@ -18,9 +18,10 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class ReductionSpec:
-    """A reduction asked for, under the name of its array.
+    """A requested reduction, with the name of its array.
 
-    `function` is where the one of a claim stands, as in ``package.module:name``; else empty.
+    For a claim, `function` is the place of its function, as in ``package.module:name``; for other
+    reductions it is empty.
     """
 
     name: str
@@ -31,24 +32,24 @@ class ReductionSpec:
 
 @dataclass(frozen=True)
 class Sweep:
-    """All of a sweep file.
+    """The content of a sweep file.
 
     Attributes
     ----------
     name : str
-        Of the sweep.
+        The name of the sweep.
     scene : Scene
-        What everything not on an axis is taken from.
+        The scene that supplies everything that is not on an axis.
     axes : tuple of Axis
-        In the order of the file.
+        The axes, in the order of the file.
     solver : Solver
-        What solves.
+        The method or program that solves the scenes, with its settings.
     reductions : tuple of ReductionSpec
-        What is kept.
+        The quantities that are kept.
     chunk : int
-        The most scenes in a chunk.
+        The largest number of scenes in a chunk.
     text, fingerprint : str
-        The file's text, and the SHA-256 of that and of what it refers to.
+        The text of the file, and the SHA-256 of the text and of the scene file that it names.
     """
 
     name: str
@@ -62,23 +63,24 @@ class Sweep:
 
     @property
     def dimensions(self) -> dict[str, int]:
-        """Name and length of each dimension of the grid, in the order of the file."""
+        """Return the name and length of each dimension of the grid, in the order of the file."""
         return {axis.dimension: axis.count for axis in self.axes}
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Lengths of the dimensions."""
+        """Return the lengths of the dimensions."""
         return tuple(self.dimensions.values())
 
     @property
     def n_scenes(self) -> int:
-        """How many scenes."""
+        """Return the number of scenes."""
         return math.prod(self.shape)
 
     @property
     def chunk_shape(self) -> tuple[int, ...]:
-        """Lengths of a chunk: the last dimensions whole, one cut, one by one before it.
+        """Return the lengths of a chunk.
 
+        The last dimensions are whole, one dimension is divided, and those before it have length 1.
         A chunk never holds two programs, methods, listings or readings.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
@@ -92,20 +94,20 @@ class Sweep:
 
     @property
     def chunk_counts(self) -> tuple[int, ...]:
-        """How many chunks along each dimension."""
+        """Return the number of chunks along each dimension."""
         return tuple(-(-n // c) for n, c in zip(self.shape, self.chunk_shape, strict=True))
 
     @property
     def n_chunks(self) -> int:
-        """How many chunks."""
+        """Return the number of chunks."""
         return math.prod(self.chunk_counts)
 
     def place(self, chunk: int) -> tuple[int, ...]:
-        """Return where a chunk stands among the chunks, from 0."""
+        """Return the indices of a chunk among the chunks, counted from 0 along each dimension."""
         return tuple(int(each) for each in np.unravel_index(chunk, self.chunk_counts))
 
     def box(self, chunk: int) -> tuple[slice, ...]:
-        """Return the part of the grid that a chunk is."""
+        """Return the part of the grid that a chunk covers."""
         return tuple(
             slice(at * length, min(n, (at + 1) * length))
             for at, length, n in zip(self.place(chunk), self.chunk_shape, self.shape, strict=True)
@@ -113,14 +115,14 @@ class Sweep:
 
 
 def points(sweep: Sweep, box: tuple[slice, ...]) -> list[Indices]:
-    """Return for each dimension the indices of all scenes of a box, the last running fastest."""
+    """Return the indices of all scenes of a box for each dimension; the last one varies fastest."""
     ranges = [np.arange(part.start, part.stop) for part in box]
     return [each.ravel() for each in np.meshgrid(*ranges, indexing="ij")]
 
 
 def spread(sweep: Sweep, count: int) -> list[Indices]:
-    """Return the indices of some `count` scenes from all over the grid, the ends among them."""
-    # Python's whole numbers: a grid may have more scenes than 64 bits count.
+    """Return the indices of `count` scenes from all over the grid, including both ends."""
+    # Python integers, because a grid may have more scenes than 64 bits can count.
     total = sweep.n_scenes
     count = min(count, total)
     flat = [i * (total - 1) // max(1, count - 1) for i in range(count)]
@@ -133,13 +135,13 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return the values of every axis at scenes, by field."""
+    """Return the values of every axis at some scenes, by field."""
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 
 
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
-    """Return the members of each distinct row of columns, and the row; in order of appearance."""
+    """Return the members of each distinct row of columns, in order of appearance, with the row."""
     if not columns:
         return [(np.arange(n), ())]
     numbered = [np.unique(column, return_inverse=True) for column in columns]

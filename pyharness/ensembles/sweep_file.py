@@ -1,4 +1,4 @@
-"""Sweep files: TOML in, a sweep out, checked once."""
+"""Reading of a sweep file, TOML text that is checked once and describes a sweep."""
 
 import hashlib
 import itertools
@@ -39,26 +39,26 @@ _SOLVE = (
 CHUNK = 100_000
 _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
-# What carries attitudes of many bodies.
+# Methods that propagate the attitudes of many bodies.
 _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = None) -> Sweep:
-    """Return the sweep of a TOML file.
+    """Return the sweep that a TOML file describes.
 
     Parameters
     ----------
     path : path
-        Of the file. A scene file named in it is looked for beside it.
+        The path of the file. The path of a scene file that it names is relative to its folder.
     claims : mapping, optional
-        Where the function of each claim stands, as in ``package.module:name``. It takes a
-        `Batch` of n scenes, and returns 1 for each that the claim holds of, 0 where it
-        fails, 2 where it says nothing.
+        The function of each claim, as in ``package.module:name``. It takes a `Batch` of n scenes
+        and returns a code for each scene. The codes are 1 if the claim holds, 0 if it fails, 2 if
+        it does not apply to the scene, and 3 if it holds in part.
 
     Raises
     ------
     InputError
-        Where the file can't be read, or describes no sweep.
+        If the file can't be read, or does not describe a sweep.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
@@ -100,7 +100,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene that all others are made from, and what it was read from beside the file."""
+    """Return the scene from which all others are made, and the content of its file, if any."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]
@@ -239,7 +239,7 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
 
 
 def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
-    """Yield the words that meet in a scene: those along one dimension go together."""
+    """Yield each combination of words in a scene; words along one dimension vary together."""
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
     for at in itertools.product(*map(range, counts.values())):
@@ -248,7 +248,7 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _check_solvers(sweep: Sweep) -> None:
-    """Refuse a name that is no program, method, listing or reading, and what can't be combined."""
+    """Raise InputError for an unknown program, method, listing or reading, or a wrong setting."""
     solver = sweep.solver
     for program in _choices(sweep, "program", solver.program):
         if program not in PROGRAMS:

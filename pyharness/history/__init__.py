@@ -1,1 +1,1 @@
-"""The thesis: its listings, its figures, its statements."""
+"""The study of the thesis: its listings, its figures and its claims."""

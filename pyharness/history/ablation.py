@@ -1,4 +1,4 @@
-"""What each defect does: alone corrected, alone kept, and in every company."""
+"""The effect of each defect: corrected alone, kept alone, and in every subset of defects."""
 
 import math
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from pyharness.truth.reference import Reference, reference
 
 @dataclass(frozen=True)
 class Effect:
-    """What one listing makes of a scene: largest errors (rad/s, m/s) at the steps that were run."""
+    """The largest errors of one listing on a scene (rad/s and m/s), over the steps that it ran."""
 
     listing: Listing
     omega: float
@@ -33,7 +33,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """A defect or reading in one program and case, alone corrected and alone kept."""
+    """The effects of an apparatus entry in one program and case, corrected alone and kept alone."""
 
     program: str
     case: int
@@ -44,7 +44,7 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the entries of the apparatus, of one kind or of all; InputError for no such kind."""
+    """Return the apparatus entries of one kind or of all; raise InputError for an unknown kind."""
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -53,7 +53,7 @@ def entries(kind: str | None = None) -> list[dict[str, Any]]:
 
 
 def entry(name: str) -> dict[str, Any]:
-    """Return an entry of the apparatus; InputError where there is none of that name."""
+    """Return an entry of the apparatus; raise InputError if no entry has that name."""
     by_name = {each["id"]: each for each in entries()}
     if name not in by_name:
         raise unknown("entry", name, list(by_name))
@@ -61,7 +61,7 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Run a listing and hold it against the truth (with velocity) at the scene's times."""
+    """Run a listing and compare it with `truth`, a reference with velocity at the scene's times."""
     run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
     velocity = math.nan if found.velocity is None else found.velocity
@@ -70,15 +70,16 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 
 @cache
 def case_truth(case: int) -> Reference:
-    """Return the truth of a case with velocity, computed once."""
+    """Return the reference solution of a case, with velocity; it is computed once."""
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield what a flagged defect or reading does in each of its programs, case by case.
+    """Yield the effect of a flagged apparatus entry in each of its programs, case by case.
 
-    For a reading, which no listing has by default, *original* has it and *corrected alone* has not.
+    For a reading or a conjecture, `original` is the original listing with it, and `corrected_alone`
+    the original listing without it. No listing has a reading by default.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -106,7 +107,7 @@ def lattice(
 ) -> list[Effect]:
     """Return the effect of every subset of a program's defects, largest error of omega first.
 
-    The readings are in the subsets like defects: the corrected program has none.
+    The subsets also include or omit each of `readings`; the corrected program has no reading.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
@@ -116,12 +117,15 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return what can be switched off to an effect: of a constant torque nothing is assumed."""
+    """Return the switches that can affect a scene.
+
+    Under a constant torque only defects can, because the conjectures are about varying torques.
+    """
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 
 def _size(found: Effect) -> tuple[float, float]:
-    # What overflowed is worse than anything that did not.
+    # An overflow counts as worse than any finite error.
     worst = math.inf if found.ended == "overflow" else found.omega
-    # Three digits: what differs by rounding alone is a tie.
+    # Three digits make a tie of errors that differ by rounding alone.
     return float(f"{worst:.2e}"), float(f"{found.velocity:.2e}")

@@ -35,11 +35,11 @@ _SUBSETS = (
     *words("active"), Column("error of w", short, unit="rad/s"),
     Column("error of V", short, unit="m/s"), Column("steps"), Column("stop"),
 )  # fmt: skip
-_HALF = 48  # columns of a text that stands beside another
+_HALF = 48  # width of each of two texts printed side by side
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
-    """Report a line for each entry: name, kind, certainty, flag, what it is."""
+    """Report a line for each entry: its name, kind, certainty, flag and summary."""
     rows = [
         [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
         for each in entries
@@ -51,7 +51,7 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Report one entry with these of its `FIELDS`, and its effect by program and case."""
+    """Report one entry with the fields in `names`, and its effect by program and case."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -81,7 +81,7 @@ def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return errors and stops by program and case, under each of four listings."""
+    """Return tables of the errors and stops of four listings, by program and case."""
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
         columns = ("original, with it", "original", "corrected, with it", "corrected")
@@ -103,7 +103,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Report, by program, a row for each subset of its defects, as letters, sorted by effect."""
+    """Report every subset of each program's defects, written as letters and sorted by effect."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

@@ -1,4 +1,4 @@
-"""The reports of `cards`: the text of the edition, the scan, and where port and twin have it."""
+"""The reports of `cards`: each card with its lines in scan, Fortran port and Python twin."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -18,11 +18,11 @@ _CLASSES = (
     Column("runge-kutta"), Column("places"),
 )  # fmt: skip
 _CLASSES_NAMES = [each.head for each in _CLASSES]
-_HALF = 48  # columns of a text that stands beside another
+_HALF = 48  # width of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
-    """Report cards one by one: card and scan, port and twin, entries and what they do."""
+    """Report each card with its scan, its lines in port and twin, and its apparatus entries."""
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
         for each in cards
@@ -36,7 +36,10 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 
 
 def card_record(card: Card) -> dict[str, Any]:
-    """Return a card for JSON; `scan` is null where the scan has the card as it is."""
+    """Return a card as a JSON record.
+
+    `scan` is null if the scan agrees with the card, and empty if the scan lacks the card.
+    """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
     return {
@@ -56,7 +59,7 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Report whether the tables explain a scan, with every line that they don't."""
+    """Report whether the tables of the edition explain a scan, with every unexplained place."""
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
     pairs = sum(len(each.differences) for each in cards)
@@ -85,7 +88,11 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Report the alterations by class: entries, those behind a flag, and cards by program."""
+    """Report the number of entries and cards for each kind of apparatus entry.
+
+    The columns count the entries, the entries with a flag, the cards named in each program, and the
+    places where the scan differs because of such an entry.
+    """
     entries = facts("apparatus")["entry"]
     rows = []
     for kind in dict.fromkeys(each["kind"] for each in entries):

@@ -14,7 +14,7 @@ _COLUMNS = (
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Report every step of the programs, and why decks or thesis disagree about it."""
+    """Report every step of the programs, with the reason for any disagreement about it."""
     told = faults([*found])
     rows = [
         [

@@ -1,4 +1,4 @@
-"""Figures 6 to 12 of the thesis: curves over the reference, their pictures and their report."""
+"""Figures 6 to 12 of the thesis: the curves and the reference, as pictures and as a report."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SETS = {"original": original, "corrected": corrected}
 ENDINGS = ("svg", "png", "csv")
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
-# Told apart without colour: by dash, width and marker, and by where the markers stand.
+# Curves are distinct without colour: by dash, width, marker, and position of the markers.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _STYLES = {
@@ -43,10 +43,10 @@ _END: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """One figure of one of `SETS`, before anything is computed for it.
+    """The plan of one figure in one of `SETS`, before anything is computed.
 
-    Number and part as the thesis has them, the part `A`, `B` or empty; the caption is in our
-    words, and the source is where the thesis says so.
+    `number` and `part` are those of the thesis; `part` is `A`, `B` or empty. `caption` is in our
+    words. `source` is the place in the thesis on which the choice of programs rests.
     """
 
     number: int
@@ -59,31 +59,31 @@ class FigurePlan:
 
     @property
     def stem(self) -> str:
-        """The name of its files without their endings."""
+        """Return the name of the figure's files without their endings."""
         of_set = "-corrected" if self.set == "corrected" else ""
         return f"figure-{self.number:02d}{self.part.lower()}{of_set}"
 
     @property
     def files(self) -> list[str]:
-        """The names of its files: pictures, and the plotted numbers."""
+        """Return the names of the figure's files: the pictures and the plotted numbers."""
         return [f"{self.stem}.{ending}" for ending in ENDINGS]
 
     @property
     def title(self) -> str:
-        """Its number, as in `Figure 10, part A`."""
+        """Return the figure's number, as in `Figure 10, part A`."""
         return f"Figure {self.number}" + (f", part {self.part}" if self.part else "")
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """What one program made of the scene."""
+    """The trajectory of one program in a figure."""
 
     listing: Listing
     trajectory: Trajectory
 
     @property
     def ending(self) -> str:
-        """Where it ends before the last step, in a few words; empty where it does not."""
+        """Return where and why the curve ends early; empty if it reaches the last step."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -91,23 +91,23 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Its program, and where it ends."""
+        """Return the curve's program, and where it ends early."""
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A figure with its numbers; its curves end where the program ended."""
+    """A figure with its computed curves; each curve ends where its program ended."""
 
     plan: FigurePlan
     scene: Scene
     reference: Reference
     curves: tuple[Curve, ...]
-    limit: tuple[str, Array] | None = None  # what a program tends to, and its omega (rad/s)
+    limit: tuple[str, Array] | None = None  # label and omega (rad/s) of a program's limit
 
 
 def plans() -> list[FigurePlan]:
-    """Return all figures, those from the original programs first."""
+    """Return the plans of all figures, first the figures of the original programs."""
     return [
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
@@ -119,7 +119,7 @@ def plans() -> list[FigurePlan]:
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Compute figure after figure, in the order of `plans`."""
+    """Compute the figures and yield them one by one, in the order of `plans`."""
     truths: dict[int, Reference] = {}
     for plan in plans():
         scene = case_scene(plan.case)
@@ -133,7 +133,7 @@ def findings() -> Iterator[FigureFinding]:
 def _limit(
     plan: FigurePlan, scene: Scene, truths: dict[int, Reference]
 ) -> tuple[str, Array] | None:
-    """Return the limit that is drawn in an original figure; None where none is."""
+    """Return the limit that a figure of the original programs shows, or None if it shows none."""
     asked = {entry["number"]: entry.get("limit_of") for entry in facts("figures")["figure"]}
     program = asked[plan.number]
     if program is None or plan.set != "original":
@@ -193,7 +193,7 @@ def curve_numbers(finding: FigureFinding) -> Table:
 
 
 def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
-    """Return values with those at time 0 before them."""
+    """Return values preceded by the value at time 0."""
     return np.concatenate([np.array(start, ndmin=values.ndim), values])
 
 
@@ -233,8 +233,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Draw omega1 of a figure that has a limit, original and corrected, over the reference.
 
-    Where the original ends, its limit says where it would have gone. Of the corrected programs
-    the last is drawn: the others would draw the same line again.
+    Beyond the end of an original run, the limit shows where it would have gone. Only the last of
+    the corrected programs is drawn, because the others would draw the same line again.
     """
     from matplotlib.figure import Figure
 
@@ -278,7 +278,7 @@ def _draw(
     time, omega = _from_zero(run.time), _from_zero(run.omega, start)
     style: dict[str, Any] = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
     height = top - bottom
-    # Far outside the frame a renderer loses its way: there the curve may be anywhere.
+    # Clip the curve far outside the frame, because renderers fail on very large coordinates.
     shown = np.clip(omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
     axes.plot(time, shown, label=curve.label, zorder=3, **style | _MARKERS | other)
     if curve.ending and len(run.time):
@@ -286,10 +286,10 @@ def _draw(
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
-    """Return the frame: all of what stays near the reference; what diverges leaves it."""
+    """Return the limits of the axis, which contain all curves that stay near the reference."""
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
-    # A curve further off than the fastest turn of the body is on its way out of every picture.
+    # A curve that is further off than the largest omega diverges, and may leave the frame.
     far = float(np.abs(truth).max())
     near = max(0.6 * (largest - least), 0.01 * far)
     low, high = least, largest

@@ -1,8 +1,8 @@
-"""What the original programs tend to as the step goes to zero.
+"""The limits of the original programs as the step size goes to zero.
 
-A program that does not converge to the solution converges to something else, or to nothing.
-The derivations stand in docs/findings.md; here each limit is solved for, independently of the
-programs, and the programs are held against it while their step is halved.
+A program that does not converge to the solution converges to another function, or to none.
+docs/findings.md derives the limits. This module computes each limit independently of the programs,
+and compares the programs with their limits while the step is halved.
 """
 
 import math
@@ -23,7 +23,7 @@ from pyharness.original.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 _TOLERANCE = 1e-11
-_MOST_EVALUATIONS = 1_000_000  # some ten seconds
+_MOST_EVALUATIONS = 1_000_000  # about ten seconds
 
 TENDS_TO = {
     "two-term": "the solution of w' = F(w) - (2/9) t^2 Q(F(w)), Q the quadratic part of F",
@@ -45,7 +45,10 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """Largest distances of any omega (rad/s) at one step size (s); infinite after an overflow."""
+    """The largest distances of omega (rad/s) from limit and reference at one step size (s).
+
+    Both distances are infinite after an overflow.
+    """
 
     step_size: float
     from_limit: float
@@ -54,10 +57,10 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """What an original program tends to, how it comes near, and with which power of the step.
+    """The limit of an original program, and its order of convergence to this limit.
 
-    The order is None where there is none: nothing but rounding, or a limit that leaves every bound
-    at the time `blow_up` (s).
+    `order` is None if the distance is rounding error alone, if one of the last two runs overflows,
+    or if there is no limit. It is also None if the limit is unbounded at the time `blow_up` (s).
     """
 
     program: str
@@ -68,7 +71,7 @@ class Limit:
 
     @property
     def approach(self) -> str:
-        """Say how it comes near."""
+        """Return a description of the convergence to the limit."""
         if self.blow_up is not None:
             return f"no order: the limit leaves every bound at t = {self.blow_up:.3g} s"
         if self.order is not None:
@@ -78,11 +81,11 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Hold an original program, without its stop test, against its limit.
+    """Measure the distance of an original program, without its stop test, from its limit.
 
-    Where the torque varies with time, the collocation programs have no limit, and the Runge-Kutta
-    program's is found from its limit equations. InputError where the work is more than `effort`
-    allows.
+    The step size is halved `halvings` times. If the torque varies with time, the collocation
+    programs have no limit, and the limit of the Runge-Kutta program is computed from its limit
+    equations. Raise InputError if the run exceeds the work limit (`effort`).
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -100,7 +103,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
         found.append(Halving(finer.step_size, *distances))
     last, before = found[-1].from_limit, found[-2].from_limit
     scale = float(np.abs(truth.omega).max(initial=0.0))
-    # A rounding in every step, of what is as large as omega.
+    # Bound on the rounding error of all steps, for numbers as large as omega.
     noise = 2.0**-50 * scale * scene.steps * 2**halvings
     finite = math.isfinite(before) and math.isfinite(last) and last > noise
     return Limit(
@@ -111,14 +114,14 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> Array:
-    """Return the limit (rad/s) at `times`, NaN where there is none."""
+    """Return the limit of a program (rad/s) at `times`; NaN where it has none."""
     return _limit_solution(program, scene, times, truth, effort)[0]
 
 
 def _limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
 ) -> tuple[Array, str, float | None]:
-    """Return the limit at `times`, its name, and when it leaves every bound (s), if it does."""
+    """Return the limit at `times`, its description, and its blow-up time (s) or None."""
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
     if program == "runge-kutta":
@@ -136,11 +139,12 @@ def _limit_solution(
 
 
 def _extrapolated(scene: Scene) -> Rate:
-    """Return the limit equation of the two-term program.
+    """Return the right-hand side of the two-term program's limit equation.
 
-    In step n the points are t/3 and 2t/3, t = n h, beyond the step's beginning. The slope there
-    along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F); the line through its
-    values at the two points, read at 0, is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
+    In step n the collocation points are t/3 and 2t/3 after the beginning of the step, with t = n h.
+    Along the first estimate the slope is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). Here w is
+    omega, F the right-hand side of Euler's equations, and Q its quadratic part. The line through
+    g(t/3) and g(2t/3), extrapolated to s = 0, is 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
     """
     right_hand_side = scene.right_hand_side()
     a, b, c = scene.euler_coefficients
@@ -154,10 +158,10 @@ def _extrapolated(scene: Scene) -> Rate:
 
 
 def _slow_slopes(scene: Scene) -> Rate:
-    """Return the limit equations of the Runge-Kutta program where the torque varies.
+    """Return the right-hand side of the Runge-Kutta program's limit equations, for varying torque.
 
-    U(1) = p gains h/2 F(p) a step, and the result gains h F(p): slopes are taken at a point that
-    moves at half speed.
+    In every step U(1) = p grows by h/2 F(p), and the result by h F(p). The slopes are therefore
+    taken at a point that moves at half speed.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -171,7 +175,7 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Return the solution at `times`, NaN from where it leaves every bound, and that time (s)."""
+    """Return the solution at `times`, NaN from its blow-up on, and the blow-up time (s) or None."""
     from scipy.integrate import solve_ivp
 
     evaluations, latest = 0, 0.0
@@ -201,15 +205,15 @@ def _solved(
     rows = np.full((len(times), len(start)), math.nan)
     if len(result.t):  # else y is an empty list
         rows[: len(result.t)] = result.y.T
-    # It ends at the bound, or just before, where no step is short enough.
+    # The solver ends at the bound, or just before it if no step is small enough.
     return rows, latest if result.status else None
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Name the defects, by program, that change no omega of a scene beyond rounding.
+    """Return, by program, the defects that change no omega of a scene beyond rounding.
 
-    A defect is invisible where correcting it alone, all others kept, moves no omega by more than
-    rounding and leaves the last step where it was.
+    A defect is invisible if its correction alone, with all others kept, changes omega by rounding
+    at most, and changes neither the number of steps nor the ending.
     """
     found = {}
     for program in PROGRAMS:
@@ -232,7 +236,7 @@ def _same(first: Array, second: Array) -> bool:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Report what each program tends to, and the defects that change nothing, by program."""
+    """Report the limit of each program, and each program's defects that do not change omega."""
     text: list[Section] = [heading(scene)]
     data = []
     for each in found:

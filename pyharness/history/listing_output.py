@@ -1,6 +1,6 @@
-"""A printed page from anywhere, held against the pages of the programs in every word.
+"""A printed page from any machine, compared with the programs' pages in every arithmetic.
 
-What a machine printed, an emulated one perhaps, says by its digits in which arithmetic it ran.
+The digits that a machine printed, real or emulated, show in which arithmetic its program ran.
 """
 
 import re
@@ -16,7 +16,7 @@ from pyharness.model.scene_file import case_scene
 from pyharness.original.printer import page
 from pyharness.original.programs import WORD_NAMES, run_program
 
-# A number as FORMAT writes it, asterisks where it has no room, R and I of the CDC.
+# A number as FORMAT writes it: asterisks if it does not fit, R or I (CDC) if it is not finite.
 _FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
 _SHOWN = 5
 _LARGEST = 1 << 24  # bytes
@@ -24,7 +24,7 @@ _LARGEST = 1 << 24  # bytes
 
 @dataclass(frozen=True)
 class Difference:
-    """A number of a page that is not ours: its row and place in it, from 1, theirs and ours."""
+    """A number of a page that differs from ours: its row and place, from 1, and both as printed."""
 
     row: int
     place: int
@@ -34,16 +34,16 @@ class Difference:
 
 @dataclass(frozen=True)
 class Fit:
-    """A page against one of ours.
+    """The comparison of a page with a page that our programs print.
 
     Attributes
     ----------
     program, listing, word : str
     case : int
     fields : int
-        Numbers in the rows of the page, theirs or ours, whichever has more.
+        How many numbers the rows of the page have, theirs or ours, whichever has more.
     differences : tuple of Difference
-        Those that are not printed alike.
+        The numbers that are not printed alike.
     """
 
     program: str
@@ -55,12 +55,15 @@ class Fit:
 
     @property
     def is_whole(self) -> bool:
-        """Whether every number is printed alike."""
+        """Return whether every number is printed alike."""
         return not self.differences
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return the lines of a file that hold numbers alone, field by field; InputError for others."""
+    """Return the lines of a file that contain only numbers, split into fields.
+
+    Raise InputError if no line has at least six numbers.
+    """
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = _numbers(content.decode("ascii", "replace"))
@@ -75,9 +78,10 @@ def fits(
     cases: Sequence[int],
     progress: Callable[[str], None] = lambda told: None,
 ) -> list[Fit]:
-    """Return how a page fits each of ours with its moments, torques and columns, the best first.
+    """Compare a page with each of our pages that has the same moments, torques and columns.
 
-    InputError where none of ours has them.
+    Return the comparisons, those with the fewest differences first. Raise InputError if none of our
+    pages has these moments, torques and columns.
     """
     found = []
     for program in programs:
@@ -100,7 +104,7 @@ def fits(
 
 
 def _form(program: str, case: int) -> tuple[list[list[str]], int]:
-    """Return the lines of numbers before the rows, and how many numbers a row has."""
+    """Return a page's lines of numbers before its rows, and how many numbers a row has."""
     scene = replace(case_scene(case), steps=1)
     *head, row = _numbers(page(scene, program, run_program(scene, original(program), "python")))
     return head, len(row)
@@ -121,13 +125,13 @@ def _fit(theirs: Sequence[Sequence[str]], listing: Listing, case: int, word: str
 
 
 def _numbers(text: str) -> list[list[str]]:
-    """Return the lines that hold numbers alone, field by field."""
+    """Return the lines that contain only numbers, split into fields."""
     lines = [line.split() for line in text.splitlines()]
     return [line for line in lines if line and all(map(_FIELD.fullmatch, line))]
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
-    """Report which program, listing and word print a page, and the first numbers that differ."""
+    """Report which program, listing and arithmetic print a page, or the first differences."""
     best = found[0]
     whole = [each for each in found if each.is_whole]
     told = [
@@ -151,7 +155,7 @@ def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
 
 
 def name_of(fit: Fit) -> str:
-    """Return what makes a page."""
+    """Return the name of a fit: its program, case, listing and arithmetic."""
     return f"{fit.program}, case {fit.case}, {fit.listing}, in {fit.word}"
 
 

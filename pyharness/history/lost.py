@@ -1,9 +1,10 @@
-"""The lost experiments of IV.2: how three weightings could have failed, mistake by mistake.
+"""The lost experiments of IV.2: mistakes with which three weightings could have failed.
 
-The programs for subdomain, Galerkin and least squares are not printed; IV.2 says that they gave no
-meaningful results where the solution is known, in Cases 1 and 2. Each conjecture here is a mistake
-that such a program could have had, programmed as IV.2 describes the method: two terms, the products
-written out as polynomials, one solution for a constant right-hand side, one correction.
+The thesis does not print the programs for subdomain, Galerkin and least squares. IV.2 says that
+they gave no meaningful results where the solution is known, in Cases 1 and 2. Each conjecture here
+is a mistake that such a program could have had. The method is programmed as IV.2 describes it: two
+terms, the products written out as polynomials, one solution for a constant right-hand side, and one
+correction.
 """
 
 from collections.abc import Sequence
@@ -25,17 +26,17 @@ from pyharness.original.programs import BINARY64
 from pyharness.truth.reference import reference
 
 WEIGHTINGS = ("subdomain", "galerkin", "least-squares")
-# The cases whose solution IV.2 could hold a program against.
+# The cases with a known solution, with which IV.2 could compare a program.
 CASES = (1, 2)
 TERMS = 2
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """A weighting with one mistake, on the cases of known solution.
+    """A weighting with one mistake, run on the cases with a known solution.
 
-    `shares` has the largest error over the largest omega by case, infinite on overflow; `failed`
-    the cases in which that is more than the limit of `data/lost.toml`.
+    `shares` is, by case, the largest error divided by the largest omega, infinite on overflow.
+    `failed` has the cases in which this ratio exceeds the limit in `data/lost.toml`.
     """
 
     mistake: str
@@ -46,7 +47,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A mistake with its attempts, and for how many weightings it fails as IV.2 says."""
+    """A mistake with its attempts, and the number of weightings that it makes fail."""
 
     mistake: str
     summary: str
@@ -54,17 +55,17 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Weightings that fail in both known cases."""
+        """Return how many weightings fail in both known cases."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Weightings that fail in at least one."""
+        """Return how many weightings fail in at least one known case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Return every conjectured mistake, computed in a word, the best explanation of IV.2 first."""
+    """Run all conjectured mistakes in the arithmetic `word`; return the best explanation first."""
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:
@@ -80,7 +81,7 @@ def ranked(word: str = BINARY64) -> list[Ranked]:
 
 
 def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> float:
-    """Return the largest error over the largest omega, with a mistake or with `none`."""
+    """Return the largest error divided by the largest omega, with a mistake or with `none`."""
     given = scene if word == BINARY64 else scene_in(scene, WORDS[word])
     omega = march(given, weighting, mistake)
     truth = reference(scene, scene.times()).omega
@@ -90,19 +91,20 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 
 
 def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
-    """Return omega (rad/s), shape (steps, 3), of a weighting with one mistake; torque constant.
+    """Integrate a scene of constant torque by a weighting with one mistake.
 
-    It is computed in the numbers of the scene, floats or those of another word.
+    Return omega (rad/s), shape (steps, 3); NaN from an overflow on. The scene's numbers, floats or
+    numbers of another word (`WORDS`), determine the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
     torque = np.array(scene.normalized_torque(0.0))
     state = np.array(scene.omega)
     rows = np.full((scene.steps, 3), np.nan)
-    weighted_over: float | None = None  # the length that the matrix is of
+    weighted_over: float | None = None  # the interval length for which the matrix was computed
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
-            # Where the residual is weighted; the step is assembled at h all the same.
+            # The residual is weighted over (0, length); the result is evaluated at h in any case.
             length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
             if weighted_over is None or length != weighted_over:
                 matrix = _matrix(weighting, length)
@@ -124,7 +126,7 @@ def march(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return A omega2 omega3 and so on as polynomials of t, a column for each component."""
+    """Return the products A omega2 omega3, ... as polynomials of t, one column per component."""
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
@@ -140,16 +142,16 @@ def _matrix(weighting: str, length: float) -> Array:
 
 
 def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
-    """Return c1, c2 of all components, with which the weighted residuals vanish."""
+    """Return c1 and c2 of all components, for which the weighted residuals vanish."""
     if mistake == "transposed":
         matrix = matrix.T
     if mistake == "matrix-used-up" and second:
-        # LEQT1F leaves its factors in A; the second call takes them for the matrix.
+        # LEQT1F overwrites A with its factors; the second call takes them for the matrix.
         matrix = _factors(matrix)
     if mistake == "unscaled-solver":
         (a, b), (c, d) = matrix
         x, y = right.T
-        # A number of a word stands behind an array, which asks it then.
+        # The array is the left operand, so that NumPy applies a word's arithmetic to each element.
         second = (y - x * (c / a)) / (d - c / a * b)
         return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
@@ -162,7 +164,7 @@ def _power(exponent: int) -> Array:
 
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
-    """Return the integrals of a polynomial over (0, length), one for each weight."""
+    """Return the weighted integrals of a polynomial over (0, length), one for each weight."""
     found = []
     for k in range(TERMS):
         if weighting == "subdomain":
@@ -176,13 +178,13 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
 
 
 def _factors(matrix: Array) -> Array:
-    """Return what Crout's factorization leaves in the place of a 2 x 2 matrix."""
+    """Return the factors with which Crout's factorization overwrites a 2 x 2 matrix."""
     (a, b), (c, d) = matrix.tolist()
     return np.array([[a, b], [c / a, d - c / a * b]])
 
 
 def halved(scene: Scene, weighting: str) -> float:
-    """Return by how much the error of a weighting without mistake falls as the step is halved."""
+    """Return the factor by which halving the step reduces the error of a correct weighting."""
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
 
@@ -196,7 +198,7 @@ _TABLE = (
 
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
-    """Report every mistake, the largest errors it makes, and where it fails as IV.2 says."""
+    """Report every mistake, its largest errors, and how many weightings it makes fail."""
     rows = [
         [
             each.mistake,

@@ -1,9 +1,10 @@
-"""The edition as TEI P5: every card, the scan's characters beside ours, and the apparatus.
+"""The edition as a TEI P5 document: every card, the scan's variants, and the apparatus.
 
-Decks stand in the order of their cards, with a `pb` where a page of the scan begins; its `n` is
-the place of the page in the scan. Where the scan differs there is an `app`: `lem` is what we read,
-`rdg` what the scan has. Taken in the order of the pages, with `rdg` for `lem`, the lines of cards,
-`fw` and `surplus` are the scan.
+Each deck is in the order of its cards. A `pb` element marks the beginning of a page of the scan;
+its `n` is the position of the page in the scan. An `app` element marks each place where the scan
+differs: `lem` is our reading, and `rdg` the scan's. To restore the scan, take the pages in the
+order of `n` and each `rdg` instead of its `lem`. The lines of the cards, `fw` and `surplus` are
+then the lines of the scan.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,7 +19,7 @@ from pyharness.original.cards import Card, Place, deck, numbers, parallels
 TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"
 SCHEMA = "https://www.tei-c.org/Vault/P5/4.12.0/xml/tei/custom/schema/relaxng/tei_all.rng"
-"""The edition of the guidelines that the document is written to."""
+"""The schema of the document, from version 4.12.0 of the TEI guidelines."""
 
 _XML = "{http://www.w3.org/XML/1998/namespace}"
 _HEAD = (
@@ -38,19 +39,19 @@ _KINDS = {
     "missing text": "cards that the scan or the report does not have",
     "dialect": "what only the FORTRAN of the machine explains",
 }
-# The words of the apparatus, and those of TEI.
+# The degrees of certainty in the apparatus, and the values of `cert` in TEI.
 _CERTAINTY = {
     "certain": "high",
     "probable": "medium",
     "conjecture": "low",
     "undecidable": "unknown",
 }
-# What an entry says, in the words of the table.
+# The fields of an apparatus entry that the document shows.
 _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
 
 
 class _Page(NamedTuple):
-    """A page of the scan: its place there, its lines, and the entry that says why it is moved."""
+    """A page of the scan: its position, its lines, and the entry that explains its move, if any."""
 
     number: int
     lines: list[Any]
@@ -72,7 +73,7 @@ def tei_document() -> bytes:
     back = xml.SubElement(text, "back")
     _apparatus(_named(back, "div", type="apparatus"))
     _places(_named(back, "div", type="places"))
-    # Blanks count in a card, so it is filled when all else is indented.
+    # Blanks in a card are significant, so the cards are filled in after the indentation.
     xml.indent(root)
     for block, card in blocks:
         _fill(block, card)
@@ -129,7 +130,7 @@ def _header(root: xml.Element) -> None:
 
 
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
-    """Give the block of every card, still empty, in the order of the cards."""
+    """Append a deck to `body`; yield each card with its block, which is still empty, in order."""
     div = _named(body, "div", program, type="deck")
     _said(div, "head", f"The {program} program")
     cards = deck(program).cards
@@ -141,7 +142,7 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
         for item in page.lines:
             if isinstance(item, str):
                 for number in numbers(item):
-                    # A lost card is on no page; it stands before the next that is.
+                    # A lost card is on no page; it goes before the next card that is on one.
                     while lost and lost[0] < number:
                         card = cards[lost.pop(0)]
                         yield _block(div, card), card
@@ -215,7 +216,7 @@ def _apparatus(div: xml.Element) -> None:
 
 
 def _targets(entry: dict[str, Any]) -> Iterator[str]:
-    """Give the cards of an entry, and the deck where it names none of a program."""
+    """Yield the identifiers of an entry's cards, or of a deck if the entry names no card of it."""
     for program in entry["programs"]:
         cards = deck(program).cards
         named = numbers(entry["cards"].get(program, ""))
@@ -266,7 +267,7 @@ def _said(
 
 
 def _id(card: Card) -> str:
-    """``two-term.1660``: a colon has no place in an XML name."""
+    """Return a card's XML identifier, as in ``two-term.1660``; it may not contain a colon."""
     return f"{card.program}.{card.number}"
 
 

@@ -1,4 +1,4 @@
-"""The name of the edition's text in a citation: a digest of its cards and its apparatus."""
+"""The digest of the edition's cards and apparatus, which identifies the text in a citation."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -9,18 +9,18 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 
 TABLES = (*(f"cards/{program}" for program in PROGRAMS), "apparatus")
-"""The tables of `data` that are the text: what each card reads, what the scan shows, and why."""
+"""The tables of `data` that make up the text: the cards, the scan's variants, the reasons."""
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return the first 12 digits of the SHA-256 of the text.
+    """Return the first 12 hexadecimal digits of the SHA-256 of the edition's text.
 
-    Port, twins and version of the project have no part in it, nor have comments in the tables.
+    The port, the twins, the project's version and comments in the tables do not change the digest.
 
     Parameters
     ----------
     table : callable, optional
-        Returns each of `TABLES` by its name.
+        Function that returns each of `TABLES` by its name.
     """
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))

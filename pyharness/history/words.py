@@ -1,4 +1,4 @@
-"""What word length does: programs with p bits, by every rule, against binary64 and the truth."""
+"""The effect of word length: runs with p bits, compared with binary64 and the reference."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,31 +16,32 @@ from pyharness.original.word import RULES, Word
 from pyharness.truth.reference import reference
 
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
-# A wider word has no more of a program's error than its method leaves out.
+# In the widest word a program's error is the truncation error of its method alone.
 DOUBLE, WIDEST = Word(53), Word(113)
 
 
 @dataclass(frozen=True)
 class WordRun:
-    """A program in a word.
+    """A run of a program in an arithmetic with words of p bits.
 
     Attributes
     ----------
     case : int
     program, listing : str
     p : int
-        Bits.
+        Bits of the significand.
     rule : str
         One of `RULES`.
     stop : str
-        ``V2 at 25``, ``overflow at 50``: the step that has no more rows; empty where it ran on.
+        The reason for an early end and its step, as in ``V2 at 25`` or ``overflow at 50``; empty if
+        the run is complete.
     fields, different : int
-        Numbers in the rows of the page, in binary64 or here, whichever has more; and those that
-        are not printed alike.
+        How many numbers the rows of the page have, in binary64 or in this word, whichever has more;
+        and how many of them are not printed alike.
     error : float
-        Largest error of any omega of its rows against the truth (rad/s).
+        Largest error of any omega component against the reference (rad/s).
     singular : int
-        Rows with IER = 129 of LEQT1F.
+        Number of rows for which LEQT1F reports IER = 129.
     """
 
     case: int
@@ -57,18 +58,18 @@ class WordRun:
 
 @dataclass(frozen=True)
 class WordCell:
-    """A program with its listing on a case: its run in binary64, in the widest word, in all."""
+    """One listing on one case: its run in binary64, in the widest word, and in each chosen word."""
 
     double: WordRun
     widest: WordRun
     runs: tuple[WordRun, ...]
 
     def of(self, p: int, rule: str) -> WordRun | None:
-        """Return the run in a word, or None."""
+        """Return the run with p bits and a rounding rule, or None."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
-        """Return the least p from which on all runs are the same; None where the last is not."""
+        """Return the least p from which on `same` holds for all runs of a rule, or None."""
         least = None
         for run in sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p):
             if not same(run):
@@ -83,9 +84,9 @@ def cells(
     lengths: Sequence[int] = LENGTHS,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Iterator[WordCell]:
-    """Run all programs, original and corrected, on all cases in every word.
+    """Run the programs, original and corrected, on the cases in every word; yield the cells.
 
-    `progress` gets how many runs are done, and of how many.
+    `progress` is called with the number of finished runs and the number of all runs.
     """
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
@@ -106,7 +107,7 @@ def cells(
 
 
 class _Judge:
-    """Runs a program in words, and says of each how it differs from binary64 and the truth."""
+    """A scene and listing whose runs in words are compared with binary64 and the reference."""
 
     def __init__(self, scene: Scene, listing: Listing) -> None:
         self.scene, self.listing = scene, listing

@@ -1,4 +1,4 @@
-"""The report of `words`: what changes in the machine's words, and what word length does."""
+"""The report of `words`: the effect of the machine's arithmetic, and of word length."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
@@ -12,7 +12,7 @@ from pyharness.original.word import RULES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# A larger error than this times that of the widest word is one of rounding.
+# An error larger than this multiple of the widest word's error is due to rounding.
 ROUNDS = 2.0
 _FIELDS = " ".join(field.name for field in fields(WordRun))
 _MACHINE = (("cdc48", 48, "FX"), ("rounded", 48, "RX"))
@@ -26,7 +26,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 def words_report(cells: Sequence[WordCell]) -> Report:
-    """Report cells, all with the same lengths."""
+    """Report cells that all have the same word lengths."""
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
     tables = [[_lengths(cells)], [_errors(cells)]]
@@ -79,7 +79,7 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 
 
 def _changes(cells: Sequence[WordCell]) -> list[str]:
-    """Say in a sentence for each of the machine's words what is not as in binary64."""
+    """Return, for each arithmetic of the machine, a sentence on its differences from binary64."""
     told = []
     for name, p, rule in _MACHINE:
         found = [(cell.double, run) for cell in cells if (run := cell.of(p, rule))]
@@ -128,7 +128,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Draw the error against p by program and listing; dashed what the method leaves out."""
+    """Draw the error against p, by program and listing; a dashed line is the truncation error."""
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

@@ -1,1 +1,1 @@
-"""The words of the house as plain data: scenes, listings, trajectories, and their files."""
+"""The base layer: plain data types for scenes, listings, trajectories, and their files."""

@@ -1,4 +1,7 @@
-"""Arrays of many bodies: checked and counted, with one set of messages for all that take them."""
+"""Checks of arrays for many bodies: shape, type, values and number of rows.
+
+All functions that take such arrays share these error messages.
+"""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -12,7 +15,7 @@ from pyharness.model.values import integer, number
 
 _MOST_THREADS = 1024
 _REAL = "iuf"
-# A test of each number, and what it allows.
+# An elementwise test, and the allowed values in words.
 Rule = tuple[Callable[[Array], NDArray[np.bool_]], str]
 
 ABOVE_ZERO: Rule = (
@@ -23,10 +26,11 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return an array with a row of `shape` for each body, or one row that all bodies share.
+    """Return an array with one row of `shape` per body, or with one row that all bodies share.
 
-    A letter in `shape` stands for any length. InputError, which begins with `where`, for another
-    shape and for what is no real number; with a `rule` for the first number that breaks it.
+    A letter in `shape` means any length. Raise InputError, prefixed with `where`, for another shape
+    or an entry that is not a real number. With a `rule`, raise it for the first number that breaks
+    the rule.
     """
     found = numbers_of(where, values)
     own = found.shape[-len(shape) :] if shape else ()
@@ -41,13 +45,13 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return an array of float64 of any shape; InputError where it holds anything but real numbers.
+    """Return a float64 array of any shape; raise InputError if an entry is not a real number.
 
-    Fractions, decimals, and whole numbers beyond 64 bits are real numbers too.
+    Fractions, decimals, and integers beyond 64 bits are accepted as real numbers.
     """
     try:
         found = np.asarray(values)
-    except Exception as error:  # rows of different lengths, or a class of the user's
+    except Exception as error:  # rows of different lengths, or a user-defined class
         raise InputError(
             f"{where}: {kind_of(values)} that is no array of numbers; allowed: rows of one length"
         ) from error
@@ -64,13 +68,16 @@ def numbers_of(where: str, values: object) -> Array:
 
 
 def waves_of(where: str, values: object) -> Array:
-    """Return waves of torque, shape (n, k, 4): three amplitudes and a frequency each."""
+    """Return torque waves, shape (n, k, 4): for each wave three amplitudes and a frequency."""
     found = numbers_of(where, values)
     return rows_of(where, found, "k", 4) if found.size else np.empty((1, 0, 4))
 
 
 def count_bodies(rows: Mapping[str, Array]) -> int:
-    """Return the number of bodies; InputError for an array with neither one row nor that many."""
+    """Return the number of bodies; raise InputError for an array with another number of rows.
+
+    An array may also have a single row, which all bodies share.
+    """
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:
@@ -80,7 +87,7 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
 
 
 def check_rows(name: str, array: Array, n: int) -> None:
-    """Refuse an array with neither one row nor as many as there are bodies."""
+    """Raise InputError if an array has neither one row nor one row per body."""
     if len(array) not in (1, n):
         raise InputError(
             f"{name}: {len(array)} rows; allowed: 1, or as many as there are bodies, {n}"
@@ -88,12 +95,15 @@ def check_rows(name: str, array: Array, n: int) -> None:
 
 
 def row_of(array: Array, i: int) -> Any:
-    """Return the row of a body, which may be that of all."""
+    """Return the row of body `i`, or the single row that all bodies share."""
     return array[0 if len(array) == 1 else i]
 
 
 def only_one(given: Mapping[str, object]) -> str:
-    """Return which of some arguments is given, nothing for none; InputError for several."""
+    """Return the name of the one argument that is not None, or an empty string if all are None.
+
+    Raise InputError if several are not None.
+    """
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
         raise InputError(f"{' and '.join(names)} are both given; allowed: one of them")
@@ -101,7 +111,7 @@ def only_one(given: Mapping[str, object]) -> str:
 
 
 def threads_of(threads: object) -> int:
-    """Return a number of threads; InputError where it is none."""
+    """Return a number of threads; raise InputError unless it is an integer from 1 to 1024."""
     found = integer("threads", threads)
     if not 1 <= found <= _MOST_THREADS:
         raise InputError(f"threads is {found}; allowed: 1 to {_MOST_THREADS}")
@@ -109,7 +119,7 @@ def threads_of(threads: object) -> int:
 
 
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
-    """Return an array that a kernel can write to; InputError for any other."""
+    """Return `array` if a kernel can write to it; raise InputError if not."""
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
         raise InputError(
@@ -119,7 +129,7 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return an array with a row for each of n bodies, in one piece."""
+    """Return a contiguous array with one row for each of n bodies."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))

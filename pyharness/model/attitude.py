@@ -1,7 +1,8 @@
-"""Attitudes: unit quaternions, scalar first, Hamilton's product, from body to space.
+"""Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-v in space is q v times the conjugate of q, and q' = q (0, omega)/2. Angles and matrices are for the
-eye alone; nothing is integrated in them.
+A vector v of the body has the components q v q* in space, where q* is the conjugate of q. The
+quaternion satisfies q' = q (0, omega)/2. Angles and matrices are for output only; they are not
+integrated.
 """
 
 import math
@@ -17,12 +18,15 @@ Quaternion = tuple[float, float, float, float]
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 SEQUENCES = ("3-1-3", "3-2-1")
 FORMS = ("quaternion", *SEQUENCES, "matrix")
-NEAR_ONE = 1e-12  # a length that is off by less was meant to be 1
-_ROUNDED = 2.0**-51  # such a length can't be mended
+NEAR_ONE = 1e-12  # a norm that is closer to 1 than this was meant to be 1
+_ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation can not reduce
 
 
 def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
-    """Return four numbers over their length, and that; InputError where they are no attitude."""
+    """Return the normalised quaternion and its original norm.
+
+    Raise InputError, prefixed with `where`, unless `values` are four finite numbers, not all 0.
+    """
     allowed = "allowed: four finite numbers, scalar first, not all 0"
     given = [finite(where, each) for each in number_list(where, values, allowed)]
     if len(given) != 4:
@@ -30,7 +34,7 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
     largest = max(map(abs, given))
     if largest == 0.0:
         raise InputError(f"{where}: all four are 0; {allowed}")
-    # Scaled first, so that no square leaves the range of numbers.
+    # The numbers are scaled first, so that no square overflows or underflows.
     length = math.hypot(*(x / largest for x in given))
     whole = length * largest
     if abs(whole - 1.0) > _ROUNDED:
@@ -40,7 +44,11 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude of three angles (degrees) about the axes of a sequence, one by one."""
+    """Return the attitude after successive rotations (degrees) about the body axes of `sequence`.
+
+    Raise InputError, prefixed with `where`, unless `angles_deg` are three finite numbers and
+    `sequence` is one of `SEQUENCES`.
+    """
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
         raise unknown("sequence", name, SEQUENCES, where)
@@ -54,7 +62,7 @@ def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
 
 
 def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return Hamilton's product."""
+    """Return Hamilton's product of two quaternions."""
     a, b, c, d = p
     e, f, g, h = q
     return (
@@ -66,10 +74,11 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def angles(attitude: Array, sequence: str) -> Array:
-    """Return the angles (degrees) of attitudes, shape (n, 4), about the axes of a sequence, (n, 3).
+    """Return the angles (degrees) of attitudes about the axes of a sequence, shape (n, 3).
 
-    By arc tangents of half angles, which keep their digits at the poles. There only the sum of the
-    first and last angle is known, or their difference: the last one is then 0.
+    The shape of `attitude` is (n, 4). The angles are computed by arc tangents of half angles, which
+    keep their digits at the poles. At a pole only the sum or the difference of the first and last
+    angle is determined; the last angle is then set to 0.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -91,7 +100,7 @@ def angles(attitude: Array, sequence: str) -> Array:
 
 
 def matrices(attitude: Array) -> Array:
-    """Return the matrices, shape (n, 3, 3), that take vectors from body to space."""
+    """Return the rotation matrices, shape (n, 3, 3), that take vectors from body to space."""
     w, x, y, z = attitude.T
     rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -102,7 +111,7 @@ def matrices(attitude: Array) -> Array:
 
 
 def angle_between(attitude: Array, other: Array) -> Array:
-    """Return the angles (rad), shape (n,), between attitudes; their signs play no part."""
+    """Return the angles (rad) between attitudes, shape (n,); quaternion signs do not matter."""
     a, b, c, d = attitude.T
     e, f, g, h = other.T
     vector = np.array([

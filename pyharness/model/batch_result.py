@@ -1,4 +1,4 @@
-"""The result of a batch: what solvers and programs have in common."""
+"""The result of a batch of bodies, common to solvers and programs."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ class BatchResult:
     Attributes
     ----------
     omega : ndarray, shape (n, ..., 3)
-        Angular velocity about the body axes, rad/s; NaN where there is no result.
+        Angular velocity about the body axes, rad/s; NaN for a body without result.
     status : ndarray of int8, shape (n,)
         A code of `pyharness.model.codes.Statuses` for each body.
     """
@@ -31,10 +31,10 @@ class BatchResult:
 
     @property
     def ended(self) -> NDArray[np.str_]:
-        """How each body ended, in words: complete, sensitive, stopped, overflow, refused, ..."""
+        """The status of each body in words: complete, sensitive, stopped, overflow, refused, ..."""
         return np.array(ENDS)[self.status]
 
     @property
     def has_result(self) -> NDArray[np.bool_]:
-        """Whether each body has all of its results."""
+        """Whether each body has all of its results, as a boolean array."""
         return np.isin(self.status, _RESULTS)

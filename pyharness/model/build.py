@@ -1,4 +1,4 @@
-"""How this installation was built, and what it stands on."""
+"""The build of this installation, and the packages that it depends on."""
 
 import importlib.util
 import os
@@ -18,7 +18,10 @@ OPTIONAL = {
 
 @dataclass(frozen=True)
 class Build:
-    """Versions and flags; `compiler` and `flags` are None where the extension is not built."""
+    """Versions, compiler and flags of an installation.
+
+    `compiler`, `flags` and `extension` are None if the extension is not built.
+    """
 
     version: str
     compiler: str | None
@@ -31,7 +34,7 @@ class Build:
 
 
 def build() -> Build:
-    """Return how this installation was built."""
+    """Return the versions, compiler and flags of this installation."""
     compiler = flags = extension = None
     try:
         from pyharness import _build, _kernels
@@ -54,7 +57,7 @@ def build() -> Build:
 
 
 def machine(packages: Iterable[str]) -> dict[str, str]:
-    """Return processor and cores, and the versions of `packages` that are installed."""
+    """Return processor, number of cores, and versions of those `packages` that are installed."""
     found = {"processor": _processor(), "cores": str(os.cpu_count())}
     return found | {name: text for name in packages if (text := _version(name)) is not None}
 
@@ -82,7 +85,7 @@ def _version(package: str) -> str | None:
 
 
 def doctor_report(build: Build) -> Report:
-    """Report what is built, with what, and which of the optional packages are missing."""
+    """Return the report of the verb `doctor`: the build, and the optional packages missing."""
     rows = {
         "pyharness": build.version,
         "extension": build.extension or "not built: 'make compare', or 'pip install .'",

@@ -1,8 +1,9 @@
-"""Symmetric 3 x 3 matrices diagonalised in integers: eigenvalues to a high relative accuracy.
+"""Diagonalisation of symmetric 3 x 3 matrices in integers, with high relative accuracy.
 
-A method in binary64 gives each eigenvalue to some 1e-16 of the largest one, so that a small one has
-few digits or none. The entries of a matrix are binary64 numbers, and therefore integers in one
-unit, from which a bound of the smallest eigenvalue follows: that many more bits are carried.
+A method in binary64 computes every eigenvalue with an error of some 1e-16 of the largest one. A
+small eigenvalue then has few correct digits or none. The entries of a matrix are binary64 numbers,
+and therefore integer multiples of one unit. This gives a lower bound of the smallest eigenvalue,
+which determines how many more bits the arithmetic uses.
 """
 
 import math
@@ -11,24 +12,25 @@ from fractions import Fraction
 
 Row = tuple[Fraction, Fraction, Fraction]
 
-# Of every eigenvalue; twice what a double-double number holds is not needed.
+# Bits of each eigenvalue. Twice the bits of a double-double number are not needed.
 _BITS = 128
 _PAIRS = ((0, 1), (0, 2), (1, 2))
-# Off-diagonal entries below 2 to this power, in units in the last place, are rounding alone.
+# Off-diagonal entries below 2 to this power, in units in the last place, are rounding error alone.
 _NOISE = 8
-# Each takes the largest off-diagonal entry away, and the convergence is quadratic: some ten do.
+# Each rotation removes the largest off-diagonal entry. The convergence is quadratic, so that about
+# ten rotations suffice.
 _MOST_ROTATIONS = 500
 
 
 @dataclass(frozen=True)
 class Diagonal:
-    """Eigenvalues of a matrix, and its orthonormal eigenvectors.
+    """The eigenvalues of a matrix and its orthonormal eigenvectors.
 
     Attributes
     ----------
     values : tuple of three Fractions
-        The eigenvalues, of which each is good to 2**-100 of itself. One that is 0 is no more than
-        0 to within rounding: the matrix is singular.
+        The eigenvalues, each with a relative error of at most 2**-100. An eigenvalue that can not
+        be told from 0, because of rounding, is 0: the matrix is singular.
     vectors : tuple of three tuples of three Fractions
         `vectors[k]` belongs to `values[k]`.
     """
@@ -40,7 +42,7 @@ class Diagonal:
 def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
     """Return the eigenvalues and eigenvectors of a symmetric matrix of finite numbers.
 
-    By Jacobi's rotations; a diagonal matrix is returned as it is, and its order never changes.
+    The method is Jacobi's. A diagonal matrix is returned unchanged, its entries in the same order.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[_in_unit(x, exponent) for x in row] for row in matrix]
@@ -65,7 +67,7 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Make the entry p, q vanish, by the smaller of the two angles (Rutishauser 1966)."""
+    """Rotate so that entry p, q vanishes, by the smaller of the two angles (Rutishauser 1966)."""
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]
     root = math.isqrt(gap * gap + twice * twice)
@@ -86,7 +88,7 @@ def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: 
 
 
 def _last_bit(x: float) -> int:
-    """Return the exponent of the last bit of a number that is not 0."""
+    """Return the exponent of the lowest nonzero bit of a number that is not 0."""
     numerator, denominator = x.as_integer_ratio()
     if denominator > 1:
         return 1 - denominator.bit_length()

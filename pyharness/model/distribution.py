@@ -1,6 +1,6 @@
-"""The distribution: its name in a package index, unlike that of the import, and its version."""
+"""Name and version of the distribution; its name differs from the name of the import."""
 
-# The index has another package by the name of the import.
+# The package index has another package with the name of our import.
 DISTRIBUTION = "rigid-body-harness"
 
 
@@ -12,5 +12,5 @@ def version() -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs what an extra needs."""
+    """Return the pip command that installs the packages of an optional extra."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"

@@ -1,7 +1,7 @@
-"""How much work is done without being asked for: every limit, and the one option that lifts it.
+"""Work limits, and the option `effort` that raises them.
 
-A limit counts work, steps times waves and the like, so that a method gives up after some ten
-seconds. `effort` is a factor on all of them.
+A limit counts work, for example steps times waves, and is chosen so that a method stops after some
+ten seconds. The option `effort` is a factor on all limits.
 """
 
 import math
@@ -13,33 +13,34 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, number
 
-_SLACK = 2.0  # of a forecast: the pace so far is not that of the rest
-_ROUNDING = 1.0 + 1e-9  # of an effort that was advised
-_UNFORESEEN = 10.0  # where there is no forecast
-# Steps of a program without waves, some 30 s of the slowest, and what a wave costs of such a step.
-# Another word is that of a twin; words by name are of the compiled programs.
+_SLACK = 2.0  # safety factor of a forecast: the pace so far may not last
+_ROUNDING = 1.0 + 1e-9  # allows for the rounding of an effort that a message suggested
+_UNFORESEEN = 10.0  # factor on the effort where there is no forecast
+# The largest number of steps of a program without waves, some 30 s for the slowest program, and the
+# cost of a wave relative to such a step. The key "another word" is for the Python twin with another
+# word length than binary64. The keys "binary32" and "binary128" are for the compiled programs.
 _LIMITS = {
     "fortran": (1e8, 1.0),
     "python": (5e5, 0.05),
     "another word": (5e4, 0.3),
     "binary32": (2e5, 0.1),
-    "binary128": (2e5, 10.0),  # its sine is our own
+    "binary128": (2e5, 10.0),  # with our sine, not the compiler's
 }
-# The same of the compiled programs on many bodies, a step of each counted.
+# The same limit for the compiled programs on many bodies: steps summed over the bodies.
 _MOST_STEPS_OF_ALL = 1e9
 
 
 class Integrator(Protocol):
-    """What turns a scene into rows at times that run away from 0."""
+    """A function that integrates a scene and returns rows at times that move away from 0."""
 
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
-        """Solve, or raise InputError."""
+        """Return the trajectory of `scene` at `times`, or raise InputError."""
 
 
 def checked_effort(effort: Number) -> float:
-    """Return the factor; InputError where it is no finite number above 0."""
+    """Return `effort` as a float; raise InputError unless it is a finite number above 0."""
     value = number("effort", effort)
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
@@ -47,16 +48,17 @@ def checked_effort(effort: Number) -> float:
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:
-    """Return how a message ends where a limit ended the work: what would help `instead`.
+    """Return the last part of a message about an exceeded work limit: what the user can do.
 
-    `effort` is the factor on the limit, `needed` what it should have been, as far as can be told.
+    `instead` is the remedy that needs no more work. `effort` is the present factor on the limit,
+    and `needed` the estimated factor that the work takes, if there is an estimate.
     """
     factor = suggested(effort, needed)
     return f"{instead}, or allow more work: --effort {factor} (effort={factor} in Python)"
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return a factor that should do: two digits, rounded up."""
+    """Return an effort that should suffice, rounded up to two digits."""
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
     digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
@@ -65,12 +67,12 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of waves in a torque, which every step has to sum up."""
+    """Return the number of waves in the torque of a scene, which every step has to sum."""
     return len(scene.torque.sines) + len(scene.torque.cosines)
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
-    """Refuse a scene that takes a program longer than anyone waits who was not asked."""
+    """Raise InputError if the run of a program exceeds its work limit."""
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
     most, a_wave = _LIMITS[implementation]
@@ -84,7 +86,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
-    """Refuse so many bodies that their steps take longer than anyone waits who was not asked."""
+    """Raise InputError if the run of a program on many bodies exceeds the work limit."""
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL
     factor = checked_effort(effort)

@@ -1,19 +1,34 @@
-"""What can go wrong by a user's hand, each with one line: what, where, what is allowed."""
+"""Errors with messages of one line: what is wrong, where, and what is allowed."""
 
 from collections.abc import Iterable
 
-# More of a message than this is someone's input, given back at length.
+# The most characters of a message. A longer one quotes long input, and is shortened.
 _LONGEST = 900
 
 
 class InputError(ValueError):
-    """A user's mistake: exit code 2 on the command line.
+    """An error in the user's input; exit status 2 on the command line.
 
-    Its text is one line that a terminal can show, whatever it quotes.
+    The message is one line of printable characters, whatever it quotes.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, where, and what is allowed. White space is collapsed, and characters that are
+        not printable are escaped. A message of more than 900 characters is shortened in the middle.
+
+    Examples
+    --------
+    >>> from pyharness import InputError, case_scene
+    >>> try:
+    ...     case_scene(9)
+    ... except InputError as error:
+    ...     print(error)
+    --case: unknown case '9'; allowed: 1, 2, 3, 4, 5, 6, 7
     """
 
     def __init__(self, message: str) -> None:
-        """Bring the message into one line."""
+        """Store the message as one printable line."""
         line = printable(" ".join(message.split()))
         if len(line) > _LONGEST:
             line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
@@ -21,31 +36,42 @@ class InputError(ValueError):
 
 
 class TimedError(InputError):
-    """One whose message has a `time` (s) in it, in the units of whoever was asked."""
+    """An InputError whose message contains a time (s), in the time unit of the solved scene."""
 
     def __init__(self, message: str, time: float) -> None:
-        """Put the time where ``{time}`` stands."""
+        """Insert the time in place of ``{time}`` in the message."""
         super().__init__(message.replace("{time}", f"{time:.6g}"))
         self.time = time
         self._message = message
 
     def __reduce__(self) -> tuple[type["TimedError"], tuple[str, float]]:
-        """Let it cross to another process, as multiprocessing hands it back."""
+        """Return the class and its arguments, so that multiprocessing can pickle the error."""
         return type(self), (self._message, self.time)
 
     def slower(self, factor: float) -> "TimedError":
-        """Return the error of a motion whose times are `factor` as long."""
+        """Return the error with its time multiplied by `factor`, for a scene with rescaled time."""
         return TimedError(self._message, self.time * factor)
 
 
 class NotBuiltError(RuntimeError):
-    """The compiled extension is missing: exit code 3 on the command line."""
+    """The compiled extension is missing; exit status 3 on the command line.
+
+    Examples
+    --------
+    >>> from pyharness import NotBuiltError, case_scene, run_program, subset
+    >>> try:
+    ...     found = run_program(case_scene(1), subset("two-term"))
+    ... except NotBuiltError:
+    ...     found = run_program(case_scene(1), subset("two-term"), implementation="python")
+    >>> found.steps
+    100
+    """
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Return a text in which what steers a terminal, or is no character, is an escape sequence.
+    r"""Return a text with control and other unprintable characters as escape sequences.
 
-    The characters in `kept`, as in ``"\n\t"``, stay as they are.
+    The characters in `kept`, for example ``"\n\t"``, stay as they are.
     """
     if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
         return text
@@ -55,7 +81,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Name the kind of a value for a message, the same for one of TOML and its like in Python."""
+    """Return the kind of a value in words, alike for values from TOML and from Python."""
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -64,7 +90,7 @@ def kind_of(value: object) -> str:
     for name, types in kinds.items():
         if isinstance(value, types):
             return name
-    # NumPy, without its import: an array is a list, of which each entry has a kind.
+    # NumPy is not imported for this. An array counts as a list, whose entries have kinds.
     dtype_kind = getattr(getattr(value, "dtype", None), "kind", None)
     if isinstance(dtype_kind, str):
         if getattr(value, "shape", ()) != ():
@@ -76,9 +102,10 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the error for a name not among those allowed, with the nearest one.
+    """Return the error for a name that is not allowed, with the closest allowed name.
 
-    `what` it should name, as in "case"; `where` it was given, as in "--fix".
+    `what` is the thing that the name should denote, as in "case". `where` is the place of the name,
+    as in "--fix".
     """
     import difflib
 

@@ -1,4 +1,4 @@
-"""The compiled extension, and the words that it and Python share."""
+"""The compiled extension, and the status codes that it shares with Python."""
 
 from types import ModuleType
 from typing import Any
@@ -13,12 +13,12 @@ from pyharness.model.scene import Wave
 COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
 REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
 SENSITIVE = Statuses.SENSITIVE
-# What a user reads.
+# The statuses in words, for users.
 ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.isupper())
 
 
 def extension() -> ModuleType:
-    """Return the compiled extension; NotBuiltError where there is none."""
+    """Return the compiled extension; raise NotBuiltError if it is missing."""
     try:
         from pyharness import _kernels
     except ImportError as error:
@@ -31,7 +31,7 @@ def extension() -> ModuleType:
 
 
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
-    """Return amplitudes and frequencies as the kernels take them, shape (4, n)."""
+    """Return amplitudes and frequencies of waves in the form of the kernels, shape (4, n)."""
     columns: NDArray[Any] = np.empty((4, len(waves)), dtype=kind, order="F")
     for index, (amplitude, frequency) in enumerate(waves):
         columns[:3, index] = amplitude

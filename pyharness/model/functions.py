@@ -1,7 +1,8 @@
-"""Functions of a number, asked of the number itself.
+"""Elementary functions of floats and of numbers in other formats.
 
-Floats are asked of the C library. Numbers of another word (`pyharness.original.word`) answer
-themselves, correctly rounded to the nearest number of that word.
+For floats the functions call the C library. Numbers of another word length
+(`pyharness.original.word`) have methods of their own, which round correctly to the nearest number
+of that word.
 """
 
 import math
@@ -9,12 +10,12 @@ from typing import Any
 
 
 def is_finite(x: Any) -> bool:
-    """Whether a number is neither nan nor infinite."""
+    """Return whether a number is neither NaN nor infinite."""
     return math.isfinite(x) if isinstance(x, float) else x.is_finite
 
 
 def square_root(x: Any) -> Any:
-    """Return the square root; ValueError for a float below zero."""
+    """Return the square root; raise ValueError for a float below zero."""
     return math.sqrt(x) if isinstance(x, float) else x.sqrt()
 
 
@@ -22,7 +23,7 @@ def sine(angle: Any) -> Any:
     """Return the sine of an angle (rad)."""
     if not isinstance(angle, float):
         return angle.sin()
-    # Python raises for an infinite angle where Fortran, like IEEE 754, answers NaN.
+    # Python raises an error for an infinite angle; Fortran, like IEEE 754, returns NaN.
     return math.sin(angle) if math.isfinite(angle) else math.nan
 
 

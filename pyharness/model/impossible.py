@@ -1,15 +1,28 @@
-"""The warning about bodies that can not exist, where a user makes one."""
+"""The warning about moments of inertia that no rigid body can have."""
 
 import sys
 import warnings
 from typing import Protocol
 
-# Frames between a user's line and the scene that it makes.
+# Modules whose frames come between the user's line and the scene that it creates.
 _BETWEEN = ("copy", "dataclasses", "pyharness.model.scene", "pyharness.model.scene_file", __name__)
 
 
 class ImpossibleBodyWarning(UserWarning):
-    """The moments of a body break the triangle inequality; what is asked for is computed anyway."""
+    """The warning that the moments of a body break the triangle inequality.
+
+    The largest moment exceeds the sum of the others. The results are computed anyway.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from pyharness import ImpossibleBodyWarning, Scene
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", ImpossibleBodyWarning)
+    ...     scene = Scene("impossible", (0.0, 1.0, 0.0), moments=(3.0, 1.0, 1.0))
+    >>> scene.is_impossible
+    True
+    """
 
 
 class _Body(Protocol):
@@ -18,7 +31,10 @@ class _Body(Protocol):
 
 
 def warn_of_impossible(body: _Body) -> None:
-    """Warn, at the user's line, of a body that the user makes; scenes of our own are silent."""
+    """Warn if user code creates an impossible body, and attribute the warning to its line.
+
+    Scenes that the package itself creates cause no warning.
+    """
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:
         frame, level = frame.f_back, level + 1

@@ -1,4 +1,4 @@
-"""Full inertia matrices: their principal moments and axes."""
+"""Principal moments and axes of full inertia matrices."""
 
 import math
 from dataclasses import dataclass
@@ -15,25 +15,26 @@ from pyharness.model.values import Triple, number_list, three
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
-_ALIKE = 1e-12  # of the largest entry: so much may two entries differ that ought to be the same
-# Of the largest moment: by so much the rounding of a matrix's entries may move each of the others.
+_ALIKE = 1e-12  # of the largest entry: allowed difference of two entries that should be equal
+# Of the largest moment: the most by which rounding of the matrix may change any other moment.
 _ROUNDED = Fraction(1, 1 << 50)
-_KEPT = 256  # matrices whose axes are not computed again
+_KEPT = 256  # number of matrices whose principal frames are cached
 
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments of a body, and the axes they are about.
+    """The principal moments of a body and the corresponding axes.
 
     Attributes
     ----------
     moments, moments_low : tuple of three floats
-        The moments rounded to nearest (kg m2), and what the rounding took off them.
+        The moments rounded to nearest (kg m2), and the exact moments minus the rounded ones.
     axes : ndarray, shape (3, 3)
-        The axes in columns, rounded to nearest: a right-handed frame, the one nearest to the
-        body's own.
+        The axes in columns, rounded to nearest. They form a right-handed frame, the one nearest to
+        the body's own axes.
     exact_moments, exact_axes
-        The same to some 38 digits; each axis is a tuple of its components about the body's axes.
+        Moments and axes to some 38 digits. Each axis is a tuple of its components about the body's
+        own axes.
     """
 
     moments: Triple
@@ -43,7 +44,7 @@ class PrincipalFrame:
     exact_axes: tuple[Exact, Exact, Exact]
 
     def into(self, vector: Exact) -> Exact:
-        """Return the components of a vector of the body about the principal axes."""
+        """Transform a vector from components about the body's own axes to the principal axes."""
         first, second, third = (
             sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
             for axis in self.exact_axes
@@ -52,7 +53,7 @@ class PrincipalFrame:
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
-    """Return a symmetric matrix with moments above 0; InputError for anything else."""
+    """Return a symmetric matrix with moments above 0; raise InputError for anything else."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
     given = [three(where, row) for row in number_list(where, values, allowed)]
     if len(given) != 3:
@@ -79,13 +80,14 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
-    """Return the principal moments and axes of a symmetric matrix; the moments in no order.
+    """Return the principal moments and axes of a symmetric matrix.
 
-    Every moment is good to its last digit, however small it is beside the others.
+    The moments are not sorted. Every moment is accurate to its last digit, however small it is
+    relative to the others.
     """
     found = diagonalised(inertia)
     order: list[int] = []
-    # The axis of each row is the one that is nearest to it of those that are left.
+    # Each body axis takes the nearest of the remaining eigenvectors.
     for row in range(3):
         left = [k for k in range(3) if k not in order]
         order.append(max(left, key=lambda k: abs(found.vectors[k][row])))
@@ -104,18 +106,19 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
 
 
 def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
-    """Return the principal moments (kg m2) and the axes they are about, columns of a (3, 3) array.
+    """Return the principal moments (kg m2) and the axes, as columns of a (3, 3) array.
 
-    A right-handed frame, the one nearest to the body's own.
+    The axes form a right-handed frame, the one nearest to the body's own axes.
     """
     found = principal_frame(inertia)
     return found.moments, found.axes.copy()
 
 
 def breaks_triangle(inertia: Matrix) -> bool:
-    """Whether the largest principal moment exceeds the sum of the others.
+    """Return whether the largest principal moment exceeds the sum of the others.
 
-    A body that is flat has them equal; the rounding of its matrix is not held against it.
+    For a flat body the two are equal. An excess that the rounding of the matrix may have caused
+    does not count.
     """
     low, middle, high = sorted(principal_frame(inertia).exact_moments)
     return high - low - middle > _ROUNDED * high
@@ -126,13 +129,13 @@ def _turned(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant of orthonormal axes, 1 or -1; in floats, as its sign is needed."""
+    """Return the determinant of orthonormal axes, in floats because only its sign is needed."""
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 
 
 def nearest_float(value: Fraction) -> float:
-    """Return the nearest float, infinity for what is beyond the range of floats."""
+    """Return the nearest float, or an infinity for a value beyond the range of floats."""
     try:
         return float(value)
     except OverflowError:

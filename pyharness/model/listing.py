@@ -1,4 +1,4 @@
-"""Listings: which defects of a program are active, and which readings are selected."""
+"""Listings: programs with a selection of their defects, readings and conjectures active."""
 
 from collections.abc import Iterable, Set
 from dataclasses import dataclass
@@ -14,20 +14,34 @@ _FIELDS = {"defect": "defects", "reading": "readings", "conjecture": "conjecture
 
 @dataclass(frozen=True)
 class Listing:
-    """An original program, corrected, or anything between.
+    """A program as printed, as corrected, or with any other selection of its defects.
 
     Attributes
     ----------
-    program : str
-        One of `PROGRAMS`.
+    program : {"two-term", "four-term", "runge-kutta"}
+        The name of the program.
     defects : frozenset of str
-        The defects that are active.
+        The active defects.
     readings : frozenset of str
-        The readings that are active: an original statement is read the way that is not adopted. A
-        corrected program has none, for no reading changes a corrected statement.
+        The active readings. An active reading interprets an original statement in the way that the
+        edition does not adopt. A corrected program has no readings, since no reading changes a
+        corrected statement.
     conjectures : frozenset of str
-        The active assumptions where no card exists. They and readings are also recognised
-        among `defects`.
+        The active assumptions about statements for which no card exists. Names of conjectures and
+        readings are also accepted among `defects`.
+
+    Raises
+    ------
+    InputError
+        For an unknown program, or for a name that the program does not have.
+
+    Examples
+    --------
+    >>> from pyharness import Listing
+    >>> Listing("two-term", {"dt-accumulates"}).label
+    'custom'
+    >>> Listing("two-term", ()).label
+    'corrected'
     """
 
     program: str
@@ -46,7 +60,7 @@ class Listing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Refuse names that the program does not have."""
+        """Sort the names by kind, and raise InputError for one that the program does not have."""
         _check_program(self.program)
         given = {field: _names(field, getattr(self, field)) for field in _FIELDS.values()}
         for kind in ("reading", "conjecture"):
@@ -62,7 +76,7 @@ class Listing:
 
     @property
     def label(self) -> str:
-        """`original`, `corrected` or `custom`."""
+        """The kind of listing: `original`, `corrected` or `custom`."""
         if not self.active:
             return "corrected"
         return (
@@ -71,26 +85,26 @@ class Listing:
 
     @property
     def active(self) -> frozenset[str]:
-        """The names of all that is active: defects, readings and conjectures."""
+        """The names of all active defects, readings and conjectures."""
         return self.defects | self.readings | self.conjectures
 
     @property
     def flags(self) -> int:
-        """The active names as the bits that the Fortran reads."""
+        """The active names as the bit mask that the Fortran programs read."""
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
     def has(self, name: str) -> bool:
-        """Whether the defect, reading or conjecture `name` is active."""
+        """Return whether the defect, reading or conjecture `name` is active."""
         return name in self.active
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the defects, readings and conjectures of the apparatus that have a flag."""
+    """Return the entries of the apparatus with a flag: defects, readings and conjectures."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of a kind (`defect`, `reading`, `conjecture`), of one program or of all."""
+    """Return the names of a kind (`defect`, `reading`, `conjecture`) in one program or in all."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -99,12 +113,15 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def switchable(program: str | None = None) -> tuple[str, ...]:
-    """Return all names that can be corrected or kept: those of every kind, defects first."""
+    """Return the names of every kind that can be corrected or kept, defects first."""
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 
 def switches(program: str) -> tuple[str, ...]:
-    """Return all that is active in the original program: its defects, and what it conjectures."""
+    """Return the names active in the original program: its defects and some conjectures.
+
+    These are the conjectures that the apparatus marks as `in_original`.
+    """
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -114,12 +131,12 @@ def switches(program: str) -> tuple[str, ...]:
 
 
 def original(program: str, readings: Iterable[str] = ()) -> Listing:
-    """Return the original program: every defect is active, and what no card of it says."""
+    """Return the original program, with all its defects and its own conjectures active."""
     return Listing(program, frozenset(switches(program)), frozenset(readings))
 
 
 def corrected(program: str) -> Listing:
-    """Return the corrected program, which is the same under every reading and conjecture."""
+    """Return the corrected program, which no reading or conjecture changes."""
     return Listing(program, frozenset())
 
 
@@ -135,22 +152,40 @@ def subset(
 
     Parameters
     ----------
+    program : {"two-term", "four-term", "runge-kutta"}
+        The name of the program.
     base : {"original", "corrected"}, optional
-        What to start from; where only `keep` is given, `corrected`, else `original`.
+        The listing to start from. The default is `corrected` if `keep` has names and `fix` has no
+        names, else `original`.
     fix, keep : iterable of str
-        Defects, readings and conjectures to correct, and those to keep.
+        The defects, readings and conjectures to correct, and those to keep.
     readings : iterable of str
-        Readings to select that are not the adopted ones. A corrected statement has its intended
-        form under every reading: where the base is `corrected` only `keep` makes one active.
+        The readings to activate, which are not the adopted ones. A corrected statement has its
+        intended form under every reading. If the base is `corrected`, only `keep` therefore
+        activates a reading.
     conjectures : iterable of str, optional
-        What the original assumes where no card exists, ``none`` for nothing; by default what
-        `original` has. As with readings, only `keep` makes one active where the base is
-        `corrected`.
+        The assumptions of the original where no card exists, or ``none`` for no assumption. The
+        default is the conjectures of `original`. If the base is `corrected`, only `keep` activates
+        a conjecture.
+
+    Returns
+    -------
+    Listing
+        The program with the selected names active.
 
     Raises
     ------
     InputError
-        For a name in both `fix` and `keep`, or one that the program does not have.
+        For an unknown program or base, a name in both `fix` and `keep`, ``none`` together with
+        another conjecture, or a name that the program does not have.
+
+    Examples
+    --------
+    >>> from pyharness import subset
+    >>> subset("two-term").label
+    'original'
+    >>> sorted(subset("runge-kutta", keep=["stage-base"]).defects)
+    ['stage-base']
     """
     _check_program(program)
     fixed, kept, chosen = _names("fix", fix), _names("keep", keep), _names("readings", readings)
@@ -182,7 +217,7 @@ def subset(
 
 
 def checked_listing(listing: object) -> Listing:
-    """Return a listing; InputError where it is none."""
+    """Return `listing`; raise InputError if it is not a Listing."""
     if isinstance(listing, Listing):
         return listing
     raise InputError(f"listing is {kind_of(listing)}; it must be a Listing, as subset makes one")

@@ -1,4 +1,4 @@
-"""Work on many bodies, in pieces that threads take."""
+"""Work on many bodies, divided into pieces for threads."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-# Bodies of a piece: some milliseconds, after which Python checks for a signal.
+# Bodies in a piece: some milliseconds of work, after which Python checks for a signal.
 _PIECE = 1 << 18
-# Bodies that are too few for a thread.
+# The fewest bodies for which a further thread is worth its cost.
 _SMALL = 256
 
 
@@ -19,12 +19,12 @@ def share(
     threads: int,
     given_up: NDArray[np.int32],
 ) -> None:
-    """Call `work` for each piece, in so many threads.
+    """Call `work` for each piece, in at most `threads` threads.
 
-    What is raised, as by Ctrl-C, sets `given_up`, which kernels look at now and then.
+    An exception, for example after Ctrl-C, sets `given_up`, which the kernels poll.
     """
     if threads == 1 or len(pieces) < 2:
-        # Here and not in a thread of its own: Python gives signals to this one.
+        # The work is done in this thread and in no other, because Python delivers signals here.
         for piece in pieces:
             work(piece)
         return
@@ -34,14 +34,14 @@ def share(
             for job in jobs:
                 job.result()
         except BaseException:
-            # Signals don't reach the others.
+            # Signals don't reach the other threads.
             given_up[0] = 1
             pool.shutdown(cancel_futures=True)
             raise
 
 
 def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
-    """Call `work` for pieces of n bodies, in a number of threads.
+    """Call `work` for pieces of n bodies, in at most `threads` threads.
 
     `work` takes a piece and an array of one number, which is not 0 once the user has interrupted.
     All pieces have nearly the same size, so that no thread waits long for another.

@@ -1,4 +1,4 @@
-"""Pipes and devices under a file's name: read and written to, but not waited for without end."""
+"""Reading and writing of files that may be pipes or devices, with a limit on waiting."""
 
 import errno
 import os
@@ -8,31 +8,32 @@ import time
 
 from pyharness.model.errors import InputError
 
-PATIENCE = 10.0  # s, until the other end of a pipe must have said or taken something
+PATIENCE = 10.0  # s, the longest wait for the other end of a pipe
 _PIECE = 1 << 20
 
 
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
-    """Return the content of a file that a user named: the one reader of such files.
+    """Return the content of a file that a user named.
 
-    It may be a regular file, or a pipe (``/dev/stdin`` among them) that someone writes to.
+    All such files are read by this function. The file may be a regular file, or a pipe (among them
+    ``/dev/stdin``) with a writer.
 
     Parameters
     ----------
     path : path
-        Of the file.
+        Path of the file.
     where : str
-        How a message begins, as in ``scene file 'brick.toml'``.
+        Start of a message, as in ``scene file 'brick.toml'``.
     limit : int
-        The largest size that is read, in bytes.
+        Largest size of the content, in bytes.
     what : str
-        What the file should be, for a message: ``a TOML file``.
+        Kind of file that is expected, for a message, as in ``a TOML file``.
 
     Raises
     ------
     InputError
         For a file that can't be read, a folder, a device, a file larger than `limit`, or a pipe
-        to which no one writes for `PATIENCE` seconds.
+        that stays silent for `PATIENCE` seconds.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -45,8 +46,8 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
 
 
 def _read(path: str, limit: int) -> bytes:
-    """Return a file's content, up to a byte more than `limit`; OSError where it can't be read."""
-    # Without O_NONBLOCK, opening a pipe waits for someone who writes.
+    """Return a file's content, at most `limit` + 1 bytes; raise OSError if it can't be read."""
+    # Without O_NONBLOCK, opening a pipe waits for a writer.
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
         mode = os.fstat(handle).st_mode
@@ -68,12 +69,12 @@ def _read(path: str, limit: int) -> bytes:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Whether a character device is a terminal, or the empty one."""
+    """Return whether a character device is a terminal or the null device."""
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 
 def write_waiting(path: str, content: bytes) -> None:
-    """Write to a device, or to a pipe once someone reads from it; OSError where no one does."""
+    """Write to a device, or to a pipe once it has a reader; raise OSError if it gets no reader."""
     end = time.monotonic() + PATIENCE
     while True:
         try:

@@ -1,4 +1,4 @@
-"""A scene about the principal axes of its body, and its results about the body's own again."""
+"""Transformation of a scene to the principal axes of its body, and of the results back."""
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -15,24 +15,25 @@ from pyharness.model.waves import exact_law
 
 @dataclass(frozen=True)
 class PrincipalScene(Scene):
-    """A scene about principal axes whose moments are known to more digits than a float has.
+    """A scene about principal axes, whose moments are known in double-double precision.
 
-    A, B, C come from those: where two moments are nearly equal, their rounding would be much of
-    the difference. `moments_low` is what rounding took off `moments` (kg m2).
+    A, B, C are computed from the moments in that precision. If two moments are nearly equal, their
+    rounding errors in double precision would be a large part of their difference. `moments_low` is
+    the exact moments minus `moments` (kg m2).
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)
 
     @property
     def exact_moments(self) -> Exact:
-        """The principal moments to twice the digits of a float (kg m2)."""
+        """The principal moments in double-double precision (kg m2)."""
         pairs = zip(self.moments or (), self.moments_low, strict=True)
         first, second, third = (Fraction(high) + Fraction(low) for high, low in pairs)
         return first, second, third
 
     @cached_property
     def euler_coefficients(self) -> Triple:
-        """A, B, C of equations 13-15, without unit, rounded once."""
+        """The coefficients A, B, C of equations 13-15, without unit, each rounded once."""
         i1, i2, i3 = self.exact_moments
         exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
         a, b, c = map(nearest_float, exact)
@@ -40,10 +41,41 @@ class PrincipalScene(Scene):
 
 
 def principal(scene: Scene) -> tuple[Scene, Array]:
-    """Return a scene about principal axes, and those, columns of a (3, 3) array.
+    """Return a scene about the principal axes of its body, and these axes.
 
-    Its attitude is that of the principal axes; a torque about the axes of space stays as it is. A
-    scene without a full inertia matrix is returned as it is.
+    Parameters
+    ----------
+    scene : Scene
+        The scene to transform, with a full inertia matrix (`Scene.inertia`). Any other scene is
+        returned unchanged, with the identity matrix as its axes.
+
+    Returns
+    -------
+    scene : Scene
+        The same problem about the principal axes, with `moments` in place of `inertia`. Its
+        `attitude` is the attitude of the principal axes. A torque about the axes of space is
+        unchanged; the attitude then has a value even if `scene` has none.
+    axes : ndarray, shape (3, 3)
+        The principal axes in columns, as components about the body's own axes. They form a
+        right-handed frame, the one nearest to the body's own axes.
+
+    Raises
+    ------
+    InputError
+        If a torque has waves of one frequency whose amplitudes have a sum beyond the range of
+        binary64.
+
+    Examples
+    --------
+    >>> from pyharness import Scene, principal
+    >>> inertia = [[3.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 5.0]]
+    >>> scene, axes = principal(Scene("plate", (0.0, 1.0, 1.0), inertia=inertia))
+    >>> scene.moments
+    (2.0, 4.0, 5.0)
+    >>> axes.round(3)
+    array([[ 0.707,  0.707,  0.   ],
+           [-0.707,  0.707,  0.   ],
+           [ 0.   ,  0.   ,  1.   ]])
     """
     if scene.inertia is None:
         return scene, np.eye(3)
@@ -55,8 +87,8 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         attitude = product(attitude, _quaternion(frame.axes))
     law = scene.torque
     if not law.in_space:
-        # A torque about an axis of small moment may be what is left of large ones: it is rounded
-        # when it is found, and no sooner.
+        # The torque about an axis of small moment may result from cancellation of large
+        # components. Therefore it is rounded only after the transformation.
         law = exact_law(law).turned(frame.into).rounded()
     bare = PrincipalScene(
         scene.name,
@@ -75,7 +107,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory about principal axes about the body's own ones."""
+    """Return a trajectory about principal axes, transformed back to the body's own axes."""
     attitude = found.attitude
     if attitude is not None:
         w, x, y, z = _quaternion(axes)

@@ -1,4 +1,4 @@
-"""What JSON says of a scene, a listing, the end of a run and the installation."""
+"""Records for JSON of a scene, a listing, the end of a run and the installation."""
 
 from dataclasses import asdict
 from typing import Any
@@ -11,7 +11,7 @@ from pyharness.model.trajectory import Trajectory
 
 
 def scene_record(scene: Scene) -> dict[str, Any]:
-    """Return a scene in the form of the scene file, with the number of its case."""
+    """Return the record of a scene: the form of the scene file, with the number of its case."""
     body, values = body_of(scene)
     return {
         "name": scene.name,
@@ -38,7 +38,7 @@ def _wave(wave: Wave) -> dict[str, Any]:
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:
-    """Return a listing: its label, its active defects, its readings and conjectures."""
+    """Return the record of a listing: its label, active defects, readings and conjectures."""
     return {
         "label": listing.label,
         "defects": sorted(listing.defects),
@@ -48,7 +48,7 @@ def listing_record(listing: Listing) -> dict[str, Any]:
 
 
 def ending_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return how far a run came, what it cost, and how it ended."""
+    """Return the record of how a run ended: steps, evaluations, stop and ending."""
     stop = trajectory.stop
     return {
         "steps": trajectory.steps,
@@ -59,10 +59,10 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
-    """Return what a method says of its own error, null where unknown."""
+    """Return a method's own estimates of error, growth and digits; null where unknown."""
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 
 
 def build_record() -> dict[str, Any]:
-    """Return how this installation was built."""
+    """Return the record of how this installation was built."""
     return asdict(build())

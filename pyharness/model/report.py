@@ -1,7 +1,7 @@
-"""A report: what a finding has to say, as data; `pyharness.views` renders it.
+"""Reports: the results of a verb (subcommand) as data, which `pyharness.views` renders.
 
-Tuples with names, where other rooms have dataclasses: these are made at every cold start, and a
-dataclass takes as long as five of them.
+The types are named tuples, where other modules have dataclasses. They are created at every cold
+start, and creating one dataclass takes as long as creating five named tuples.
 """
 
 import math
@@ -15,21 +15,21 @@ if TYPE_CHECKING:
 
 
 def exact(value: Any) -> str:
-    """Return a value in full: floats round-trip; empty where there is none."""
+    """Return a value in full: a float round-trips, and None becomes an empty text."""
     if isinstance(value, float):
-        return float.__repr__(value)  # NumPy's own would name their type
+        return float.__repr__(value)  # the repr of a NumPy float names its type
     if value is None:
         return ""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def plain(value: Any) -> str:
-    """Return a word or a whole number; a dash where there is none."""
+    """Return a word or a whole number as text; a dash for None."""
     return "-" if value is None else str(value)
 
 
 def short(x: float | None) -> str:
-    """Return two digits of a number in a few characters: 1.2e-3, 0, -, inf."""
+    """Return a number to two digits in a few characters, as in 1.2e-3; a dash for None."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -39,44 +39,47 @@ def short(x: float | None) -> str:
 
 
 def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
-    """Return what writes a number in a form, as in ``.3g``, `scale` times it; a dash for none."""
+    """Return a function that formats `scale` times a number by `form`, as in ``.3g``.
+
+    The function returns a dash for None.
+    """
     return lambda x: "-" if x is None else f"{scale * x:{form}}"
 
 
 def counted(number: int, what: str) -> str:
-    """Say a number of things: 1 step, 2 steps."""
+    """Return a number with its noun, as in 1 step, 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 class Column(NamedTuple):
-    """A column of a table: `head` for people, `name` where numbers are given in full."""
+    """A column of a table: `head` is for people, `name` for numbers in full."""
 
     head: str
     write: Callable[[Any], str] = plain
-    left: bool = False  # words stand to the left, numbers to the right
+    left: bool = False  # words are aligned left, numbers right
     unit: str = ""  # of the values, which `write` may scale
-    name: str = ""  # `head` where empty
+    name: str = ""  # `head` if empty
     full: Callable[[Any], str] = exact
-    fit: str = ""  # "wrap" or "cut": what becomes of a last column that is too wide
+    fit: str = ""  # "wrap" or "cut": treatment of a last column that is too wide
 
 
 def words(heads: str) -> list[Column]:
-    """Return columns of words, which stand to the left."""
+    """Return columns of words, which are aligned left, by their heads."""
     return [Column(head, left=True) for head in heads.split()]
 
 
 class Table(NamedTuple):
-    """Columns, and rows of as many values; an array of (rows, columns) will do."""
+    """Columns, and rows with a value for each column; `rows` may be an array (rows, columns)."""
 
     columns: Sequence[Column]
     rows: "Sequence[Sequence[Any]] | Array"
 
     def written(self) -> list[list[str]]:
-        """Return the heads and all cells as people read them."""
+        """Return the heads and all cells, formatted for people."""
         return self._cells([(each.head, each.write) for each in self.columns])
 
     def in_full(self) -> list[list[str]]:
-        """Return the heads and all cells, numbers in full."""
+        """Return the heads and all cells, with numbers in full."""
         return self._cells([(each.name or each.head, each.full) for each in self.columns])
 
     def _cells(self, columns: list[tuple[str, Callable[[Any], str]]]) -> list[list[str]]:
@@ -86,46 +89,46 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table for CSV alone, of columns with these names."""
+    """Return a table for CSV only, with columns of these names."""
     return Table([Column(name) for name in names.split()], rows)
 
 
 class Line(str):
-    """A line that is left as it is, however long."""
+    """A line that is not wrapped, however long it is."""
 
     __slots__ = ()
 
 
 class Field(NamedTuple):
-    """A paragraph that stands behind its label."""
+    """A paragraph that follows its label on the same line."""
 
     label: str
     text: str
 
 
-# Paragraphs and tables without a blank line between them; a blank line is between sections.
+# Paragraphs and tables without blank lines between them. Blank lines separate sections.
 Section = Sequence[str | Field | Table]
 
 
 class Picture:
-    """A figure, the table of its numbers, and what is written above it, a line or more each."""
+    """A figure, the table of its numbers, and the paragraphs of its title."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
-        """Keep all three."""
+        """Store the figure, its numbers and its title."""
         self.figure, self.numbers, self.title = figure, numbers, title
 
 
-# A check as JUnit knows it: kind, id, why it failed (empty where it did not), replay.
+# A check for JUnit: kind, id, reason of a failure (empty if it passed), command that repeats it.
 Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
-    """What a finding has to say."""
+    """The results of a verb as data for every output format."""
 
-    title: str  # the verb that asked
-    text: Sequence[Section]  # in the terminal; empty sections do not count
-    record: Callable[[], dict[str, Any]]  # JSON
-    data: Table | None = None  # CSV, in full
-    page: Sequence[Section] | None = None  # Markdown; None for `data`
-    cases: Sequence[Case] = ()  # JUnit
+    title: str  # the verb that made the report
+    text: Sequence[Section]  # for the terminal; empty sections are skipped
+    record: Callable[[], dict[str, Any]]  # for JSON
+    data: Table | None = None  # for CSV, in full
+    page: Sequence[Section] | None = None  # for Markdown; if None, `data` is written
+    cases: Sequence[Case] = ()  # for JUnit
     pictures: Mapping[str, Callable[[], Picture]] | None = None

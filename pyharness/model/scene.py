@@ -1,4 +1,4 @@
-"""Scenes: body, torque law, initial angular velocity, step size and steps, checked once."""
+"""Scenes: body, torque law, initial conditions, step size and steps, each checked once."""
 
 import itertools
 import math
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from pyharness.model.inertia import Exact
 
 Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
-# What the waves of a law may be given as: pairs of three numbers and one.
+# Accepted forms of the waves of a law: pairs of three amplitudes and a frequency.
 Waves = Iterable[tuple[Numbers, Number]]
 
-# A result row in binary64 with IER, once in the kernel and once in the trajectory.
+# The size of a result row in binary64 with IER, once in the kernel and once in the trajectory.
 _BYTES_PER_STEP = 2 * (8 * 8 + 4)
-# The compiled programs count steps and right-hand sides, five a step at the most, in 32 bits.
+# The compiled programs count steps and right-hand sides, at most five per step, in 32 bits.
 _COUNTABLE_STEPS = 400_000_000
 _LONGEST_NAME = 60
 FULL_INERTIA = (
@@ -50,16 +50,37 @@ SPACE_TORQUE = (
 
 @dataclass(frozen=True)
 class TorqueLaw:
-    """N(t) = constant + rate t + sum of amplitude sin(frequency t) + the same with cos.
+    """A torque law: constant, linear and sinusoidal terms about the axes of the body or of space.
 
-    N m for a body of moments; 1/s2, torque over moment, for one of coefficients. `frame` says whose
-    axes its components are about: those of the "body", or of "space", where it stays as the body
-    turns. Three numbers may be a list, a tuple or an array; the fields are plain tuples of floats.
+    N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
+
+    The unit is N m for a body with moments or inertia, and 1/s2 (torque over moment) for a body
+    with coefficients. Three numbers may be a list, a tuple or an array; the fields are plain tuples
+    of floats.
+
+    Parameters
+    ----------
+    constant : three numbers
+        The constant term, in the unit of N.
+    rate : three numbers
+        The factor of time in the linear term, in the unit of N per second.
+    sines, cosines : iterable of waves
+        The sinusoidal terms. A wave is a pair: an amplitude, three numbers in the unit of N, and a
+        frequency (rad/s).
+    frame : {"body", "space"}
+        The axes of the components. A torque about the axes of space does not rotate with the body.
 
     Raises
     ------
     InputError
-        For what is not three finite numbers, or no wave, or an unknown frame.
+        For a vector that is not three finite numbers, an invalid wave, or an unknown frame.
+
+    Examples
+    --------
+    >>> from pyharness import TorqueLaw
+    >>> law = TorqueLaw((1.0, 0.0, 0.0), cosines=[((0.0, 2.0, 0.0), 0.5)])
+    >>> law.at(0.0)
+    (1.0, 2.0, 0.0)
     """
 
     constant: Triple = (0.0, 0.0, 0.0)
@@ -80,7 +101,7 @@ class TorqueLaw:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check and convert."""
+        """Check the values and convert them to floats."""
         for name in ("constant", "rate"):
             object.__setattr__(self, name, three(f"[torque] {name}", getattr(self, name)))
         for name in ("sines", "cosines"):
@@ -101,11 +122,11 @@ class TorqueLaw:
 
     @property
     def in_space(self) -> bool:
-        """Whether there is a torque about the axes of space, so that the body's attitude counts."""
+        """Whether a torque acts about the axes of space, so that omega depends on the attitude."""
         return self.frame == "space" and not self.is_zero
 
     def at(self, time: float) -> Triple:
-        """Return N at `time` (s), the terms added in the order of the definition."""
+        """Return N at `time` (s), with the terms added in the order of the definition."""
         torque = list(self.constant)
         if self.varies:
             for axis in range(3):
@@ -119,18 +140,48 @@ class TorqueLaw:
 
 @dataclass(frozen=True)
 class Scene:
-    """One problem: what moves, under what, from where, in which steps.
+    """A problem: a body, its torque, its initial conditions, and the steps of a program.
 
-    Exactly one of `moments` (kg m2), `coefficients` (A, B, C of equations 13-15) and `inertia`, a
-    full symmetric matrix (kg m2), is given. Three numbers may be a list, a tuple or an array; the
-    fields are plain tuples of floats. `attitude`, which a scene need not have, is a quaternion at
-    time 0, scalar first, from body to space; it is divided by its length. Of a name a line of 60
-    characters is kept, with what steers a terminal escaped.
+    Exactly one of `moments`, `coefficients` and `inertia` is required. Three numbers may be a list,
+    a tuple or an array; the fields are plain tuples of floats.
+
+    Parameters
+    ----------
+    name : str
+        A title. It is shortened to one line of 60 characters, with unprintable characters escaped.
+    omega : three numbers
+        The angular velocity about the body axes at time 0 (rad/s).
+    moments : three numbers, optional
+        The principal moments of inertia (kg m2).
+    coefficients : three numbers, optional
+        A, B, C of equations 13-15, without unit.
+    torque : TorqueLaw
+        The torque on the body; zero by default.
+    step_size : float
+        The step size of the programs and of methods with a fixed step (s).
+    steps : int
+        The number of steps.
+    masses, forces : three numbers
+        The mass (kg) and force (N) in the equation of each velocity component, which the programs
+        integrate too. The defaults are the numbers on the cards of the programs.
+    case : int, optional
+        The number of the case in Table 1, if the scene is one of these.
+    attitude : four numbers, optional
+        The quaternion from body to space at time 0, scalar first. It is normalised.
+    inertia : three rows of three numbers, optional
+        A full symmetric inertia matrix about the body axes (kg m2).
 
     Raises
     ------
     InputError
-        Where a value is missing, not finite, out of range, or the run does not fit in memory.
+        If a value is missing, not finite or out of range, or if the run does not fit in memory.
+
+    Examples
+    --------
+    >>> from pyharness import Scene
+    >>> scene = Scene("symmetric top", omega=(0.0, 1.0, 10.0), moments=(40.0, 40.0, 20.0))
+    >>> scene.euler_coefficients
+    (0.5, -0.5, 0.0)
     """
 
     name: str
@@ -145,7 +196,7 @@ class Scene:
     case: int | None = None
     attitude: Quaternion | None = None
     inertia: Matrix | None = None
-    # Of the attitude as it was given, before it was divided by it.
+    # Norm of the attitude before it was normalised.
     attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
     if TYPE_CHECKING:
@@ -167,7 +218,7 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Convert, and refuse what no method can run."""
+        """Convert the values, and raise InputError for a scene that no method can run."""
         if not isinstance(self.name, str):
             raise InputError(f"name is {kind_of(self.name)}; it must be text")
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
@@ -192,7 +243,7 @@ class Scene:
         if not isinstance(self.torque, TorqueLaw):
             raise InputError(f"[torque] is {kind_of(self.torque)}; it must be a TorqueLaw")
         if self.torque.in_space and self.coefficients is not None:
-            # Torque over moment would be about axes that turn.
+            # Torque over moment has components about the axes of the body, which rotate.
             raise InputError(
                 "[torque] frame is space, and the body is given by coefficients; allowed: moments "
                 "or inertia"
@@ -223,7 +274,10 @@ class Scene:
 
     @property
     def euler_coefficients(self) -> Triple:
-        """A, B, C of equations 13-15, without unit; InputError for a full inertia matrix."""
+        """The coefficients A, B, C of equations 13-15, without unit.
+
+        A full inertia matrix raises InputError.
+        """
         if self.coefficients is not None:
             return self.coefficients
         if self.moments is None:
@@ -233,15 +287,15 @@ class Scene:
 
     @property
     def exact_moments(self) -> "Exact | None":
-        """The principal moments without rounding (kg m2); None where only coefficients are known.
+        """The exact principal moments (kg m2), or None if only coefficients are known.
 
-        InputError for a full inertia matrix.
+        A full inertia matrix raises InputError.
         """
         if self.coefficients is not None:
             return None
         if self.moments is None:
             raise InputError(FULL_INERTIA)
-        # Who runs a program needs no exact numbers.
+        # Imported only here, because the programs need no exact numbers.
         from fractions import Fraction
 
         first, second, third = map(Fraction, self.moments)
@@ -249,7 +303,7 @@ class Scene:
 
     @property
     def moments_low(self) -> Triple:
-        """What rounding took off the moments (kg m2): nothing, since they are given as floats."""
+        """The exact minus the rounded moments (kg m2): 0, since the moments are floats."""
         return 0.0, 0.0, 0.0
 
     @property
@@ -266,9 +320,10 @@ class Scene:
 
     @property
     def body_torque(self) -> TorqueLaw:
-        """The torque law about the axes of the body; InputError where it is about those of space.
+        """The torque law about the axes of the body.
 
-        Whoever makes a motion of the law reads it here.
+        A torque about the axes of space raises InputError. Code that needs a torque about the body
+        axes therefore reads the law from this property.
         """
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
@@ -279,14 +334,17 @@ class Scene:
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
-        """Return M = N / I at `time` (1/s2)."""
+        """Return the torque over moment, M = N / I, at `time` (1/s2)."""
         first, second, third = self.body_torque.at(time)
         if self.moments is None:
             return first, second, third
         return first / self.moments[0], second / self.moments[1], third / self.moments[2]
 
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
-        """Return f(t, omega) of equations 16-18: rad/s2, three plain floats."""
+        """Return the right-hand side f(t, omega) of equations 16-18.
+
+        The function f returns three plain floats (rad/s2).
+        """
         a, b, c = self.euler_coefficients
         if self.body_torque.varies:
 
@@ -312,7 +370,7 @@ def most_steps() -> int:
 
 
 def _size(steps: int, limit: int) -> str:
-    # A whole number has no bound: Python refuses to write or to convert one of many digits.
+    # Python integers have no bound, but Python refuses to format or convert one of many digits.
     if abs(steps) > 10**18:
         return "a number of more than 18 digits"
     size = f" (it would need {steps * _BYTES_PER_STEP / 1e9:.3g} GB)"
@@ -320,9 +378,10 @@ def _size(steps: int, limit: int) -> str:
 
 
 def checked_scene(scene: object, any_axes: bool = False, any_torque: bool = False) -> Scene:
-    """Return a scene; InputError where it is none, or its axes are not the body's principal ones.
+    """Return `scene`; raise InputError if it is not a Scene, or not one that the caller accepts.
 
-    `any_axes`: it may have a full inertia matrix; `any_torque`: one about the axes of space.
+    With `any_axes` the scene may have a full inertia matrix. With `any_torque` its torque may be
+    about the axes of space.
     """
     if isinstance(scene, Scene):
         if scene.torque.in_space and not any_torque:

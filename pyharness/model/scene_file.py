@@ -1,4 +1,4 @@
-"""Where scenes come from: Table 1 by number, or a TOML file of the form in the README."""
+"""Scenes of the cases of Table 1, and scenes in TOML files of the form in the README."""
 
 import os
 import tomllib
@@ -30,7 +30,29 @@ def case_numbers() -> list[int]:
 
 
 def case_scene(number: SupportsIndex) -> Scene:
-    """Return the scene of a case of Table 1; InputError where there is no such case."""
+    """Return the scene of a case of Table 1.
+
+    Parameters
+    ----------
+    number : int
+        The number of the case, 1 to 7.
+
+    Returns
+    -------
+    Scene
+        The case, with the step size and the number of steps on the cards of the programs.
+
+    Raises
+    ------
+    InputError
+        If there is no such case.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene
+    >>> case_scene(2).moments
+    (40.0, 40.0, 20.0)
+    """
     number = integer("case", number)
     for entry in facts("cases")["case"]:
         if entry["number"] == number:
@@ -51,10 +73,27 @@ def case_scene(number: SupportsIndex) -> Scene:
 def read_scene(path: str | os.PathLike[str]) -> Scene:
     """Return the scene of a TOML file.
 
+    Parameters
+    ----------
+    path : str or path
+        The path of the file, of at most 1 000 000 bytes. Without a ``name`` in the file, the scene
+        has the file's name without its suffix.
+
+    Returns
+    -------
+    Scene
+        The scene that the file describes.
+
     Raises
     ------
     InputError
-        Where the file can't be read, is not TOML, has an unknown key, or lacks a value.
+        If the file can't be read, is not TOML, has an unknown key, or lacks a value.
+
+    Examples
+    --------
+    >>> from pyharness import read_scene
+    >>> read_scene("brick.toml").omega  # doctest: +SKIP
+    (0.0, 1.0, 1.0)
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"scene file: {kind_of(path)}; allowed: a path, as text or a Path")
@@ -64,7 +103,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene of a file's content; InputError, which begins with `where`, if none."""
+    """Return the scene of a file's content; raise InputError, prefixed with `where`, if invalid."""
     data = toml_of(content, where)
     try:
         return scene_of(data, default_name)
@@ -73,20 +112,20 @@ def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
-    """Return the content of a user's TOML file; InputError, which begins with `where`, if none."""
+    """Return the data of a user's TOML file; raise InputError, prefixed with `where`, if none."""
     return toml_of(read_file(path, where), where)
 
 
 def read_file(path: str | os.PathLike[str], where: str) -> bytes:
-    """Return the bytes of a user's TOML file; InputError, which begins with `where`, if none.
+    """Return the bytes of a user's TOML file; raise InputError, prefixed with `where`, on failure.
 
-    Whoever needs them twice keeps them: a pipe can be read once.
+    A caller that needs the bytes twice has to keep them, because a pipe can be read only once.
     """
     return read_input(path, where, _LARGEST_FILE, "a TOML file")
 
 
 def toml_of(content: bytes, where: str) -> dict[str, Any]:
-    """Return what the bytes of a TOML file say; InputError, which begins with `where`, if none."""
+    """Return the data in TOML text; raise InputError, prefixed with `where`, if invalid."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -98,9 +137,9 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 
 
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
-    """Return a scene as the text of a file that `read_scene` reads back to the last bit.
+    """Return a scene as the text of a file that `read_scene` reads back bit for bit.
 
-    `comments` are lines at its head.
+    `comments` are lines at the head of the text.
     """
     import json
 
@@ -124,7 +163,7 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
-    """Return by what name a file gives the body of a scene, and how."""
+    """Return the key under which a scene file specifies the body, and the value."""
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
     if scene.moments is not None:
@@ -133,7 +172,7 @@ def body_of(scene: Scene) -> tuple[str, list[Any]]:
 
 
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
-    """Return the scene that the content of a file describes; InputError where it describes none."""
+    """Return the scene that the data of a file describe; raise InputError if they are invalid."""
     check_written_schema(data, "scene file")
     check_keys(data, ("schema", "name", *_TABLES), "top level")
     tables: dict[str, dict[str, Any]] = {}
@@ -185,13 +224,13 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Refuse another schema in a file that people write, who may leave the number out."""
+    """Raise InputError for another schema in a file that people write; it may have no number."""
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
-    """Refuse a key that is not among those allowed."""
+    """Raise InputError for a key that is not allowed."""
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)

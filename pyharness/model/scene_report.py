@@ -1,4 +1,4 @@
-"""What reports say of a scene and of the end of a run."""
+"""Lines of reports about a scene and about the end of a run."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,10 @@ from pyharness.model.trajectory import Trajectory
 
 
 def heading(scene: Scene) -> list[str]:
-    """Say what a scene is: name; body, torque, start, steps; that there is no such body."""
+    """Return lines about a scene: name, body, torque, initial omega, steps, and attitude.
+
+    A further line says if no rigid body has these moments.
+    """
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif scene.moments is not None:
@@ -49,7 +52,7 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Say in a line how a run ended."""
+    """Return a line about how a run ended."""
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
@@ -66,13 +69,13 @@ def ending(trajectory: Trajectory) -> str:
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:
-    """Say that rounding times the growth of a small difference exceeds the tolerance."""
+    """Return a phrase for a result whose amplified rounding error exceeds the tolerance."""
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding grows by {short(growth)} on the way; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Say in a line what a method knows of its own error; nothing where it knows nothing."""
+    """Return a line with a method's estimates of its own error, or no line if it has none."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")

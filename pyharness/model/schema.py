@@ -1,4 +1,7 @@
-"""The versions of files that this project writes and reads again (docs/formats.md lists them)."""
+"""Schema numbers of the files that this project writes and reads.
+
+The files are listed in docs/reference/formats.md.
+"""
 
 from pyharness.model.errors import InputError, kind_of
 
@@ -14,30 +17,30 @@ SCHEMAS = {
 }
 """The number of the schema that this version writes and reads, by the kind of file.
 
-It is raised whenever a file of the new form would be misread by the old reader, or the other way
-round.
+The number is raised whenever the old reader would misread a file of the new form, or the new reader
+a file of the old form.
 """
 
 
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
-    """Refuse a file that has another schema than the one that this version reads.
+    """Raise InputError if a file has another schema than the one that this version reads.
 
     Parameters
     ----------
     where : str
-        How the file was named to us, as in "scene file 'a.toml'".
+        Name of the file for a message, as in "scene file 'a.toml'".
     kind : str
-        Its kind, one of `SCHEMAS`.
+        Kind of the file, a key of `SCHEMAS`.
     found : object
-        The number of its schema; None where it has none. A file that people write may leave it out:
-        for that, give the number of `SCHEMAS`.
+        The number of the file's schema; None if it has no number. In a file that people write the
+        number may be missing; the caller then passes the number in `SCHEMAS`.
     remedy : str
         What the user can do.
 
     Raises
     ------
     InputError
-        Where the two differ, or `found` is no whole number.
+        If `found` differs from the number in `SCHEMAS`, or is not an integer.
     """
     known = SCHEMAS[kind]
     if type(found) is int and found == known:

@@ -1,4 +1,4 @@
-"""Short representations of results, whatever their size."""
+"""Short representations of results of any size."""
 
 import textwrap
 from dataclasses import fields, is_dataclass
@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 
 _WIDTH, _LINES = 100, 10
-_LONGEST = 60  # characters of one value
+_LONGEST = 60  # most characters of one value
 
 
 def short_repr(result: Any) -> str:
-    """Return a dataclass in at most ten lines: arrays by type and shape, nothing that is None."""
+    """Return a dataclass as text of at most ten lines, with arrays by type and shape.
+
+    Fields that are None are left out.
+    """
     shown = [
         f"{each.name}={_short(value)}"
         for each in fields(result)
@@ -26,7 +29,7 @@ def short_repr(result: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    """Return one value on one line."""
+    """Return one value as text on one line."""
     if isinstance(value, np.ndarray):
         return f"<{value.dtype} {value.shape}>"
     if isinstance(value, (tuple, list)) and value and is_dataclass(value[0]):

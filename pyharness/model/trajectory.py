@@ -1,4 +1,4 @@
-"""Trajectories: what a method makes of a scene."""
+"""Trajectories: the results of a method or a program for a scene."""
 
 import math
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Of a number in binary64, relative.
+# Largest relative rounding error of a number in binary64.
 ROUNDING = 2.0**-53
-# Endings with every row that was asked for.
+# Endings in which all requested rows are present.
 WITH_ALL_ROWS = ("complete", "sensitive")
 FRAMES = ("body", "space")
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
@@ -25,16 +25,23 @@ STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 
 @dataclass(frozen=True)
 class Stop:
-    """Where the Lipschitz test of the Runge-Kutta program ended a run.
+    """The point at which the Lipschitz test of the Runge-Kutta program ended a run.
 
     Attributes
     ----------
     step : int
-        The step, from 1; its row is the last one.
+        The number of the step, from 1. Its row is the last one of the trajectory.
     variable : str
-        `U1` ... `V3`, or `U`, `UV` for the norms.
+        The variable that failed the test: `U1` ... `V3`, or `U`, `UV` for the norms.
     quotient : float
-        Change of K over change of U (1/s); infinite where U did not change.
+        Change of K over change of U (1/s); infinite if U did not change.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, run_program, subset
+    >>> stop = run_program(case_scene(2), subset("runge-kutta"), implementation="python").stop
+    >>> stop.step, stop.variable
+    (25, 'V2')
     """
 
     step: int
@@ -44,14 +51,14 @@ class Stop:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Rows of results, and how they came about.
+    """The rows of results of an integration, and how the integration ended.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
         True time, s.
     recorded_time : ndarray, shape (n,)
-        The TIME that TAPE5 got, s; for other methods the same as `time`.
+        The TIME that the program writes to TAPE5, s; for methods the same as `time`.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
@@ -59,31 +66,41 @@ class Trajectory:
     steps, evaluations : int
         Steps taken, and right-hand sides evaluated.
     ended : {"complete", "sensitive", "stopped", "overflow"}
-        Why it ended; after an overflow the rows end before the first omega that is not finite.
-        Sensitive: every row is there, but what the motion makes of rounding exceeds the tolerance.
+        How the integration ended. After an overflow the rows end before the first omega that is
+        not finite. Sensitive means that all rows are present, but the amplified rounding error
+        exceeds the tolerance.
     stop : Stop or None
-        What the Lipschitz test found.
+        The point at which the Lipschitz test ended the run; None if it did not.
     ier : ndarray of int, shape (n,), or None
-        IER as the collocation programs print it.
+        The error code IER as the collocation programs print it.
     error : float or None
-        Estimated error of any component at the times asked for, over the largest of omega on the
-        way; None where the method estimates none, and after an overflow.
-    tolerance : float or None
-        The tolerance to which a method solved the scene; None for a program and for a method with
-        a fixed step, which take none.
+        Estimated error of any component at the requested times, relative to the largest component
+        of omega along the trajectory. None if the method does not estimate it, and after an
+        overflow.
     growth : float or None
-        Largest norm of the derivative of omega at the end by omega at any time before; None where
-        it is unknown.
+        Largest norm of the state-transition matrix of omega from any earlier time to the end. None
+        if it is unknown.
     attitude : ndarray, shape (n, 4), or None
-        Quaternions from body to space, scalar first, their signs continuous; None where they were
-        not asked for.
+        Quaternions from body to space, scalar first, with continuous signs. None if they were not
+        requested.
     moments : tuple of three floats, or None
-        Of the body, kg m2; None where it has only coefficients.
+        Principal moments of the body, kg m2; None if it has only coefficients.
     axes : ndarray, shape (3, 3), or None
-        The axes of those moments, in columns; None where they are the body's own.
+        The axes of these moments, in columns; None if they are the body's own axes.
     exact : ndarray of object, shape (n, 8), or None
-        Where a program ran in another word, and has rows: `time`, `recorded_time`, `omega` and
-        `velocity` in its own numbers, of which these here are the nearest floats.
+        Rows of a program that ran with another word length: `time`, `recorded_time`, `omega` and
+        `velocity` as numbers of that word. The other arrays hold the nearest floats. None for
+        binary64, and if there are no rows.
+    tolerance : float or None
+        The tolerance to which a method integrated the scene. None for programs and for methods
+        with a fixed step, which have no tolerance.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, solve
+    >>> found = solve(case_scene(2), [0.5, 1.0])
+    >>> found.ended, found.omega.shape
+    ('complete', (2, 3))
     """
 
     time: Array
@@ -106,19 +123,40 @@ class Trajectory:
     __repr__ = short_repr
 
     def rotation(self) -> "Rotation":
-        """Return the attitudes as rotations of SciPy, which turn vectors from body to space.
+        """Return the attitudes as SciPy rotations, which rotate vectors from body to space.
 
-        InputError where the attitude was not asked for.
+        Returns
+        -------
+        scipy.spatial.transform.Rotation
+            A rotation for each row.
+
+        Raises
+        ------
+        InputError
+            If the attitude was not requested.
         """
         from scipy.spatial.transform import Rotation
 
         return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
 
     def angular_momentum(self, frame: str = "body") -> Array:
-        """Return the angular momentum about the axes of `body` or `space`, shape (n, 3), kg m2/s.
+        """Return the angular momentum about the axes of the body or of space.
 
-        InputError for a body without moments, an unknown frame, or one in space whose attitude was
-        not asked for.
+        Parameters
+        ----------
+        frame : {"body", "space"}
+            The axes of the components.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            The angular momentum, kg m2/s.
+
+        Raises
+        ------
+        InputError
+            For a body without moments, an unknown frame, or the axes of space if the attitude was
+            not requested.
         """
         if frame not in FRAMES:
             raise unknown("frame", str(frame), FRAMES)
@@ -126,9 +164,17 @@ class Trajectory:
         return momentum if frame == "body" else turned_to_space(self._attitudes(), momentum)
 
     def energy(self) -> Array:
-        """Return the kinetic energy of the rotation, shape (n,), J.
+        """Return the kinetic energy of the rotation.
 
-        InputError for a body without moments.
+        Returns
+        -------
+        ndarray, shape (n,)
+            The energy, J.
+
+        Raises
+        ------
+        InputError
+            For a body without moments.
         """
         energy: Array = 0.5 * (self.omega * self._momentum()).sum(axis=1)
         return energy
@@ -147,22 +193,22 @@ class Trajectory:
 
     @property
     def digits(self) -> float | None:
-        """Decimal digits that are left at the end; None where the error is unknown."""
+        """The number of correct decimal digits at the end; None if the error is unknown."""
         return digits_left(self.error)
 
     @property
     def has_all_rows(self) -> bool:
-        """Whether every row that was asked for is there, though it may be sensitive."""
+        """Whether all requested rows are present, even if the result is sensitive."""
         return self.ended in WITH_ALL_ROWS
 
 
 def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Return vectors of the body, shape (n, 3), about the axes of space."""
+    """Transform vectors of the body, shape (n, 3), to components about the axes of space."""
     scalar, vector = attitude[:, :1], attitude[:, 1:]
     twice = 2.0 * np.cross(vector, vectors)
     return vectors + scalar * twice + np.cross(vector, twice)
 
 
 def digits_left(error: float | None) -> float | None:
-    """Return how many decimal digits an error (relative) leaves: 0 to 15.95, those of binary64."""
+    """Return the number of decimal digits that a relative error leaves, 0 to 15.95 (binary64)."""
     return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))

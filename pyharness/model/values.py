@@ -1,4 +1,4 @@
-"""What a user gives, in whatever form, as plain Python: checked and converted once."""
+"""Conversion of user input to plain Python numbers, with checks."""
 
 import itertools
 import math
@@ -10,19 +10,22 @@ from pyharness.model.errors import InputError, kind_of
 
 Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
-# float() makes one of Python's of it, though not of text: int, Fraction, Decimal, NumPy's scalars.
+# A number that float() converts: int, Fraction, Decimal, a NumPy scalar; text is excluded.
 Number = SupportsFloat | SupportsIndex
-# A list, a tuple, an array, a generator.
+# For example a list, a tuple, an array or a generator.
 Numbers = Iterable[Number]
 
 _TOO_LARGE = "a number too large for binary64"
-# Of NumPy's kinds of data, those that are real numbers.
+# The kinds of NumPy data that are real numbers.
 _REAL = "iuf"
 _THREE_FLOATS = [float, float, float]
 
 
 def number(where: str, value: object) -> float:
-    """Return a real number as a float, any; InputError, which begins with `where`, for no such."""
+    """Return a real number as a float; raise InputError, prefixed with `where`, for anything else.
+
+    Infinities and NaN are accepted.
+    """
     found = converted(value)
     if isinstance(found, float):
         return found
@@ -32,23 +35,26 @@ def number(where: str, value: object) -> float:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float, or in words what it is instead."""
+    """Return a real number as a float, or the kind of any other value in words."""
     if type(value) is float:
         return value
     if is_no_number(value):
         return kind_of(value)
     try:
         found = float(value)  # type: ignore[arg-type]
-        # What has more range than binary64 becomes infinite.
+        # A number beyond the range of binary64 becomes infinite.
         return _TOO_LARGE if math.isinf(found) and found != value else found
     except OverflowError:
         return _TOO_LARGE
-    except Exception:  # of a class of the user's: whatever it raises, it is no number
+    except Exception:  # a user-defined class may raise anything; its value is no number
         return kind_of(value)
 
 
 def is_no_number(value: object) -> bool:
-    """Whether it is none though float() may take it: text, truth, an array, NumPy's complex."""
+    """Return whether a value is no real number, although float() may accept it.
+
+    Such values are text, booleans, arrays, and complex numbers of NumPy.
+    """
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
@@ -56,7 +62,7 @@ def is_no_number(value: object) -> bool:
 
 
 def three(where: str, values: object) -> Triple:
-    """Return three finite numbers; InputError, which begins with `where`, for anything else."""
+    """Return three finite numbers; raise InputError, prefixed with `where`, for anything else."""
     found = three_floats(where, values)
     for each in found:
         if not math.isfinite(each):
@@ -65,7 +71,7 @@ def three(where: str, values: object) -> Triple:
 
 
 def three_floats(where: str, values: object) -> Triple:
-    """Return three floats, any of them; InputError, which begins with `where`, for no three."""
+    """Return three floats, finite or not; raise InputError, prefixed with `where`, if invalid."""
     if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
         return values
     allowed = "allowed: three numbers"
@@ -78,7 +84,7 @@ def three_floats(where: str, values: object) -> Triple:
 
 
 def finite(where: str, value: object) -> float:
-    """Return a finite number; InputError, which begins with `where`, for anything else."""
+    """Return a finite number; raise InputError, prefixed with `where`, for anything else."""
     found = number(where, value)
     if not math.isfinite(found):
         raise _not_finite(where, found)
@@ -90,7 +96,7 @@ def _not_finite(where: str, value: float) -> InputError:
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
-    """Return an iterator over what has an order; InputError for text, a set, a mapping."""
+    """Return an iterator over ordered values; raise InputError for text, a set or a mapping."""
     if not isinstance(values, (str, bytes, bytearray, Mapping, Set)):
         try:
             return iter(values)  # type: ignore[call-overload, no-any-return]
@@ -100,7 +106,7 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 
 
 def integer(where: str, value: object) -> int:
-    """Return a whole number; InputError, which begins with `where`, for anything else."""
+    """Return a whole number; raise InputError, prefixed with `where`, for anything else."""
     if not is_no_number(value):
         try:
             return operator.index(value)  # type: ignore[arg-type]
@@ -110,14 +116,17 @@ def integer(where: str, value: object) -> int:
 
 
 def boolean(where: str, value: object) -> bool:
-    """Return True or False; InputError, which begins with `where`, for anything else."""
+    """Return True or False; raise InputError, prefixed with `where`, for anything else."""
     if isinstance(value, bool) or kind_of(value) == "true or false":
         return bool(value)
     raise InputError(f"{where} is {kind_of(value)}; allowed: True or False")
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a tolerance as a float; InputError where it is no number. Its range is not checked."""
+    """Return a tolerance as a float; raise InputError if it is no number.
+
+    The range of the tolerance is not checked. The message names `finest` as its lower end.
+    """
     found = converted(value)
     if isinstance(found, float):
         return found

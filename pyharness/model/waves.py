@@ -1,8 +1,9 @@
-"""Waves of a torque law that have the same frequency, added up without rounding.
+"""Exact sums of the waves of a torque law that have the same frequency.
 
-Each amplitude is divided by a moment and rounded by itself. Where two waves nearly cancel, their
-roundings are left: amplitudes that differ by 1e-10 would leave six digits of the torque. Added
-first, exactly, they leave all digits, and fewer waves are less work.
+A wave is a sine or cosine term of the law. Each amplitude is divided by a moment, and each quotient
+is rounded. If two waves nearly cancel, their rounding errors remain. For example, amplitudes that
+differ by 1e-10 would leave six digits of the torque. An exact sum before the division leaves all
+digits, and fewer waves take less work.
 """
 
 import math
@@ -27,7 +28,7 @@ _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 
 @dataclass(frozen=True)
 class ExactLaw:
-    """A torque law whose waves of one frequency are one, its numbers without rounding."""
+    """A torque law with one wave per frequency, in exact numbers."""
 
     constant: Exact
     rate: Exact
@@ -36,7 +37,7 @@ class ExactLaw:
     frame: str
 
     def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
-        """Return the law with every vector turned."""
+        """Return the law with `turn` applied to every vector."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
             return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
@@ -48,7 +49,7 @@ class ExactLaw:
     def rounded(self) -> TorqueLaw:
         """Return the law in floats, each number rounded once.
 
-        InputError where a sum of amplitudes is beyond the range of numbers.
+        Raise InputError if a sum of amplitudes is beyond the range of floats.
         """
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[Wave, ...]:
@@ -64,18 +65,18 @@ class ExactLaw:
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return the law with one wave for each frequency; a law of which that is true is not changed.
+    """Return the law with one wave per frequency, or the same object if there is nothing to merge.
 
-    Sines of opposite frequencies are one, with opposite signs, and cosines with the same sign. A
-    cosine of frequency 0 is part of the constant, and a sine of frequency 0 is nothing.
+    Sines of opposite frequencies are merged with opposite signs, cosines with the same sign. A
+    cosine of frequency 0 is added to the constant, and a sine of frequency 0 is dropped.
     """
     return exact_law(law).rounded() if is_mergeable(law) else law
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
-    """Whether two waves of a law are of one frequency, or one is of frequency 0."""
+    """Return whether a law has a wave of frequency 0, or two sines or cosines of one frequency."""
     for waves in (law.sines, law.cosines):
-        # A wave without amplitude is none.
+        # A wave without amplitude does not count.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
         if 0.0 in counts or any(count > 1 for count in counts.values()):
             return True
@@ -83,7 +84,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a torque law with one wave for each frequency, without rounding."""
+    """Return a torque law with one wave per frequency, in exact numbers."""
     constant = _exact(law.constant)
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -100,7 +101,7 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
 
 
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
-    """Return a wave for each frequency, but none whose amplitude vanishes; `even`: cosines."""
+    """Return one wave per frequency, without waves of zero amplitude; `even` means cosines."""
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:
         exact = _exact(amplitude)
@@ -132,17 +133,17 @@ def _rounded(values: Exact) -> Triple:
 
 
 def with_merged_waves(scene: Scene) -> Scene:
-    """Return a scene whose torque has one wave for each frequency."""
+    """Return the scene with one wave per frequency in its torque."""
     law = merged(scene.torque)
     return scene if law is scene.torque else replace(scene, torque=law)
 
 
 def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Array, Array, Array]:
-    """Return the constants and waves of many torque laws, with one wave for each frequency of each.
+    """Return the constants and waves of many torque laws, each law with one wave per frequency.
 
-    The shapes are (m, 3), (m, k, 4) and (m, l, 4), each m the number of laws, or 1 where one is
-    shared by all. Each law becomes what `merged` makes of it alone; a wave that is no longer there
-    has the amplitude and the frequency 0. A law that is not finite is left as it is.
+    The shapes are (m, 3), (m, k, 4) and (m, l, 4). In each array m is the number of laws, or 1 if
+    all laws share one row. Each law becomes the law that `merged` returns for it. A wave that was
+    merged into another one has amplitude and frequency 0. A law that is not finite is unchanged.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
@@ -163,7 +164,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
         try:
             law = merged(law)
         except InputError:
-            # Its sum is no number, and its status will say so.
+            # The sum overflows. An infinite constant makes the status of this body report it.
             constant[n] = np.inf
             continue
         constant[n] = law.constant
@@ -175,13 +176,13 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
 
 
 def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
-    """Return where a law has two waves of one frequency, or one of frequency 0; shape (m,)."""
+    """Return for each law whether `is_mergeable` holds, shape (m,)."""
     found = np.zeros(1, bool)
     for waves in (sines, cosines):
         if waves.size:
             acts = waves[..., :3].any(axis=-1)
             frequencies = np.abs(waves[..., 3])
-            # What fills up a shorter law has no amplitude, and is no wave.
+            # The padding of a shorter law has no amplitude, and does not count as a wave.
             found = found | (acts & (frequencies == 0.0)).any(axis=-1)
             sizes = np.sort(np.where(acts, frequencies, np.nan), axis=-1)
             found = found | (sizes[:, 1:] == sizes[:, :-1]).any(axis=-1)
@@ -198,9 +199,9 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return an array of waves without the columns in which no law has one.
+    """Return an array of waves without the columns in which no law has a wave.
 
-    A frequency that is no number keeps its column, so that its law alone is refused for it.
+    A column with a frequency that is not finite is kept, so that only its own law is refused.
     """
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

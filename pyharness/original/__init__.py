@@ -1,1 +1,1 @@
-"""The twins: the three programs of the appendix again, in plain Python."""
+"""The three programs of the appendix: their cards, Python ports (twins) and compiled runs."""

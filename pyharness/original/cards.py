@@ -1,7 +1,8 @@
-"""The text of the edition: every card of the three decks, and what the scan shows of it.
+"""The text of the edition: every card of the three decks, and how the scan shows it.
 
-A line of the scan is a number, a dash and the text of a card; blanks do not count. The tables are
-in `data/cards`: the decks, the pages of the scan in its order, and where a card is in the twins.
+A line of the scan is a card number, a dash and the text of the card; blanks are ignored. The tables
+in `data/cards` hold the decks, the pages of the scan in its order, and the lines of the twins that
+correspond to each card. An entry is an entry of the critical apparatus (`data/apparatus.toml`).
 """
 
 import re
@@ -21,7 +22,7 @@ _PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
-    """What the scan has in place of our characters, and the entry that says why."""
+    """A passage that the scan shows in other characters than ours, and the entry that says why."""
 
     ours: str
     scans: str
@@ -29,7 +30,7 @@ class Difference(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A line of a source."""
+    """A line of a source file."""
 
     file: str
     line: int
@@ -37,7 +38,7 @@ class Place(NamedTuple):
 
 
 class Card(NamedTuple):
-    """A card.
+    """A card of a deck, and how the scan shows it.
 
     Attributes
     ----------
@@ -48,11 +49,12 @@ class Card(NamedTuple):
     text : str
         Columns 1 to 72 as we read them.
     differences : tuple of Difference
-        From left to right, each at the first place after the one before; blanks do not count.
+        The passages that the scan shows otherwise, from left to right. Each is the first occurrence
+        of its characters after the previous one; blanks are ignored.
     printed : tuple of (str, str) or None
-        The number that the scan shows, where it is another, and the entry.
+        The number that the scan shows if it is not `number`, and the entry that says why.
     lost : str or None
-        The entry of a card that the scan does not have.
+        The entry of a card that is missing from the scan.
     """
 
     program: str
@@ -64,27 +66,27 @@ class Card(NamedTuple):
 
     @property
     def name(self) -> str:
-        """``two-term:1660``."""
+        """Return the program and the number of the card, as in ``two-term:1660``."""
         return f"{self.program}:{self.number}"
 
     @property
     def statement(self) -> str:
-        """The text with single blanks."""
+        """Return the text with single blanks."""
         return " ".join(self.text.split())
 
     @property
     def is_comment(self) -> bool:
-        """Whether column 1 has a C."""
+        """Return whether column 1 has a C."""
         return self.text.startswith("C")
 
     @property
     def continues(self) -> bool:
-        """Whether column 6 has a character: the card goes on with the statement before it."""
+        """Return whether the card continues the previous statement, by a character in column 6."""
         return not self.is_comment and self.text[5:6].strip() != ""
 
     @property
     def scan(self) -> str | None:
-        """The line of the scan without blanks; None where it has no such line."""
+        """Return the line of the scan without blanks; None if the scan has no such line."""
         if self.lost:
             return None
         number = self.printed[0] if self.printed else str(self.number)
@@ -92,17 +94,17 @@ class Card(NamedTuple):
         return f"{number}-{''.join(shown)}"
 
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
-        """Give the text in pieces: as the scan has it, or with the difference that it shows."""
+        """Yield the text in passages, each with the difference that the scan shows, or None."""
         return passages(self.text, self.differences)
 
     @property
     def deviates(self) -> bool:
-        """Whether the scan's line is not the card."""
+        """Return whether the line of the scan differs from the card."""
         return bool(self.lost or self.printed or self.differences)
 
     @property
     def entries(self) -> tuple[str, ...]:
-        """The entries of the apparatus that name the card."""
+        """Return the identifiers of the apparatus entries that name the card."""
         return tuple(
             each["id"]
             for each in facts("apparatus")["entry"]
@@ -111,10 +113,10 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program by number, and where they stand in its port and its twin."""
+    """The cards of a program by number, and their lines in its Fortran port and its Python twin."""
 
     def __init__(self, program: str) -> None:
-        """Read the table."""
+        """Read the program's table of cards."""
         self.program = program
         self._places = facts("cards/places")[program]
         self.cards = {
@@ -131,7 +133,7 @@ class Deck:
 
     @cached_property
     def executable(self) -> frozenset[int]:
-        """Cards of statements that compute, print or jump: neither comment nor specification."""
+        """Return the cards of executable statements, which are not comments or specifications."""
         found, computes = set(), False
         for card in self.cards.values():
             if not card.continues:
@@ -142,34 +144,34 @@ class Deck:
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Executable cards without a statement in the port, and the reason."""
+        """Return the executable cards without a statement in the port, each with the reason."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Cards whose statement in the port has other words, and the reason."""
+        """Return the cards whose statement is different in the port, each with the reason."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
     def port(self) -> dict[int, list[Place]]:
-        """The lines of the Fortran port by card, as its margin names them."""
+        """Return the lines of the Fortran port by card, from the card numbers in its margin."""
         return _by_card((cards, place) for place, cards in margin(self.program))
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """The lines of the Python twin by card."""
+        """Return the lines of the Python twin by card."""
         places = self._places["twin"]
         return _by_card((cards, _line_of(file, text)) for cards, file, text in places)
 
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program; callers must not change it."""
+    """Return the deck of a program. It is cached, so callers must not change it."""
     return Deck(program)
 
 
 def numbers(ranges: str) -> list[int]:
-    """Return the cards of a text such as ``750-770, 800``."""
+    """Return the card numbers of a text such as ``750-770, 800``."""
     found: list[int] = []
     for each in ranges.split(",") if ranges else ():
         first, _, last = each.strip().partition("-")
@@ -178,7 +180,7 @@ def numbers(ranges: str) -> list[int]:
 
 
 def find(program: str, number: int) -> Card:
-    """Return a card; InputError, with its neighbours, where there is none."""
+    """Return a card; raise InputError, which names the nearest cards, if there is no such card."""
     cards = deck(program).cards
     if number not in cards:
         near = sorted(cards, key=lambda each: abs(each - number))[:2]
@@ -188,17 +190,18 @@ def find(program: str, number: int) -> Card:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the cards that are asked for; all where nothing is.
+    """Return the requested cards; all cards if nothing is requested.
 
     Parameters
     ----------
     asked : iterable of str
-        ``two-term``, ``1660``, ``1040-1090`` (of every deck that has them), ``two-term:1660``.
+        Programs, card numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every deck that
+        has such cards), ``two-term:1660``.
 
     Raises
     ------
     InputError
-        Where one of them is no card, no range, or an empty one.
+        If a request is no program, card or range, or is a range without cards.
     """
     found: dict[Card, None] = {}
     for each in list(asked) or PROGRAMS:
@@ -207,7 +210,7 @@ def chosen(asked: Iterable[str]) -> list[Card]:
 
 
 def parallels(card: Card) -> list[Card]:
-    """Return the cards of the other decks with the same text, where that is no common one."""
+    """Return the cards of other decks with the same text; none for a comment or a blank card."""
     if card.is_comment or not card.text[6:].strip():
         return []
     return [
@@ -264,7 +267,7 @@ def _cards_of(asked: str) -> list[Card]:
 
 
 def margin(program: str) -> Iterator[tuple[Place, str]]:
-    """Give the lines of the port that name cards, and the cards that they name."""
+    """Yield the lines of the Fortran port that name cards in the margin, and those cards."""
     file = f"{program.replace('-', '_')}.fypp"
     for number, text in enumerate(_lines(shipped(_PORT) / file), 1):
         if match := _MARGIN.match(text):
@@ -274,11 +277,11 @@ def margin(program: str) -> Iterator[tuple[Place, str]]:
 def passages(
     text: str, differences: Iterable[Difference]
 ) -> Iterator[tuple[str, Difference | None]]:
-    """Give a text in pieces: as the scan has it, or with the difference that the scan shows there.
+    """Yield a text in passages, each with the difference that the scan shows there, or None.
 
-    ValueError where our characters do not stand.
+    Raise ValueError if the text does not contain the characters of a difference in their order.
     """
-    # Blanks do not count; these are the places of what does.
+    # Blanks are ignored; these are the indices of all other characters.
     places = [n for n, letter in enumerate(text) if not letter.isspace()]
     letters = tight(text)
     done = at = 0
@@ -318,5 +321,5 @@ def _lines(path: Path) -> list[str]:
 
 
 def tight(text: str) -> str:
-    """Return a text without its blanks, which do not count."""
+    """Return a text without its blanks."""
     return "".join(text.split())

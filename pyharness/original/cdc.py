@@ -1,21 +1,23 @@
-"""The arithmetic of the CDC 6600 and CYBER 70: its rules of rounding.
+"""The rounding rules of the arithmetic of the CDC 6600 and CYBER 70.
 
-After the CYBER 170 hardware reference, CDC 60463560: a coefficient of p = 48 bits, a whole number,
-and an exponent; sums in a frame of 2 p bits. `FX` are the instructions 30, 31, 40 and 44, `RX`
-their rounded kind, 34, 35, 41 and 45; NX (24) normalises a sum. No guard bit survives: what lies
-below the unit of the larger operand is cut before NX moves the sum to the left.
+The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient of
+p = 48 bits and an exponent; a sum is formed in a frame of 2 p bits. `FX` are the instructions 30,
+31, 40 and 44, and `RX` their rounding counterparts 34, 35, 41 and 45. NX (24) normalises a sum. No
+guard bit survives, because the bits below the unit of the larger operand are truncated before NX
+shifts the sum to the left.
 """
 
 from pyharness.original.rounding import Operation, Pair, Rules, rounding
 
-# Exponents of the whole number that a coefficient is: the fields 0000 and 3776 of a word.
+# Exponents of an integer coefficient: the octal exponent fields 0000 and 3776 of a word.
 LEAST, MOST = -1023, 1022
 
 
 def cdc(p: int, rounds: bool) -> Rules:
-    """Return the rules for coefficients of p bits, FX, or RX where it `rounds`.
+    """Return the rules for coefficients of p bits: those of RX if `rounds`, else those of FX.
 
-    Literals go to nearest, as the constants .2 and .01 in the decks; nothing says so of FTN.
+    Literals, such as the constants .2 and .01 in the decks, are rounded to nearest. No source says
+    that the compiler FTN did so.
     """
     settled = rounding(p, LEAST, MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0
@@ -45,9 +47,9 @@ def _sum(p: int, rounds: bool) -> Operation:
 
 
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
-    """Return the sum in its frame, in units of 2**(e - p), and e, of the larger operand.
+    """Return the sum in its frame, in units of 2**(e - p), and e, the larger operand's exponent.
 
-    The operands are normalised. The shift of the smaller one cuts its magnitude.
+    The operands must be normalised. The alignment shift truncates the magnitude of the smaller one.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe

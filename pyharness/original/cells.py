@@ -1,4 +1,4 @@
-"""The cells in which Fortran and twin are compared: program x case x listing x reading."""
+"""Cells: the combinations of program, case and listing for which Fortran and twin are compared."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,20 +9,24 @@ from pyharness.original.equations import initial_torque
 
 
 def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
-    """Return every subset, the empty one first."""
+    """Yield every subset of the names, the empty one first."""
     for bits in range(2 ** len(names)):
         yield frozenset(name for i, name in enumerate(names) if bits >> i & 1)
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Return every subset of defects, with every choice of readings."""
+    """Yield the listings of a program with every subset of defects and every choice of readings."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Return every listing of every program with every case, and what a case alone allows."""
+    """Yield every listing of every program with every case.
+
+    For a case with an initial torque, each listing is also yielded with the conjecture
+    `initial-torque`.
+    """
     for program in PROGRAMS:
         for listing in all_listings(program):
             for case in case_numbers():
@@ -33,12 +37,16 @@ def all_cells() -> Iterator[tuple[Listing, int]]:
 
 
 def cell_name(listing: Listing, case: int) -> str:
-    """Return a name without blanks, as in ``two-term/case-3/dt-accumulates+torque-held``."""
+    """Return the name of a cell, as in ``two-term/case-3/dt-accumulates+torque-held``."""
     return f"{listing.program}/case-{case}/{listing_name(listing)}"
 
 
 def listing_name(listing: Listing) -> str:
-    """Return `original`, with its readings after a colon, `corrected`, or all that is active."""
+    """Return the name of a listing, without blanks.
+
+    It is `corrected`, or `original` with its readings after colons. For any other listing it is
+    the names of all active defects, readings and conjectures, joined by ``+``.
+    """
     if listing.label == "custom":
         return "+".join(sorted(listing.active))
     return ":".join([listing.label, *sorted(listing.readings)])

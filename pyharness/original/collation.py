@@ -1,4 +1,4 @@
-"""The collation: the scan against the cards line by line, and the cards against the entries."""
+"""The collation: checks of the scan against the cards, and of the cards against the apparatus."""
 
 import difflib
 import re
@@ -12,7 +12,11 @@ HEADING = "APPENDIX AND PROGRAMS"
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return all that the appendix should have: a line without blanks, and what it is."""
+    """Return every line that the appendix should have, without blanks, with its name.
+
+    The name is a card's name, ``furniture`` for a line that an editor added, or ``phantom`` for
+    text that belongs to no card at its place.
+    """
     found = []
     for page in facts("cards/scan")["page"]:
         for item in page["lines"]:
@@ -27,12 +31,12 @@ def expected_lines() -> list[tuple[str, str]]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return what the tables do not explain of a scan, a sentence each; none where they do.
+    """Return one sentence for each line in which a scan and the tables disagree.
 
     Raises
     ------
     InputError
-        Where the text has no appendix with cards.
+        If the text has no appendix with cards.
     """
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
@@ -55,7 +59,7 @@ def unexplained(scan: str) -> list[str]:
 
 
 def undeclared() -> list[str]:
-    """Return what cards and entries say otherwise, a sentence each; none where they agree."""
+    """Return one sentence for each disagreement between the cards and the apparatus entries."""
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
         for each in card.differences:

@@ -1,8 +1,9 @@
-"""Collocation as in IV.2, for up to five terms: an interval, and the march of the two programs.
+"""Collocation as in IV.2, with up to five terms: one interval, and a run of the two programs.
 
-Every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34) whose derivative meets the
-right-hand side at as many points as there are terms (eq. 36). The right-hand side needs the
-unknowns themselves: a first estimate takes it constant, one correction takes it at the points.
+Every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its derivative equals the
+right-hand side at as many points as there are terms (eq. 36). The right-hand side depends on the
+unknowns themselves. A first estimate therefore takes it as constant, and one correction evaluates
+it at the points.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +16,7 @@ from pyharness.original.equations import Record, Vector, all_finite, initial_tor
 from pyharness.original.linear_solver import leqt1f
 
 Rates = Callable[[int, Vector], list[float]]
-"""Right-hand sides of all unknowns at point k (0 is the interval's beginning)."""
+"""The right-hand sides of all unknowns at point k; point 0 is the start of the interval."""
 
 
 def march(
@@ -24,9 +25,10 @@ def march(
     points_of: Callable[[float], list[float]],
     rates: Callable[[Sequence[Vector], int, Vector], list[float]],
 ) -> Trajectory:
-    """Run a program whose points lie in a step as `points_of` says.
+    """Run a collocation program; `points_of` returns the collocation points for a DT (s).
 
-    `rates` gets the torques at the beginning and at the points, k, and the unknowns there.
+    `rates` takes the torques at the start and at all points, the index k of a point, and the
+    unknowns there. It returns their right-hand sides.
     """
     h = scene.step_size
     dt = h
@@ -60,7 +62,7 @@ def interval(
 ) -> tuple[list[float], int]:
     """Advance all unknowns to `end`; return them, and IER of the second solution.
 
-    The points of collocation and the end are in s from the interval's beginning.
+    The collocation points and `end` are in seconds from the start of the interval.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -70,13 +72,13 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return the coefficients c1, c2, ... of every unknown whose derivative meets `rates`."""
+    """Return each unknown's coefficients c1, c2, ... that give the derivatives `rates`, and IER."""
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 
 
 def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
-    """Return the derivatives of t, t**2, ... at every point, a row for each (eq. 36)."""
+    """Return the derivatives of t, t**2, ... at the points, one row for each point (eq. 36)."""
     return [
         [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]
         for t in points
@@ -84,7 +86,7 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 
 
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
-    """Return x(0) + c1 t + c2 t**2 + ... for every unknown, added in this order."""
+    """Return x(0) + c1 t + c2 t**2 + ... of every unknown, with the terms added in this order."""
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]
     result = []

@@ -1,4 +1,4 @@
-"""The compiled programs of the appendix: scenes in, trajectories out."""
+"""Runs of the appendix's compiled programs on a scene, with the results as a trajectory."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -20,9 +20,9 @@ def run(
     may_stop: bool = True,
     velocity: bool = True,
 ) -> Trajectory:
-    """Run a program in Fortran: what `run_program` takes, but for the checks, and returns.
+    """Run the compiled program of a listing; parameters and result are those of `run_program`.
 
-    NotBuiltError where the extension is not built.
+    The arguments are not checked. Raise NotBuiltError if the extension is not built.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
         *program_arguments(scene, listing, lipschitz, may_stop, velocity)
@@ -36,7 +36,10 @@ def read_rows(
     listing: Listing, rows: Array, ier: NDArray[np.int32], evaluations: int,
     ended: str, stop_variable: int, stop_quotient: float,
 ) -> Trajectory:  # fmt: skip
-    """Return what a compiled program gave, rows (n, 8) and as many IER or more, as a trajectory."""
+    """Return the output of a compiled program as a trajectory.
+
+    `rows` has shape (n, 8), and `ier` has at least n values.
+    """
     n = len(rows)
     is_stopped = stop_variable > 0
     return Trajectory(
@@ -53,7 +56,7 @@ def read_rows(
 
 
 class Arguments(NamedTuple):
-    """What the compiled `run_program` takes, in its order."""
+    """The arguments of the compiled `run_program`, in its order."""
 
     program: int
     flags: int
@@ -78,7 +81,7 @@ class Arguments(NamedTuple):
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
 ) -> Arguments:
-    """Return what the compiled `run_program` takes."""
+    """Return the arguments of the compiled `run_program` for a scene and a listing."""
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
         conjectures = listing.conjectures - {"initial-torque"}
@@ -107,5 +110,5 @@ def program_arguments(
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
-    """Whether a run without velocity would end elsewhere."""
+    """Return whether a run needs the velocity because the stop test may read it."""
     return may_stop and listing.has("lipschitz-tests-velocity")

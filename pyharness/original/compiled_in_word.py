@@ -1,4 +1,7 @@
-"""The compiled programs in the words of IEEE 754, whose numbers go in and come out as bytes."""
+"""Runs of the compiled programs in a word, which is a floating-point format of IEEE 754.
+
+Numbers are passed to the extension, and returned by it, as bytes.
+"""
 
 import itertools
 from dataclasses import replace
@@ -20,10 +23,10 @@ from pyharness.original.word import Word
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run a program in Fortran, in a word: what `in_word.run` takes and returns.
+    """Run the compiled program of a listing in a word, as `in_word.run` runs its twin.
 
-    InputError where the compiler of the extension has no such word, or angles are too large for
-    its sine; NotBuiltError where there is no extension.
+    Raise InputError if the extension's compiler does not support the word, or if angles are too
+    large for the extension's sine. Raise NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -60,7 +63,7 @@ def run(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the words that the extension has; none where there is no extension."""
+    """Return the names of the words that the extension supports; none if it is not built."""
     try:
         from pyharness import _build
     except ImportError:
@@ -69,7 +72,7 @@ def compiled_words() -> tuple[str, ...]:
 
 
 def _check_angles(scene: Scene) -> None:
-    # TIME of the collocation programs grows with the square of the steps.
+    # In the collocation programs TIME grows with the square of the number of steps.
     latest = scene.step_size * scene.steps**2
     law = scene.torque
     for _, frequency in (*law.sines, *law.cosines):

@@ -1,6 +1,7 @@
-"""The decks compared with each other, and with sections II to V: every step of every program.
+"""The collation of the decks with each other and with sections II to V, operation by operation.
 
-The table is `data/cards/collation.toml`; whether decks agree is found from their statements.
+`data/cards/collation.toml` lists the operations of the programs. Whether the decks agree on an
+operation is computed from their statements.
 """
 
 import re
@@ -14,25 +15,26 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 class Row(NamedTuple):
-    """A step of the programs.
+    """A row of the table: one operation of the programs.
 
     Attributes
     ----------
     what : str
-        What its cards do.
+        What the cards do.
     cards : dict of str to str
-        The cards of each deck that has the step, as in ``750-770, 800``.
+        The cards of each deck that has the operation, as in ``750-770, 800``.
     decks : str
-        ``agree`` where all that have the step have the same statements, ``names`` or ``order``
-        where they differ in that alone, else ``differ``; ``-`` where none has it.
+        ``agree`` if all decks that have the operation have the same statements. ``names`` if their
+        statements differ only in names, ``order`` if they differ only in names and order, else
+        ``differ``. ``-`` if no deck has the operation.
     thesis : str
-        ``agrees`` or ``differs``; ``silent`` where the thesis does not speak of the step.
+        ``agrees`` or ``differs``; ``silent`` if the thesis does not mention the operation.
     text, says : str
-        The place in the thesis, and what it says; empty where it is silent.
+        The place in the thesis, and its statement; both empty if the thesis is silent.
     entries : tuple of str
         The entries of the apparatus that explain a disagreement.
     reason : str
-        What else does.
+        Another explanation of a disagreement.
     """
 
     what: str
@@ -46,18 +48,18 @@ class Row(NamedTuple):
 
     @property
     def is_explained(self) -> bool:
-        """Whether nothing disagrees, or an entry or a reason says why."""
+        """Return whether the three decks and the thesis agree, or the row explains why not."""
         agrees = self.decks == "agree" and len(self.cards) == len(PROGRAMS)
         return (agrees and self.thesis == "agrees") or bool(self.entries or self.reason)
 
 
 def rows() -> list[Row]:
-    """Return the steps in the order of the decks."""
+    """Return the rows of the table, in the order of the decks."""
     return [_row(each) for each in facts("cards/collation")["row"]]
 
 
 def faults(found: list[Row]) -> list[str]:
-    """Return what the table leaves unexplained or has wrong, a sentence each."""
+    """Return one sentence for each mistake of the table and each unexplained disagreement."""
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
     for row in found:
@@ -84,7 +86,7 @@ def faults(found: list[Row]) -> list[str]:
 
 
 def statements(program: str, cards: str) -> list[str]:
-    """Return the statements of cards without blanks and labels; comments are none."""
+    """Return the statements of cards without blanks and labels; comments are left out."""
     found: list[str] = []
     for number in numbers(cards):
         card = deck(program).cards[number]
@@ -109,7 +111,7 @@ def _row(given: dict[str, Any]) -> Row:
 
 
 def _decks(given: dict[str, Any]) -> str:
-    """Say how the statements of the decks that have a step differ."""
+    """Return how the statements of the decks that have an operation differ, as in `Row.decks`."""
     found = {program: statements(program, cards) for program, cards in given["cards"].items()}
     if not found:
         return "-"
@@ -136,13 +138,13 @@ def _same(found: dict[str, list[str]]) -> bool:
 
 
 def _renamed(statement: str, names: str) -> str:
-    """Return a statement with names replaced, as in ``A=A1 B=B1``."""
+    """Return a statement with names replaced by pairs such as ``A=A1 B=B1``."""
     changes = dict(each.split("=") for each in names.split())
     return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
 
 
 def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
-    """Whether an entry names a card of the row; one of no card at all may stand in any."""
+    """Return whether an entry names a card of the row, or no card at all."""
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))
         for program, cards in row.cards.items()

@@ -1,7 +1,8 @@
-"""Decks: the cards of a program as fixed-form FORTRAN, and their run by a Fortran compiler.
+"""Decks: the cards of a program as fixed-form FORTRAN, and their runs with a Fortran compiler.
 
-A third path from the cards to the numbers. It shares the card table with the edition and nothing
-with port and twin: the compiler reads the author's own statements, and LEQT1F is one of its own.
+This is a third, independent way from the cards to the results. It shares the card table with the
+edition, and nothing with the Fortran port and the twin. The compiler reads the author's own
+statements and a separate version of LEQT1F (`data/cards/leqt1f.f`).
 """
 
 import re
@@ -22,9 +23,9 @@ from pyharness.original.cards import deck, numbers
 
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-MODELS = (3, 5)  # terms of the models that V.2 used in Case 6 and did not print
+MODELS = (3, 5)  # terms of the models that V.2 used in Case 6, whose programs are not printed
 COMPILER = "gfortran"
-# Numbers are binary64 and 0 until they are set; no operation is joined with another.
+# REAL is binary64, variables are 0 until they are set, and no operations are fused.
 FLAGS = (
     "-std=legacy", "-fdefault-real-8", "-fno-automatic", "-finit-real=zero", "-ffp-contract=off",
     "-fno-sign-zero",
@@ -34,14 +35,14 @@ _MARK = "+"
 
 
 class Run(NamedTuple):
-    """What a compiled deck wrote.
+    """The output of a compiled deck.
 
     Attributes
     ----------
     tape5 : array (n, 7)
-        TIME, U1 to U3 (rad/s), V1 to V3 (m/s), a row for each record.
+        TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s), one row for each record of TAPE5.
     page : str
-        TAPE6 as it was printed, without carriage control and blanks at the ends of lines.
+        TAPE6 as it was printed, without carriage control and trailing blanks.
     """
 
     tape5: np.ndarray
@@ -54,25 +55,28 @@ def deck_text(
     dialect: str = "1982",
     terms: int | None = None,
 ) -> str:
-    """Return a program as fixed-form FORTRAN, card numbers in columns 73 to 80.
+    """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
 
     Parameters
     ----------
     listing : Listing
         The program, its defects and readings.
     scene : Scene, optional
-        A case of Table 1, in the deck's own assignment cards and DO limit; by default the case that
-        was printed: 2 in the collocation decks, 5 in the other, 300 and 100 steps.
+        A case of Table 1, which is set by the deck's own assignment cards and DO limit. By default
+        it is the printed case: Case 2 with 300 steps in the collocation decks, Case 5 with 100
+        steps in the Runge-Kutta deck.
     dialect : {"1982", "gfortran", "ftn"}
-        The text; with what a compiler of today needs, marked in column 73; or with the torque of
-        Case 7 alone, for the compiler that it was written for.
+        "1982" is the text itself. "ftn", for the compiler for which the decks were written, adds
+        only the torque of Case 7. "gfortran" adds that torque and what a modern compiler needs.
+        Column 73 marks each card that a dialect adds or replaces.
     terms : int, optional
-        Of a model that is not printed, made of the four-term deck: a conjecture.
+        Number of terms, 3 or 5, of a model that is not printed. Its deck is derived from the
+        four-term deck, and is a conjecture.
 
     Raises
     ------
     InputError
-        For an unknown dialect, or a scene that no card can hold.
+        If the dialect is unknown, or if no card can express the listing, the terms or the scene.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -100,21 +104,23 @@ def deck_text(
 
 
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
-    """Return a batch job that compiles and runs a deck with FTN, and our LEQT1F where it is called.
+    """Return a batch job that compiles and runs a deck with FTN.
+
+    The job includes our LEQT1F if the deck calls it.
 
     Parameters
     ----------
     deck : str
-        In the dialect `ftn`.
+        A deck in the dialect `ftn`.
     system : {"nos", "nosbe"}
-        The operating system whose control statements stand around it.
+        The operating system whose control statements surround the deck.
     rounds : bool
-        Whether sums, products and quotients are rounded: FTN's option ROUND.
+        Whether FTN's option ROUND is set, by which sums, products and quotients are rounded.
 
     Raises
     ------
     InputError
-        For an unknown system.
+        If the system is unknown.
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -123,14 +129,14 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     compiles = job["compile"].format(rounds=jobs["rounds"] if rounds else "")
     control = [*job["before"], compiles, *job["after"], jobs["record"]]
     statements = "".join(f"{each}\n" for each in control)
-    named = statements.format(user="USERNAME", password="PASSWORD")  # the site's
+    named = statements.format(user="USERNAME", password="PASSWORD")  # the site assigns them
     return named + deck + (_SOLVER.read_text() if "LEQT1F" in deck else "")
 
 
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Whether all that an alteration names is so."""
+    """Return whether all conditions of an alteration hold for the listing, dialect and case."""
     named = alteration.get
     return (
         named("program") == listing.program
@@ -155,17 +161,17 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 
 
 def model_cards(terms: int) -> dict[int, str]:
-    """Return the cards of a collocation deck of so many terms, as the four-term deck has them.
+    """Return the cards of a collocation deck with `terms` terms, modelled on the four-term deck.
 
-    A conjecture: the three- and five-term models, which V.2 used in Case 6, are not printed. The
-    points are k/(n+1) of the interval; cards that there are in another number are numbered anew.
+    The cards are a conjecture: V.2 used the three- and five-term models in Case 6, but they are not
+    printed. With n terms the points are k/(n+1) of the interval. All cards are renumbered.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
     end = f"T{terms + 1}"
 
     def made(start: str, last: str, new: list[str]) -> None:
-        """Put cards in the place of those from one to another."""
+        """Replace the cards from the text `start` to the text `last` by new ones."""
         first = next(n for n, each in enumerate(text) if each.strip() == start)
         after = next(n for n in range(first, len(text)) if text[n].strip() == last)
         text[first : after + 1] = [f"      {each}" for each in new]
@@ -230,7 +236,7 @@ def model_cards(terms: int) -> dict[int, str]:
     tail = next(n for n, each in enumerate(text) if each.strip().startswith("WRITE(6,5)"))
     ending = [each.replace("(6)", f"({terms + 2})") for each in text[tail:]]
     text = [*head, *text[:tail], *ending]
-    # A statement that ends with an operator goes on.
+    # A statement whose card ends with an operator continues on the next card.
     for n, each in enumerate(text[:-1]):
         if each.rstrip().endswith("+"):
             text[n + 1] = "     C" + text[n + 1].strip().removeprefix("C")
@@ -261,12 +267,12 @@ def _literal(value: float) -> str:
 
 
 def solver_cards() -> int:
-    """Return the cards of our LEQT1F, comments apart."""
+    """Return the number of cards of our LEQT1F, without comments."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
 def compiler() -> str | None:
-    """Return the path of the compiler; None where there is none."""
+    """Return the path of the Fortran compiler; None if it is not installed."""
     return shutil.which(COMPILER)
 
 
@@ -278,12 +284,13 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
     text : str
         The deck.
     folder : Path, optional
-        Where the solver was compiled before, as `solver_object` does; else it is compiled anew.
+        A folder that keeps the compiled solver, as in `solver_object`. By default each call
+        compiles the solver again.
 
     Raises
     ------
     RuntimeError
-        Where the compiler refuses the deck, or the program fails.
+        If the compiler rejects the deck, or if the program fails.
     """
     with TemporaryDirectory() as place:
         here = Path(place)
@@ -295,7 +302,7 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
 
 
 def solver_object(folder: Path) -> Path:
-    """Return LEQT1F compiled into a folder, where it is not yet."""
+    """Return the path of the compiled LEQT1F in a folder; compile it if it is missing."""
     found = folder / "leqt1f.o"
     if not found.exists():
         _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)
@@ -309,7 +316,7 @@ def _command(words: list[str], folder: Path) -> None:
 
 
 def _records(path: Path) -> np.ndarray:
-    """Return the records of an unformatted file: 7 numbers between two lengths."""
+    """Return the records of an unformatted file: 7 numbers each, between two record lengths."""
     record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
     return np.fromfile(path, dtype=record)["values"]
 

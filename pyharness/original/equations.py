@@ -1,4 +1,4 @@
-"""What the three twins share: right-hand sides, and the record of a run."""
+"""Right-hand sides, and the record of a run, which the three twins share."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of equations 16-18 at the angular velocity `u` (rad/s2)."""
+    """Return F, G, H of equations 16-18 (rad/s2) at the angular velocity `u` (rad/s)."""
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
@@ -29,15 +29,18 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return force over mass along each axis (m/s2); corrected, a body has one mass, the first."""
+    """Return the force over the mass along each axis (m/s2).
+
+    Without the defect `three-masses` the first mass is used for all axes.
+    """
     masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
     return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the torque over moment that Table 1 gives initially (1/s2); None where it gives none.
+    """Return the initial torque of a case in Table 1 over the moments (1/s2); None if it has none.
 
-    By the conjecture `initial-torque` it acts over the first step.
+    Under the conjecture `initial-torque` this torque acts over the first step.
     """
     given = card_torque(scene)
     if given is None or scene.moments is None:
@@ -46,21 +49,21 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the torque that Table 1 gives initially (N m); None where it gives none."""
+    """Return the initial torque of a case in Table 1 (N m); None if it has none."""
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 
 
 def all_finite(values: Vector) -> bool:
-    """Whether no value is NaN or infinite."""
+    """Return whether no value is NaN or infinite."""
     return all(map(is_finite, values))
 
 
 class Record:
-    """The rows of a run as they come, and the trajectory that they make."""
+    """The rows of a run, collected step by step, from which a trajectory is made."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Start with no rows; every step evaluates as many right-hand sides."""
+        """Start with no rows; each step evaluates `evaluations_per_step` right-hand sides."""
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
         self._rows: list[list[float]] = []
@@ -75,7 +78,10 @@ class Record:
     def trajectory(
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
-        """Return what was run; an overflow's own step is evaluated but leaves no row."""
+        """Return the trajectory of all rows.
+
+        A step that overflows counts among the evaluations, but has no row.
+        """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)
         steps = len(self._rows)

@@ -1,4 +1,4 @@
-"""A program in a word: its twin, on a scene whose numbers are those of the word."""
+"""Runs of a program's twin in a word, which is a floating-point format of `word.py`."""
 
 import copy
 import importlib
@@ -17,9 +17,10 @@ Of = TypeVar("Of", Scene, TorqueLaw)
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run a program in a word: what `run_program` takes, but for the checks.
+    """Run the twin of a listing's program in a word; the parameters are those of `run_program`.
 
-    The trajectory has the nearest floats, and in `exact` the numbers of the word themselves.
+    The arguments are not checked. The trajectory has the nearest floats, and in `exact` the numbers
+    of the word themselves.
     """
     twin = importlib.import_module(f"pyharness.original.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -29,7 +30,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a scene that was checked with its numbers, all but counts, in a word."""
+    """Return a checked scene with all its numbers, except counts, converted to a word."""
     law = scene.torque
 
     def those(values: Any) -> Any:
@@ -51,7 +52,7 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 
 
 def _with(frozen: Of, **fields: Any) -> Of:
-    """Return a copy with other fields, which its own checks would turn into floats."""
+    """Return a copy with other fields, without the checks, which would convert them to floats."""
     changed = copy.copy(frozen)
     vars(changed).update(fields)
     return changed

@@ -1,6 +1,6 @@
-"""Numbers of the words of IEEE 754 as the bytes of its interchange formats, and back.
+"""Conversions of numbers of a word of IEEE 754 to bytes of its interchange format, and back.
 
-As this machine orders bytes: what the compiled programs take and give.
+The bytes are in this machine's order, as the compiled programs take and return them.
 """
 
 import math
@@ -18,20 +18,20 @@ _BITS = {24: 32, 53: 64, 113: 128}
 
 
 def n_bytes(word: Word) -> int:
-    """Return the bytes of a number of a word, one of IEEE 754 with nearest-even."""
+    """Return the number of bytes of a number; its word is binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
-    """Return numbers of a word, by columns, as an array of shape (bytes of a number, *shape)."""
+    """Return numbers of a word as bytes, shape (n_bytes(word), *shape), in column-major order."""
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
-    # A copy: arrays that NumPy makes begin where any number may.
+    # A copy, because memory that NumPy allocates is aligned for any number.
     return np.array(np.frombuffer(written, np.int8).reshape((size, *shape), order="F"), order="F")
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the numbers of an array whose first axis is the bytes of a number."""
+    """Return the numbers of an array whose first axis runs over the bytes of a number."""
     size = n_bytes(word)
     written = given.tobytes(order="F")
     found = np.empty(len(written) // size, dtype=object)
@@ -42,12 +42,12 @@ def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
 
 
 def _pattern(x: Number) -> int:
-    """Return the sign, the biased exponent and the fraction as one whole number."""
+    """Return the sign, the biased exponent and the fraction of a number as one integer."""
     p = x.word.p
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:
         sign, coefficient = x.m < 0, abs(x.m)
-        # Gradual underflow, by its exponent 0, has the unit of exponent 1.
+        # A subnormal number has the exponent field 0, with the unit of the exponent field 1.
         field = x.e + places + (most >> 1) if coefficient >> places else 0
         fraction = coefficient & (1 << places) - 1
     else:

@@ -1,6 +1,6 @@
-"""Stands for LEQT1F of the IMSL library: A X = B for several right-hand sides.
+"""A replacement for LEQT1F of the IMSL library, which solves A X = B for several right-hand sides.
 
-LU factors in Crout's order with implicit row scaling and partial pivoting.
+It computes LU factors in Crout's order, with implicit row scaling and partial pivoting.
 """
 
 SINGULAR = 129
@@ -9,9 +9,10 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Return x of A x = b for every b, and IER; neither A nor any b is changed.
+    """Return the solution x of A x = b for every b, and IER; A and every b stay unchanged.
 
-    Where A is algorithmically singular each b comes back as it was, with `SINGULAR`; else 0.
+    If A is algorithmically singular, IER is `SINGULAR`, and every b is returned as it is. Otherwise
+    IER is 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
@@ -38,7 +39,7 @@ def _factor(a: list[list[float]]) -> list[int] | None:
                 total = total - row[k] * a[k][j]
             row[j] = total
 
-        # On and below the diagonal these are candidates for the pivot; the first maximum wins.
+        # Elements on and below the diagonal are candidates for the pivot; of equal ones the first.
         biggest = 0.0
         pivot = j
         for i in range(j, n):
@@ -59,7 +60,7 @@ def _factor(a: list[list[float]]) -> list[int] | None:
 
 
 def _substitute(a: list[list[float]], pivots: list[int], b: list[float]) -> list[float]:
-    """Forward through L, then backward through U."""
+    """Return the solution by forward substitution in L, then backward substitution in U."""
     n = len(a)
     x = list(b)
     for i, row in enumerate(a):

@@ -1,4 +1,4 @@
-"""The programs of the appendix for many bodies in one call, bit for bit as in single runs."""
+"""Runs of the appendix's programs for many bodies in one call."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -30,36 +30,38 @@ from pyharness.model.values import Number, boolean, integer, number_list
 from pyharness.original.compiled import stop_reads_velocity
 from pyharness.original.equations import card_torque
 
-_LEAST_WORK = 100_000  # steps of all its bodies, for which a thread is asked
-_PIECES = 8  # for each thread, as bodies may end early
+_LEAST_WORK = 100_000  # fewest steps, of all bodies of a piece, that are worth a thread
+_PIECES = 8  # pieces for each thread, because bodies may end early
 _NOT_REACHED = -1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProgramEnsemble(BatchResult):
-    """The rows that a program gave for n bodies; NaN, and -1 of `ier`, for rows not reached.
+    """The results of a program for n bodies, at m steps each.
+
+    A row that a body did not reach is NaN, and -1 in `ier`. `run_many` returns a ProgramEnsemble.
 
     Attributes
     ----------
     omega : ndarray, shape (n, m, 3)
         Angular velocity about the body axes, rad/s.
     status : ndarray of int8, shape (n,)
-        COMPLETE, STOPPED or OVERFLOW of pyharness/model/codes.py.
+        The code COMPLETE, STOPPED or OVERFLOW of `pyharness.model.codes.Statuses` for each body.
     at : ndarray of int, shape (m,)
-        The steps of these rows, from 1.
+        The steps of these rows, counted from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Velocity along the body axes, m/s.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
-        The TIME that was written to TAPE5, s. A single row for all bodies has NaN at a step that
-        no body reached.
+        The TIME that the program writes to TAPE5, s. A single row for all bodies has NaN at a step
+        that no body reached.
     n_rows : ndarray of int32, shape (n,)
         The number of steps with a result.
     stop_variable : ndarray of int8, shape (n,)
-        The variable that ended a run: 1-3 U1-U3, 4-6 V1-V3, 7 the norm of U, 8 the norm of U and
-        V; 0 if the stop test did not end it.
+        The variable by which the stop test ended a run: 1-3 for U1-U3, 4-6 for V1-V3, 7 for the
+        norm of U, 8 for the norm of U and V; 0 if the test did not end the run.
     stop_quotient : ndarray, shape (n,)
-        The change of K over the change of U (1/s) where the stop test ended a run: infinite if U
-        did not change, NaN if the test did not end the run.
+        The change of K over the change of U (1/s) if the stop test ended a run, infinite if U did
+        not change; NaN if the test did not end the run.
     ier : ndarray of int32, shape (n, m), or None
         IER as the collocation programs print it; None for the Runge-Kutta program.
     """
@@ -73,7 +75,7 @@ class ProgramEnsemble(BatchResult):
     ier: NDArray[np.int32] | None
 
 
-# As text: else its signature shows what NumPy makes of ArrayLike, 300 characters for each.
+# Annotations as text: otherwise the signature shows ArrayLike's definition, 300 characters each.
 def run_many(
     scene: Scene,
     listing: Listing,
@@ -90,7 +92,9 @@ def run_many(
     threads: SupportsIndex = 1,
     effort: Number = 1.0,
 ) -> ProgramEnsemble:
-    """Run a listing's compiled program for n bodies, each bit for bit as `run_program` does.
+    """Run a listing's compiled program for n bodies.
+
+    Each result is bit-for-bit identical to the result of `run_program`.
 
     Parameters
     ----------
@@ -99,8 +103,9 @@ def run_many(
     listing : Listing
         The program, its active defects and readings.
     omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
-        Values in place of the scene's: angular velocities (rad/s), moments (kg m2) or A, B, C, and
-        torques (N m). At most one of `moments` and `coefficients` may be given.
+        Values in place of the scene's: initial angular velocities (rad/s), moments (kg m2) or
+        coefficients A, B, C, and torques. Torques are in N m, or in 1/s2 for bodies specified by
+        coefficients. At most one of `moments` and `coefficients` may be specified.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
         Step sizes (s; by default the scene's) and constants of the stop test (1/s).
     may_stop : bool
@@ -108,25 +113,37 @@ def run_many(
     velocity : bool
         Whether to return the velocities.
     at : sequence of int, optional
-        The steps whose rows to return, from 1, in any order; by default the last step.
+        The steps whose rows are returned, counted from 1, in any order; by default the last step.
     threads : int
-        The number of threads that share the bodies; no bit depends on it.
+        The number of threads among which the bodies are divided. The results do not depend on it.
     effort : float
-        Factor on the work limit: steps times waves of all bodies.
+        Factor on the work limit. The work is the number of bodies times steps, times one plus the
+        number of waves of the torque.
 
     Returns
     -------
     ProgramEnsemble
-        The results of n bodies. An array of one row is shared by all bodies; without any longer
-        array n is 1.
+        The results of n bodies. An array of one row applies to all bodies; if no array has more
+        rows, n is 1.
 
     Raises
     ------
     InputError
-        If `run_program` would refuse a body (the message names its row), or if the arrays differ
-        in their numbers of rows, or do not fit in memory.
+        If `run_program` would refuse a body; the message names its row. Also if the arrays differ
+        in their numbers of rows, if the results do not fit in memory, or if the work limit is
+        exceeded.
     NotBuiltError
         If the extension is not built.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pyharness import case_scene, run_many, subset
+    >>> starts = np.array([[0.0, 1.0, 10.0], [0.0, 2.0, 5.0]])
+    >>> found = run_many(case_scene(2), subset("runge-kutta", "corrected"), omega0=starts)
+    >>> np.round(found.omega[:, -1], 6) + 0.0
+    array([[-0.958924,  0.283662, 10.      ],
+           [ 1.196944, -1.602287,  5.      ]])
     """
     kind = only_one({"moments": moments, "coefficients": coefficients})
     checked_scene(scene, any_axes=bool(kind))
@@ -177,7 +194,7 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run what was checked."""
+    """Run the program with checked arguments."""
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
     body, omega, constant, first, step_size, lipschitz = (
@@ -186,10 +203,10 @@ def _run(
     )
     computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
     prints_ier = listing.program != "runge-kutta"
-    # The kernel takes one row at least.
+    # The kernel needs at least one row.
     at = np.unique(wanted) if wanted.size else np.full(1, scene.steps, dtype=np.int32)
     back = np.searchsorted(at, wanted)
-    # Body by body, as the kernel's columns are.
+    # The first axis is the body, so that the transposes are the kernel's column-major arrays.
     omega_rows = np.full((n, at.size, 3), np.nan)
     velocity_rows = np.full((n * velocity, at.size, 3), np.nan)
     times = np.full((1 if one_step_size else n, at.size), np.nan)
@@ -227,7 +244,7 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the bodies of each call: all at once, or whole blocks for threads to take."""
+    """Yield the bodies of each kernel call: all of them for one thread, else some whole blocks."""
     size = n
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
@@ -238,7 +255,7 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
 
 
 def _check_ends(step_size: Array, steps: int) -> None:
-    """Refuse step sizes whose last time is no number."""
+    """Raise InputError if a step size times the number of steps is not finite."""
     with np.errstate(over="ignore"):
         ends = np.isfinite(step_size * steps)
     if not ends.all():
@@ -249,7 +266,7 @@ def _check_ends(step_size: Array, steps: int) -> None:
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
-    """Return the numbers of the steps that are wanted."""
+    """Return the requested steps; raise InputError if one of them is out of range."""
     if at is None:
         return np.array([steps], dtype=np.int32)
     found = [integer("at", each) for each in number_list("at", at, "allowed: a list of steps")]

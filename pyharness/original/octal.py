@@ -1,8 +1,8 @@
-"""Words of the CDC in octal, and what its instructions make of two of them.
+"""CDC words in octal, and the results of CDC instructions on them.
 
-A word has 60 bits, a negative one all of them complemented: an exponent field of 12, of which 11
-are used, and a coefficient of 48. The exponent is the field less 2000 (octal), and one more where
-that is below zero.
+A word has 60 bits: an exponent field of 12, of which 11 are used, and a coefficient of 48. All bits
+of a negative word are complemented. The exponent is the field minus 2000 (octal), plus one if that
+difference is below zero.
 """
 
 import math
@@ -25,9 +25,9 @@ _INSTRUCTIONS = tuple(
 
 
 def from_octal(text: str) -> Pair:
-    """Return the number of a word; InputError for what is not 20 octal digits, or not normalised.
+    """Return the number that a word represents; all bits zero, or all one, represent zero.
 
-    Zero has all bits zero, or all one.
+    Raise InputError if the text is not 20 octal digits, or if the coefficient is not normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -47,7 +47,7 @@ def from_octal(text: str) -> Pair:
 
 
 def to_octal(number: Pair) -> str:
-    """Return the word of a number of 48 bits, in groups of four octal digits."""
+    """Return the word of a number with 48 bits, in groups of four octal digits."""
     m, e = number
     if m:
         return _written(m < 0, e, abs(m))
@@ -58,9 +58,10 @@ def to_octal(number: Pair) -> str:
 
 
 def operated(name: str, x: str, y: str) -> str:
-    """Return what an instruction makes of two words, all in octal.
+    """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
-    Sums without NX are not normalised. InputError for another name or no word.
+    A sum without NX is not normalised. Raise InputError if the instruction is unknown, or if `x` or
+    `y` is not a word.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

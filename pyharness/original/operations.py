@@ -1,8 +1,8 @@
-"""Floating-point operations of a step, counted on the cards themselves.
+"""Counts of the floating-point operations of a step, made on the cards themselves.
 
-A deck is read statement by statement, as the author wrote it, and run on numbers that count what is
-done with them; LEQT1F is our own, for its source is not published. `T**2` is one multiplication,
-`T**3` and `T**4` are two. Subscripts and jumps cost nothing here, nor do ABS and WRITE.
+The statements of a deck are interpreted as the author wrote them, on numbers that count the
+operations applied to them. LEQT1F is our own, because its source is not published. `T**2` is one
+multiplication, `T**3` and `T**4` are two. Subscripts, jumps, ABS and WRITE are not counted.
 """
 
 import re
@@ -23,14 +23,14 @@ _TARGET = re.compile(r"(\w+?)(?:\(([\w,]+)\))?=(.*)")
 
 
 class Count(NamedTuple):
-    """Additions, multiplications and divisions of a step.
+    """The number of additions, multiplications and divisions of a step.
 
     Attributes
     ----------
     written : int
-        As the cards have them.
+        All operations that the cards perform.
     once : int
-        Where what was computed before in the same step is not computed again.
+        Distinct operations: one that repeats an earlier operation of the same step is not counted.
     """
 
     written: int
@@ -38,7 +38,7 @@ class Count(NamedTuple):
 
 
 class _Counter:
-    """How many operations were done, and which of them for the first time."""
+    """A counter of operations, which keeps the result of each distinct operation."""
 
     def __init__(self) -> None:
         self.written = 0
@@ -64,7 +64,7 @@ def _value(x: Any) -> float:
 
 
 class _Number:
-    """A value, known by who computed it."""
+    """A value that counts its operations; its object identity tells how it was computed."""
 
     def __init__(self, counter: _Counter, value: float) -> None:
         self.counter, self.value = counter, value
@@ -113,14 +113,14 @@ class _Number:
 
 
 class _Array(defaultdict[tuple[int, ...], Any]):
-    """Elements in parentheses, as FORTRAN has them."""
+    """An array whose elements are read with subscripts in parentheses, as in FORTRAN."""
 
     def __call__(self, *subscripts: int) -> Any:
         return self[subscripts]
 
 
 def operations_per_step(listing: Listing) -> Count:
-    """Return the operations of the first step of a program, the case of its deck."""
+    """Return the operation counts of a program's first step, in the case that its deck prints."""
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
     label = _DO.match(statements[begin][1])
@@ -138,7 +138,7 @@ def operations_per_step(listing: Listing) -> Count:
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return what was computed before the step as numbers that count there."""
+    """Return a value from before the step with its numbers attached to the step's counter."""
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)
@@ -146,7 +146,7 @@ def _moved(value: Any, counter: _Counter) -> Any:
 
 
 def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Give label and text, without blanks, of every statement of a deck."""
+    """Return the label and the text, without blanks, of every statement of a deck."""
     found: list[list[str]] = []
     for line in text.splitlines():
         label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())

@@ -1,8 +1,9 @@
-"""The printer page: a trajectory in, the lines of a line printer out.
+"""The line-printer output of a program, made from its trajectory.
 
-The page is what paper showed: the first character of each record, the carriage control, is
-taken off. It is always a blank (`data/printer.toml` has the FORMATs and what is conjecture).
-FORMATs are written by a library; FORTRAN 77 and a page of that time have two words of their own.
+The page is what appeared on paper, without the first character of each record, which is the
+carriage control. That character is always a blank (`data/printer.toml` has the FORMATs, and marks
+what is conjecture). A library writes the FORMATs. Two cases are treated here: zero, and values that
+are not finite.
 """
 
 import math
@@ -21,16 +22,17 @@ from pyharness.model.trajectory import Trajectory
 
 # Zero has no minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
-# What is not finite does not fit: the machine printed R or I there, and asterisks say no less.
+# A value that is not finite is printed as one too wide for its field, by asterisks. The machine
+# printed R or I there, which says no more.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
 
 
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
-    """Return the page of a program, by its FORMATs, without blanks at the ends of lines.
+    """Return the page of a program, written by its FORMATs, without trailing blanks.
 
-    The scene's moments, which it must have, and torques are the header; then one line for each
-    row, that of a stop the last.
+    The header has the scene's torques and moments; the scene must have moments. One line for each
+    row follows. If the stop test ended the run, the last line is the row of that step.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -46,7 +48,7 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 
 
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
-    """Return omega and velocity; of another word the floats that are printed as its numbers are."""
+    """Return omega and velocity; for another word, as floats that print like its numbers."""
     if trajectory.exact is None:
         assert trajectory.velocity is not None
         return np.hstack([trajectory.omega, trajectory.velocity]).tolist()  # type: ignore[no-any-return]
@@ -55,7 +57,7 @@ def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
 
 
 def _to_places(x: Any, places: int) -> float:
-    """Return a number, of any word, to so many decimals; halves away from zero, as floats go."""
+    """Return a number of any word to `places` decimals, with ties away from zero as for floats."""
     if not is_finite(x):
         return math.nan
     value = Fraction(x) if isinstance(x, float) else x.fraction()
@@ -67,7 +69,7 @@ def _to_places(x: Any, places: int) -> float:
 
 
 def formats_of(program: str) -> dict[str, Any]:
-    """Return the FORMATs of a program, with what is certain about them."""
+    """Return the FORMATs of a program, with notes on what in them is certain or conjecture."""
     formats: dict[str, dict[str, Any]] = {
         each["name"]: each for each in facts("printer")["program"]
     }
@@ -75,14 +77,14 @@ def formats_of(program: str) -> dict[str, Any]:
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
-    """Return the torques that the cards of the deck set: a law of time stands on none."""
+    """Return the torques on the cards of the deck; no card has a torque that varies with time."""
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.torque.constant)
     return first, second, third
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
-    """Return the records of one WRITE by a FORMAT, the carriage control included."""
+    """Return the records of one WRITE with a FORMAT, including the carriage control."""
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
     return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
 

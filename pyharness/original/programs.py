@@ -1,4 +1,4 @@
-"""The programs of the appendix, compiled or as twins, by name."""
+"""The programs of the appendix by name, to be run compiled or as Python twins."""
 
 import importlib
 from dataclasses import dataclass
@@ -20,7 +20,10 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 @dataclass(frozen=True)
 class Program:
-    """A program of the appendix; its corrected error falls with `order` of the step."""
+    """A program from the appendix.
+
+    After correction its global error is O(h**order), where h is the step size.
+    """
 
     name: str
     order: int
@@ -37,7 +40,10 @@ class Program:
         effort: float = 1.0,
         word: str = BINARY64,
     ) -> Trajectory:
-        """Run the program: what `run_program` takes and raises, for its own listings alone."""
+        """Run a listing of this program, with the parameters and errors of `run_program`.
+
+        Raise InputError if the listing belongs to another program.
+        """
         checked_scene(scene)
         checked_listing(listing)
         lipschitz = number("lipschitz", lipschitz)
@@ -60,7 +66,10 @@ class Program:
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Compute what was checked; the options are those of `run`, but for the effort."""
+        """Run the program in binary64 with checked arguments.
+
+        `options` are `lipschitz`, `may_stop` and `velocity`, as in `run`.
+        """
         if implementation == "fortran":
             return compiled.run(scene, listing, *options)
         lipschitz, may_stop, _ = options
@@ -70,14 +79,18 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return what `check_steps` calls the way that a program is run in."""
+    """Return the key of the work limit in `check_steps` for a word and an implementation."""
     if word == BINARY64:
         return implementation
     return "another word" if implementation == "python" else word
 
 
 def checked_word(word: object, implementation: str) -> str:
-    """Return the name of a word; InputError for an unknown one, or one that Fortran has not."""
+    """Return the name of a word.
+
+    Raise InputError if the word is unknown, or if the compiled programs do not support it and the
+    implementation is Fortran.
+    """
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
     if word not in COMPILED_WORDS and implementation == "fortran":
@@ -106,36 +119,50 @@ def run_program(
     effort: float = 1.0,
     word: str = BINARY64,
 ) -> Trajectory:
-    """Run the program of a listing.
+    """Run the program of a listing on a scene.
 
     Parameters
     ----------
     scene : Scene
-        What to integrate.
+        The body, the initial condition, the torque and the steps.
     listing : Listing
         The program, its active defects and readings.
     implementation : {"fortran", "python"}
-        The compiled program or its twin; both give the same bits.
+        The compiled program or its Python port, the twin. Their results are bit-for-bit identical.
     lipschitz : float
         Constant of the stop test (1/s), which only the Runge-Kutta program has.
     may_stop : bool
         Whether the stop test may end the run.
     velocity : bool
-        Whether the velocity is wanted; the compiled program then computes it only if its
-        stop test needs it. No other bit depends on this.
+        Whether the velocity is needed. If False, the compiled program computes the velocity only if
+        the stop test reads it, and does not return it. No other result depends on this.
     effort : float
-        Factor on the steps, times waves, that are run without being asked for.
+        Factor on the work limit, which counts the steps and, for each step, the waves of the
+        torque.
     word : str
-        The arithmetic, one of `WORD_NAMES`; those not in `COMPILED_WORDS` with
-        `implementation="python"` alone.
+        The arithmetic, one of `pyharness.original.programs.WORD_NAMES`. Those that are not in
+        `COMPILED_WORDS` need `implementation="python"`.
+
+    Returns
+    -------
+    Trajectory
+        One row for each step, up to a stop or an overflow. In a word other than binary64, `exact`
+        has the numbers of the word.
 
     Raises
     ------
     InputError
-        For what is no scene or listing, an unknown implementation or word, a word that the
-        compiled programs have not, or more steps than `effort` allows.
+        If `scene` or `listing` is of another type, the implementation or the word is unknown, the
+        compiled programs do not support the word, or the run exceeds the work limit.
     NotBuiltError
-        Where the compiled program is asked for and not built.
+        If the compiled program is requested and the extension is not built.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, run_program, subset
+    >>> run = run_program(case_scene(2), subset("runge-kutta", "original"))
+    >>> run.ended, run.stop.step, run.stop.variable
+    ('stopped', 25, 'V2')
     """
     program = PROGRAM_REGISTRY[checked_listing(listing).program]
     options = lipschitz, may_stop, velocity, effort, word

@@ -1,12 +1,12 @@
-"""Rules of rounding: what a sum, a product and a quotient of two numbers become in a word.
+"""Rounding rules: the sum, the product and the quotient of two numbers of a word.
 
-A number is a pair (m, e) of whole numbers, m 2**e; m has p bits, but below the least exponent of a
-word with gradual underflow. Where m is 0, e is the float that the pair stands for: 0.0, -0.0, inf,
--inf or nan; `Operation` gets none of these, and may give them.
+A number is a pair (m, e) of integers with the value m 2**e. m has p bits, or fewer for a subnormal
+number. If m is 0, e is the float that the pair represents: 0.0, -0.0, inf, -inf or nan. An
+`Operation` takes none of these, but may return them.
 
-No library of soft floats has these rules together: mpmath and gmpy2 round correctly and have no
-exponent range of their own, SoftFloat and numpy have the formats of IEEE 754 alone, and none has
-the CDC's (`cdc.py`).
+No library of software floating point has all these rules. mpmath and gmpy2 round correctly and have
+no exponent range of their own. SoftFloat and numpy have only the formats of IEEE 754. None has the
+CDC's (`cdc.py`).
 """
 
 import math
@@ -24,13 +24,13 @@ class Rules(NamedTuple):
     Attributes
     ----------
     nearest : Rounding
-        The nearest number of the word, of two the even one: functions, and literals.
+        Rounding to nearest, ties to even, of functions and literals.
     cut : Rounding
-        The next number towards zero: literals where those are cut.
+        Truncation towards zero, of literals in a word that truncates them.
     add, multiply, divide : Operation
-        Of two numbers; a difference is the sum with the negative.
+        Operations on two numbers; a difference is the sum with the negative.
     difference : Operation
-        The sum whose zero says that two numbers are equal.
+        The sum of a number and the negative of another; the two compare equal if it is zero.
     signed_zero : bool
         Whether there is -0.0.
     """
@@ -45,10 +45,11 @@ class Rules(NamedTuple):
 
 
 def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Rounding:
-    """Return what fits m 2**e of any length into p bits and the exponents `least` to `most`.
+    """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
-    `cut` towards zero, else to nearest even; what is too large is infinite. Too small: `gradual`
-    as IEEE 754 has it, else zero.
+    m may have any length. The function truncates towards zero if `cut`, else it rounds to nearest,
+    ties to even. A value too large becomes infinite. A value too small underflows gradually, as in
+    IEEE 754, if `gradual`, else it becomes zero.
     """
     shortened = _cut if cut else _to_even
 
@@ -86,9 +87,10 @@ def _to_even(m: int, shift: int) -> int:
 
 
 def ieee(p: int, largest: int, cut: bool) -> Rules:
-    """Return the rules of IEEE 754, p bits and numbers below 2**(largest + 1), or with `cut` sums.
+    """Return the rules of IEEE 754 for p bits and numbers below 2**(largest + 1).
 
-    A cut result too large is infinite, as on the machines that cut, where IEEE 754 has the largest.
+    If `cut`, sums, products and quotients are truncated towards zero. A truncated result too large
+    is then infinite, as on machines that truncated; in IEEE 754 it is the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
@@ -98,7 +100,7 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
             xm, xe, ym, ye = ym, ye, xm, xe
         apart = xe - ye
         if apart > p + 2:
-            # All of y is below an eighth of x's unit: any such number rounds the same.
+            # y is below an eighth of x's last unit: any such number of its sign rounds the same.
             return fit((xm << 3) + (1 if ym > 0 else -1), xe - 3)
         return fit((xm << apart) + ym, ye)
 

@@ -24,13 +24,13 @@ from pyharness.original.equations import (
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program; `lipschitz` in 1/s, without `may_stop` the test is passed over."""
+    """Run the program; `lipschitz` is in 1/s, and without `may_stop` the stop test is skipped."""
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]
-    # Stage i is evaluated, and stored, under the index that the program gives it: 1, 2, 3, 4.
+    # Each stage is evaluated and stored under the program's own index: 1, 2, 3, 4.
     zero = [0.0] * 6
     point = {1: base, 2: zero, 3: zero, 4: zero}
     slope = {1: zero, 2: zero, 3: zero, 4: zero}
@@ -101,7 +101,7 @@ def run(
 def lipschitz_test(
     listing: Listing, change_k: Vector, change_u: Vector, lipschitz: float
 ) -> tuple[str, float] | None:
-    """Return the variable that breaks the condition of eq. 19 and its quotient, or None."""
+    """Return the variable that violates the condition of eq. 19 and its quotient, or None."""
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3
     if listing.has("lipschitz-per-component"):

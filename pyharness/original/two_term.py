@@ -1,6 +1,6 @@
 """Two-term collocation: the first program of the appendix, Jacobs 1982, IV.2.
 
-Residual zero at one third and two thirds of the interval.
+The residual is zero at one third and two thirds of the interval.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from pyharness.original.equations import Vector, accelerations, omega_rate, velo
 def run(
     scene: Scene, listing: Listing, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the program; it has no stop test, so `lipschitz` and `may_stop` do nothing."""
+    """Run the program, which has no stop test: `lipschitz` and `may_stop` have no effect."""
     a, b, c = scene.euler_coefficients
     unset_c1 = 0.0
     acceleration = accelerations(scene, listing)

@@ -1,9 +1,9 @@
-"""Vectors: operations of the CDC with their results, word for word, and who computes them.
+"""Test vectors of the CDC's arithmetic: instructions, operands and results, and our own results.
 
-Those in `data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC
-60463560); a public emulator of its float unit gives the same. A file of that form is a table: its
-`schema`, and `vectors`, a list of tables: `name`, `op` (an instruction of `octal.operated`), `x`,
-`y` and `result`, in octal.
+The vectors in `data/words/cdc.json` follow from the rules of the CYBER 170 hardware reference (CDC
+60463560). A public emulator of its floating-point unit gives the same results. Such a file is a
+JSON object with `schema` and `vectors`, a list of objects. Each has `name`, `op` (an instruction of
+`octal.operated`), and `x`, `y` and `result` in octal.
 """
 
 import json
@@ -22,7 +22,7 @@ _FIELDS = ("name", "op", "x", "y", "result")
 
 
 class Vector(NamedTuple):
-    """An operation: its name, instruction, operands and result, words in octal."""
+    """A test vector: its name, an instruction, two operands and the result, as octal words."""
 
     name: str
     op: str
@@ -32,21 +32,21 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A vector, and what we compute."""
+    """A test vector, and the result that we compute."""
 
     vector: Vector
     found: str
 
     @property
     def agrees(self) -> bool:
-        """Whether the words are the same."""
+        """Return whether our result is the vector's, blanks apart."""
         return "".join(self.vector.result.split()) == "".join(self.found.split())
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return our answers to the vectors of a file.
+    """Return the test vectors of a file, each with the result that we compute.
 
-    InputError where it can't be read, is not of that form, or has no vector.
+    Raise InputError if the file can't be read, does not have the right form, or has no vectors.
     """
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:

@@ -1,8 +1,8 @@
-"""Words: numbers of p bits with a rule of rounding, in which the twins run as in floats.
+"""Words: floating-point formats of p bits with a rounding rule, in which the twins can run.
 
-A number of a word behaves as a float does: operators, comparison, `abs`, `float`. Beside another
-number of its word it takes whole numbers and floats, which stand for the literals of a source: the
-shortest decimal that is that float, rounded to the nearest number of the word.
+A number of a word behaves like a float: it has operators, comparisons, `abs` and `float`. The other
+operand may be a number of the same word, an integer or a float. A float represents a literal of a
+source: the shortest decimal that is that float, rounded to the nearest number of the word.
 """
 
 import math
@@ -16,14 +16,14 @@ from pyharness.original.cdc import cdc
 from pyharness.original.rounding import Pair, Rules, ieee
 
 RULES = ("nearest-even", "chop", "FX", "RX")
-# More than a word's own bits, of a sine before it is rounded to these.
+# Bits beyond the word's own, to which a sine or cosine is computed before it is rounded.
 _GUARD_BITS = 40
 
 
 class Number:
-    """A number m 2**e of a word, never changed; where m is 0, e is 0.0, -0.0, inf, -inf or nan.
+    """An immutable number m 2**e of a word; if m is 0, e is 0.0, -0.0, inf, -inf or nan.
 
-    Every word has a class of its own, made by `Word`.
+    `Word` makes a subclass for each word.
     """
 
     __slots__ = ("e", "m")
@@ -31,11 +31,11 @@ class Number:
     rules: ClassVar[Rules]
 
     def __init__(self, m: int, e: Any) -> None:
-        """Take what is a number of the word already."""
+        """Store m and e, which must be a number of the word already."""
         self.m, self.e = m, e
 
     def __add__(self, other: Any) -> "Number":
-        """Return the sum by the rule of the word."""
+        """Return the sum, rounded by the rule of the word."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -46,7 +46,7 @@ class Number:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Number":
-        """Return the difference: the sum with the negative."""
+        """Return the difference, which is the sum with the negative."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -55,11 +55,11 @@ class Number:
         return self._special(operator.add, -other)
 
     def __rsub__(self, other: Any) -> "Number":
-        """Return the difference from what is no number of the word yet."""
+        """Return `other` minus this number, where `other` is converted to the word first."""
         return self.word(other) - self
 
     def __mul__(self, other: Any) -> "Number":
-        """Return the product by the rule of the word."""
+        """Return the product, rounded by the rule of the word."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -70,7 +70,10 @@ class Number:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Number":
-        """Return the quotient by the rule of the word; by zero: infinite, or of zero nan."""
+        """Return the quotient, rounded by the rule of the word.
+
+        Division by zero gives infinity; zero by zero gives nan.
+        """
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -79,7 +82,7 @@ class Number:
         return self._special(_quotient, other)
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return the quotient of what is no number of the word yet."""
+        """Return `other` over this number, where `other` is converted to the word first."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
@@ -91,11 +94,14 @@ class Number:
         return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
 
     def __bool__(self) -> bool:
-        """Whether it is not zero."""
+        """Return whether the number is not zero."""
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
-        """Whether the difference is zero; the CDC's can be that of neighbours."""
+        """Return whether the difference is zero.
+
+        The difference of two neighbouring numbers of a CDC word can be zero.
+        """
         x, y = self, self.word(other)
         if x.m and y.m:
             m, e = self.rules.difference(x.m, x.e, -y.m, y.e)
@@ -105,23 +111,23 @@ class Number:
     __hash__ = None  # type: ignore[assignment]
 
     def __lt__(self, other: Any) -> bool:
-        """Whether the difference is below zero; its sign is exact, that of the CDC's too."""
+        """Return whether the exact difference is below zero, for a word of the CDC too."""
         return self._order(other) < 0
 
     def __gt__(self, other: Any) -> bool:
-        """Whether the difference is above zero."""
+        """Return whether the exact difference is above zero."""
         return self._order(other) > 0
 
     def __le__(self, other: Any) -> bool:
-        """Whether the difference is not above zero, nor nan."""
+        """Return whether the exact difference is zero or below; False for nan."""
         return self._order(other) <= 0
 
     def __ge__(self, other: Any) -> bool:
-        """Whether the difference is not below zero, nor nan."""
+        """Return whether the exact difference is zero or above; False for nan."""
         return self._order(other) >= 0
 
     def __float__(self) -> float:
-        """Return the nearest float; infinite beyond their range."""
+        """Return the nearest float, or infinity beyond the range of floats."""
         if not self.m:
             return float(self.e)
         try:
@@ -130,21 +136,21 @@ class Number:
             return math.copysign(math.inf, self.m)
 
     def __repr__(self) -> str:
-        """Return the word and the value."""
+        """Return the word and the value as text."""
         value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
         return f"{self.word}({value})"
 
     @property
     def is_finite(self) -> bool:
-        """Whether it is neither nan nor infinite."""
+        """Return whether the number is neither nan nor infinite."""
         return bool(self.m) or self.e == 0.0
 
     def fraction(self) -> Fraction:
-        """Return the exact value; of a finite number alone."""
+        """Return the exact value of a finite number."""
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
-        """Return the square root, correctly rounded to the nearest number of any word."""
+        """Return the square root, correctly rounded to nearest, whatever the word's rule."""
         if self.m <= 0:
             return self._plain(self.e if not self.m and not self.e < 0.0 else math.nan)
         shift = 2 * self.word.p + 4 + (self.e & 1)
@@ -153,11 +159,11 @@ class Number:
         return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
 
     def sin(self) -> "Number":
-        """Return the sine of an angle (rad), rounded to the nearest number of any word."""
+        """Return the sine of an angle (rad), rounded to nearest, whatever the word's rule."""
         return self._wave("mpf_sin")
 
     def cos(self) -> "Number":
-        """Return the cosine of an angle (rad), rounded to the nearest number of any word."""
+        """Return the cosine of an angle (rad), rounded to nearest, whatever the word's rule."""
         return self._wave("mpf_cos")
 
     def _wave(self, name: str) -> "Number":
@@ -172,7 +178,7 @@ class Number:
         return self.__class__(*self.rules.nearest(-int(m) if sign else int(m), e))
 
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
-        """Return what comes of zeros, infinities and nan, which floats have the same."""
+        """Return the result of an operation with a zero, infinity or nan, as floats have it."""
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
             return self if self.m else other  # a zero was added
@@ -183,13 +189,13 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """A float of the same sign, and zero, infinite or nan as the number is."""
+        """Return a float of the same sign that is zero, infinite or nan if the number is."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
     def _order(self, other: Any) -> float:
-        """Return a number below, at or above zero as the exact difference is; or nan."""
+        """Return a number with the sign of the exact difference, or nan."""
         x, y = self, self.word(other)
         if not (x.m and y.m):
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
@@ -204,17 +210,18 @@ def _quotient(x: float, y: float) -> float:
 
 
 class Word:
-    """An arithmetic: p bits, and one of `RULES`; the exponents of IEEE 754 up to `largest`.
+    """A floating-point format with its arithmetic: p bits, and a rounding rule of `RULES`.
 
-    `nearest-even` and `chop` (towards zero) have the exponents of binary64 up to 53 bits, of
-    binary128 beyond, or those given; `FX` and `RX`, the CDC's, those of its words. Called with a
-    float, a whole number, a fraction or the text of a decimal it returns the nearest `Number`, or
+    The exponents of `nearest-even` and `chop` (towards zero) are those of IEEE 754 up to `largest`.
+    By default they are those of binary64 for up to 53 bits, and those of binary128 beyond. The
+    exponents of the CDC's rules, `FX` and `RX`, are those of CDC words. A word is called with a
+    float, an integer, a fraction or the text of a decimal, and returns the nearest `Number`, or
     with `cut_literals` the next one towards zero.
 
     Raises
     ------
     InputError
-        For an unknown rule, or less than four bits.
+        If the rule is unknown, or if p is below 4.
     """
 
     def __init__(
@@ -224,7 +231,7 @@ class Word:
         largest: int | None = None,
         cut_literals: bool = False,
     ) -> None:
-        """Make the class of its numbers."""
+        """Make the class of the word's numbers."""
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)
         if p < 4:
@@ -242,11 +249,14 @@ class Word:
         self._literals: dict[float, Number] = {}
 
     def __repr__(self) -> str:
-        """Return the bits and the rule."""
+        """Return the bits and the rule as text."""
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return the number of a value; TypeError for what is none, or of another word."""
+        """Return a value as a number of the word.
+
+        Raise TypeError if the value is of another type, or a number of another word.
+        """
         if isinstance(value, Number) and value.word is self:
             return value
         if isinstance(value, float):

@@ -1,7 +1,7 @@
-"""Random scenes by their torque against the motion: what no method was tuned on.
+"""Random scenes by kind of torque relative to the motion, on which no method was tuned.
 
-The torque is measured against the motion, so that each kind stays what it is in a slow body and in
-a fast one.
+Torques and frequencies are relative to the initial angular velocity, so that each kind has the same
+character in a slow body and in a fast one.
 """
 
 import math
@@ -13,9 +13,9 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple
 MOST_TURNS = 300.0
 WAVES = {"one wave": 1, "three waves": 3, "ten waves": 10}
 LAWS = ("no torque", "constant torque", "ramp", *WAVES)
-# Frequencies over the body's speed at the start.
+# Ranges of the frequencies relative to the initial |omega|.
 SPEEDS = {"slow waves": (0.01, 0.1), "matched waves": (0.3, 3.0), "fast waves": (3.0, 10.0)}
-# Moments in any unit, from the generator's uniform numbers.
+# Moments in an arbitrary unit, from a random generator.
 BODIES: dict[str, Callable[[Random], list[float]]] = {
     "compact": lambda source: [source.uniform(2.0, 3.0) for _ in range(3)],
     "flat": lambda source: _flat(source.uniform(1.0, 3.0), source.uniform(1.0, 3.0), source),
@@ -29,9 +29,9 @@ BODIES: dict[str, Callable[[Random], list[float]]] = {
 
 
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
-    """Return a scene of a kind of `LAWS`, `SPEEDS` and `BODIES`, and a time (s).
+    """Return a random scene with a kind of `LAWS`, `SPEEDS` and `BODIES`, and a time (s).
 
-    In that time the body should turn 1 to 300 times. Only waves have a kind of speed.
+    In that time the body should make 1 to 300 revolutions. `speed` matters only for waves.
     """
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]
@@ -47,7 +47,8 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
 
     found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
     if law in ("constant torque", "ramp"):
-        # The torque alone would add `gain` times the start by the end; the turns follow its mean.
+        # By the end the torque alone would add `gain` times the initial |omega|. The number of
+        # revolutions follows from the mean.
         gain = _log(source, 0.1, 30.0)
         constant = law == "constant torque"
         horizon /= 1.0 + gain / (2.0 if constant else 3.0)
@@ -56,7 +57,7 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
     elif law in WAVES:
         waves = []
         for _ in range(WAVES[law]):
-            # A part of the start is what each swings by, alone.
+            # Each wave alone would make omega oscillate by a fraction of its initial value.
             frequency = start * _log(source, *SPEEDS[speed])
             waves.append((torque(frequency * start * _log(source, 0.01, 1.0)), frequency))
         sines = source.randint(0, len(waves))

@@ -1,6 +1,7 @@
-"""Extreme scenes without torque, and their images: tables by suite, each of name, scene and time.
+"""Extreme scenes by suite, each with a name and a time.
 
-Near the separatrix, near symmetry, bodies of extreme shape, and other units of time.
+The suites contain motions near the separatrix, bodies near symmetry, bodies of extreme shape, a
+motion in other units of time, and bodies with an attitude. Only Case 6 has a torque.
 """
 
 import math
@@ -15,7 +16,7 @@ from pyharness.scenes.rescaled import scaled
 
 
 class Circumstance(NamedTuple):
-    """A scene that is tried until a time (s)."""
+    """A named scene, and the time (s) until which methods are tested on it."""
 
     name: str
     scene: Scene
@@ -23,12 +24,16 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return the largest coefficient times the largest omega (1/s)."""
+    """Return a rate (1/s): the largest of |A|, |B|, |C| times `largest`, the largest omega."""
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene with equal steps until `time` (s), each of .002 radians if not too many."""
+    """Return the scene with equal steps until `time` (s).
+
+    A step is .002 radians at the rate of `speed`, unless that takes fewer than 10 or more than
+    20 000 steps.
+    """
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
     return replace(scene, step_size=abs(time) / count, steps=count)
@@ -38,16 +43,16 @@ def _stepped(name: str, scene: Scene, time: float) -> Circumstance:
     return Circumstance(name, in_steps(scene, time), time)
 
 
-# Separatrix. A = C = 1/2 are exact in binary64: a disturbance that is the same about axes 1 and 3
-# is on the separatrix, and the body turns over once and never again.
+# Separatrix. A = C = 1/2 are exact in binary64. A perturbation that is the same about axes 1 and 3
+# is therefore on the separatrix, where the body flips once and never again.
 MIDDLE_AXIS = (6.0, 5.0, 2.0)
 _A, _B = 0.5, 0.8
 _FLIPS = 5
 
 
 def quarter(disturbance: float) -> float:
-    """Return the time from a start (d, 1, 0) until axis 2 has no part in the spin (s)."""
-    # K(k) over the frequency, by the arithmetic-geometric mean.
+    """Return the time (s) until omega2 first vanishes, from omega = (`disturbance`, 1, 0)."""
+    # The quarter period, K(k) over the frequency, by the arithmetic-geometric mean.
     mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
     while mean - other > 1e-9 * mean:
         mean, other = 0.5 * (mean + other), math.sqrt(mean * other)
@@ -55,11 +60,11 @@ def quarter(disturbance: float) -> float:
 
 
 def _separatrix() -> Iterator[Circumstance]:
-    """Return spins about the middle axis, disturbed by ever less."""
+    """Yield rotations about the middle axis with smaller and smaller perturbations."""
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
         flip = quarter(d)
-        # To the middle of a turn, where the motion is the fastest and errors are the largest.
+        # The times end in the middle of a flip, where the motion is fastest and errors are largest.
         for name, omega, time in (
             ("early", beside, min(14.0, 0.75 * flip)),
             ("flip", beside, flip),
@@ -70,14 +75,14 @@ def _separatrix() -> Iterator[Circumstance]:
             yield _stepped(f"{name}-{d:.0e}", scene, time)
 
 
-# 1 - 1e-16 is the number next to 1; below 1 they are twice as close as above.
+# In binary64, 1 - 1e-16 is the number next to 1: numbers just below 1 are twice as dense as above.
 _DIFFERENCES = (*(10.0**-k for k in range(1, 17)), 0.0)
 SYMMETRIC_START = (0.3, 0.9, -0.7)
 _SHORT, LONG = 20.0, 1e6  # s
 
 
 def _near_symmetry() -> Iterator[Circumstance]:
-    """Return bodies with two equal moments, three, and nearly so."""
+    """Yield bodies with two or three equal or nearly equal moments."""
     for difference in _DIFFERENCES:
         near = 1.0 - difference
         size = f"{difference:.0e}" if difference else "equal"
@@ -85,7 +90,8 @@ def _near_symmetry() -> Iterator[Circumstance]:
             ("small-pair", (1.5, 1.0, near), _SHORT),
             ("large-pair", (1.0, near, 0.6), _SHORT),
             ("large-pair-long", (1.0, near, 0.6), LONG),
-            # It turns the slower, the nearer it is to a sphere: the same angle in all.
+            # The nearer the body is to a sphere, the slower omega changes. The time is such that
+            # the angle is the same in all scenes.
             ("sphere", (1.0, near, 1.0 - 2.0 * difference), _SHORT / (difference or 1.0)),
         ):
             scene = Scene(f"near symmetry, {name}, {size}", SYMMETRIC_START, moments=moments)
@@ -94,11 +100,11 @@ def _near_symmetry() -> Iterator[Circumstance]:
 
 _SHAPED = (0.3, 1.0, -0.6)
 _RADIANS = 20.0
-# Every moment about every axis, and both senses of the order.
+# With these orders every moment is about every axis, in both cyclic senses.
 _ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
 _NEEDLE, _PLATE = (1.0, 1.0 - 2.0**-41, 1e-12), (5.0, 3.0, 2.0)
 _BODIES: dict[str, Triple] = {
-    # In the ratio 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, and as far from symmetry as a body may be.
+    # In the ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12, also as far from symmetry as a body may be.
     "needle": (1.0, 1.0, 1e-12),
     "uneven-needle": _NEEDLE,
     "coin": (1.0, 1e12, 1e12),
@@ -116,18 +122,18 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Return needles, coins, flat plates, and moments that no body has."""
+    """Yield needles, coins, flat plates, and moments that no body can have."""
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)
             order = "".join(str(axis + 1) for axis in axes)
             scene = Scene(f"{name} {order}", _SHAPED, moments=(first, second, third))
             a, b, c = map(math.sqrt, map(abs, scene.euler_coefficients))
-            # The fastest of the small motions about the three axes (rad/s).
+            # The rates of small motions about the three axes (rad/s); the fastest sets the time.
             rates = zip((b * c, c * a, a * b), scene.omega, strict=True)
             time = _RADIANS / max(w * abs(own) for w, own in rates)
             yield _stepped(f"{name}-{order}", scene, time)
-    # With its torques, which no closed form takes.
+    # Case 6 has torques, for which there is no closed form.
     yield Circumstance("case-6", case_scene(6), 1.0)
 
 
@@ -138,7 +144,7 @@ TWOS = (-996, -500, -100, 100, 498, 996)
 
 
 def _scales() -> Iterator[Circumstance]:
-    """Return one motion at angular velocities from 1e-300 to 1e300 rad/s."""
+    """Yield one motion at angular velocities from 1e-300 to 1e300 rad/s."""
     scene = in_steps(ORDINARY, ORDINARY_TIME)
     named = [(f"1e{power}", float(f"1e{power}")) for power in _TENS]
     named += [(f"2^{power}", math.ldexp(1.0, power)) for power in TWOS]
@@ -150,7 +156,7 @@ POINTED: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
 
 
 def _attitude() -> Iterator[Circumstance]:
-    """Return bodies with an attitude: near the separatrix, near symmetry, of extreme shape."""
+    """Yield bodies with an attitude: near the separatrix, near symmetry, or of extreme shape."""
     for name, scene, time in _separatrix():
         yield Circumstance(f"separatrix-{name}", replace(scene, attitude=POINTED), time)
     bodies: list[tuple[str, str, Triple, Triple]] = []
@@ -179,4 +185,4 @@ EXTREMES: dict[str, Callable[[], Iterator[Circumstance]]] = {
     "scales": _scales,
     "attitude": _attitude,
 }
-"""The extreme scenes of each trial."""
+"""The extreme scenes by suite."""

@@ -1,4 +1,4 @@
-"""Random scenes by kind: makers that turn a generator into a scene, each with a name."""
+"""Random scenes by kind: named functions that return a scene from a random generator."""
 
 import math
 from collections.abc import Callable
@@ -11,13 +11,13 @@ from pyharness.scenes.rotated import rotated
 
 
 def _body(source: Random) -> list[float]:
-    """Return moments that a body can have, in rising order."""
+    """Return moments that a body can have, in ascending order."""
     low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
     return [low, middle, source.uniform(middle, low + middle)]
 
 
 def _plain(source: Random) -> Scene:
-    """Return a body that exists, turning at a few radians a second."""
+    """Return a body that can exist, which rotates at a few radians per second."""
     moments = _body(source)
     source.shuffle(moments)
     return _scene(source, _vector(source, 5.0), _triple(moments))
@@ -40,7 +40,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return a spin about the middle axis, and a little about every axis."""
+    """Return omega: `spin` about the middle axis, plus a random perturbation of size `faint`."""
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -53,7 +53,7 @@ def _violent(source: Random) -> Scene:
 
 
 def _from_rest(source: Random) -> Scene:
-    """Return a body at rest under torque of any kind, about one axis or about all."""
+    """Return a body at rest under a random torque about one axis or about all three."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
     axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
@@ -66,7 +66,10 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Return waves that turn by as little as 1e-14 radians, half of them from rest."""
+    """Return a body under waves whose phase may change by only 1e-14 rad.
+
+    In half of the scenes the body starts at rest.
+    """
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
     law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))
@@ -75,7 +78,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return up to six waves from 1e-6 to 600 rad/s beside each other."""
+    """Return a body under two to six waves together, of frequencies from 1e-6 to 600 rad/s."""
     scene = _plain(source)
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -84,7 +87,7 @@ def _many_speeds(source: Random) -> Scene:
         some[source.randrange(2)].append(_wave(source, amplitude, frequency))
     sines, cosines = some
     if source.random() < 0.2:
-        # One frequency in a sine and in a cosine, which methods may take together.
+        # The same frequencies in sines and cosines, which methods may combine.
         cosines = sines
     start = source.choice((0.0, 0.01, 1.0))
     law = TorqueLaw(sines=sines, cosines=cosines)
@@ -96,7 +99,7 @@ def _far_scale(source: Random) -> Scene:
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
-        # The rate of a torque goes with the cube.
+        # The rate of a torque scales with the cube, and would overflow or underflow.
         scene = replace(_plain(source), torque=TorqueLaw())
     found = scaled(scene, 2.0**exponent)
     mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
@@ -104,7 +107,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a spin beside the middle axis that multiplies a difference up to 1e6 times."""
+    """Return a rotation near the middle axis that amplifies a perturbation up to 1e6 times."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
@@ -128,12 +131,12 @@ def _long(source: Random) -> Scene:
 
 
 def _no_body(source: Random) -> Scene:
-    """Return coefficients of any sign, which no body has."""
+    """Return a scene with coefficients of any sign, which no body can have."""
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
 def _extreme(source: Random) -> Scene:
-    """Return numbers from one end of binary64 to the other, which mostly overflow."""
+    """Return a scene with numbers from the whole range of binary64; most such scenes overflow."""
 
     def any_size() -> float:
         if source.random() < 0.1:
@@ -148,13 +151,13 @@ def _extreme(source: Random) -> Scene:
 
 
 def _unsorted_body(source: Random) -> Triple:
-    """Return moments that a body can have, in no order."""
+    """Return moments that a body can have, not sorted."""
     low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
     return source.uniform(abs(low - middle), low + middle), low, middle
 
 
 def _pointing(source: Random) -> Scene:
-    """Return a body without torque that starts at any attitude."""
+    """Return a body without torque, with a random initial attitude."""
     moments, omega = _unsorted_body(source), _vector(source, 3.0)
     w, x, y, z = (source.gauss(0, 1) for _ in range(4))
     return Scene("", omega, moments=moments, attitude=(w, x, y, z))
@@ -181,14 +184,17 @@ NASTY: dict[str, Callable[[Random], Scene]] = {
     "coefficients": _no_body,
     "extreme": _extreme,
 }
-"""Scenes in which numerical methods have trouble, each in its way."""
+"""Kinds of random scenes that are difficult for numerical methods, by name."""
 
 KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
-"""Every kind of random scene by name."""
+"""All kinds of random scenes, by name."""
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a torque of about `size`: 1 constant, 2 rate, 4 a sine, 8 a cosine, or a sum."""
+    """Return a random torque law of magnitude about `size`.
+
+    `kinds` is a bit mask: 1 constant, 2 linear in time, 4 sine, 8 cosine.
+    """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
     sine, cosine = (_wave(source, size, 10.0 ** source.uniform(low, high)) for _ in range(2))
@@ -207,7 +213,7 @@ def _scene(
     coefficients: Triple | None = None,
     torque: bool = True,
 ) -> Scene:
-    """Return a scene with one of the kinds of torque that there are, or none."""
+    """Return a scene whose torque is zero, constant, linear in time, or a sine and a cosine."""
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
 
     def wave(most: float) -> list[Wave]:

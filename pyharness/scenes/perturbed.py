@@ -1,4 +1,4 @@
-"""A scene with one of its numbers perturbed."""
+"""Scenes that differ from a given scene in one perturbed number."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,7 +10,10 @@ from pyharness.model.scene import Scene, TorqueLaw, Triple
 
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
-    """Yield the scene with one of its numbers after the other larger by a part of itself."""
+    """Yield the scene once for each of its numbers, with this number multiplied by 1 + `part`.
+
+    Zeros in vectors are skipped.
+    """
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):
             yield _with(scene, name, triple)

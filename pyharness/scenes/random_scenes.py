@@ -1,4 +1,4 @@
-"""Random scenes, listings and steps that can be had again: a seed and a number say which."""
+"""Random scenes, listings and parameters, reproducible from a seed and a number."""
 
 import datetime
 from dataclasses import dataclass, replace
@@ -9,42 +9,42 @@ from pyharness.model.scene import Scene
 from pyharness.scenes.kinds import KINDS, NASTY
 
 COARSEST = 1e-3
-# Drawn last: a number of a seed stands for what it stood for before these had a flag.
+# These names got their flag later. They are drawn last, so that the draws of a seed did not change.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 
 
 @dataclass(frozen=True)
 class Draw:
-    """What one number of a seed stands for."""
+    """A random scene and listing with parameters, determined by a seed and a number."""
 
-    scene: Scene  # half of them nasty; its name says in what way
+    scene: Scene  # for odd numbers a difficult one, named by its kind in `NASTY`
     listing: Listing  # of any program, with any defects and readings
     lipschitz: float  # constant of the stop test (1/s)
     may_stop: bool
-    digits: float  # 0 for the coarsest tolerance of a method, 1 for its own finest
-    backward: bool  # whether a method is asked for negative times
+    digits: float  # 0 for the coarsest tolerance, 1 for the finest one of a method
+    backward: bool  # whether a method integrates to negative times
     stages: int  # of Gauss collocation
 
     @property
     def time(self) -> float:
-        """The last time that a method is asked for (s)."""
+        """The end time of the integration by a method (s)."""
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
-        """Return the tolerance for a method that claims to meet `finest`."""
+        """Return the tolerance for a method whose finest tolerance is `finest`."""
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week, as in 2026-W47: a seed that changes every Monday."""
+    """Return the week, as in 2026-W47, for use as a seed that changes every Monday."""
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return what `number` of `seed` stands for; the same with every version of Python."""
-    # A generator of its own for each number, so that one can be repeated without the others.
+    """Return the draw of `number` with `seed`, which is the same in every version of Python."""
+    # Each number has its own generator, so that one draw can be repeated without the others.
     source = Random(f"{seed}/{number}")
     scene = KINDS["plain"](source)
     if number % 2 == 1:
@@ -70,5 +70,5 @@ def draw(seed: str, number: int) -> Draw:
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the scene of a kind of `KINDS` that a seed stands for."""
+    """Return the random scene of a kind of `KINDS` that is determined by `seed`."""
     return replace(KINDS[kind](Random(seed)), name=name)

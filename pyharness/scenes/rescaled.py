@@ -1,8 +1,8 @@
-"""The same motion faster or slower: omega and time in other units.
+"""Rescaled time: scenes and trajectories with omega and time in other units.
 
-Products of omegas below 1e-154 underflow, and of those above 1e154 overflow, though the solution
-is an ordinary number. A method that forms them gets such a scene in units that bring it near 1, by
-a power of two, which changes no digit.
+Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s,
+although the solution itself is representable. A method that forms such products gets the scene in
+units in which omega is near 1. The factor is a power of two, so that no digit changes.
 """
 
 import math
@@ -15,19 +15,20 @@ import numpy as np
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Trajectory
 
-# Far enough from the ends that products of components of unlike size keep their digits.
+# Far enough from the ends of binary64 that products of components of different size keep their
+# digits.
 _LARGE = 2.0**300
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene with the solution factor omega(factor t): the same motion, faster.
+    """Return the scene with rescaled time, whose solution is factor * omega(factor * t).
 
-    A power of 2 as factor changes no digit of any quantity.
+    A factor that is a power of 2 changes no digit of any quantity.
     """
     law = scene.torque
 
     def times(values: Triple, power: int) -> Triple:
-        # One factor after the other: its square alone may be too large a number.
+        # The factor is applied repeatedly, because its square alone may overflow.
         for _ in range(power):
             first, second, third = values
             values = first * factor, second * factor, third * factor
@@ -48,33 +49,34 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def is_ordinary(scene: Scene) -> bool:
-    """Whether products of the first omega are far from the ends of binary64."""
+    """Return whether products of the initial omega are far from overflow and underflow."""
     return 1.0 / _LARGE <= max(map(abs, scene.omega)) <= _LARGE
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the power of 2 by which a scene is scaled; 1 for every ordinary one."""
+    """Return the power of 2 by which a scene should be scaled; 1 for every ordinary scene."""
     if is_ordinary(scene):
         return 1.0
-    # What the torque gives it counts like what it has.
+    # The omega that the torque may add counts like the initial omega.
     largest = max(max(map(abs, scene.omega)), omega_by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
-    # A step short of the ends of the exponents, where the factor itself would not be a number.
+    # Nearer to the ends of the exponent range the factor itself would overflow or underflow.
     exponent = max(-1000, min(1000, math.frexp(largest)[1]))
     factor = math.ldexp(1.0, -exponent)
     return factor if _fits(scene, time, factor) else 1.0
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound of the omega (rad/s) that torque alone gives a body at rest until `time` (s).
+    """Return a bound of omega (rad/s) up to `time` (s) for a body that the torque sets in motion.
 
-    Gyroscopic torques are left out. Infinity where the bound is beyond binary64.
+    The body is at rest at time 0, and gyroscopic torques are neglected. The bound is infinite if it
+    is beyond the range of binary64.
     """
     law, span = scene.torque, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:
-        # Any axis of the body may come to lie along the torque.
+        # Any axis of the body may come to be along the torque.
         moments = (min(moments),) * 3
     largest = 0.0
     for axis, moment in enumerate(moments):
@@ -91,7 +93,10 @@ def omega_by_torque(scene: Scene, time: float) -> float:
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:
-    """Whether times and torques are numbers of full length in the new units, or nothing at all."""
+    """Return whether times and torques do not overflow in the new units.
+
+    Nonzero times must not be subnormal either.
+    """
     law = scene.torque
     waves = law.sines + law.cosines
     sizes = [abs(x) * factor * factor for a in (law.constant, *(a for a, _ in waves)) for x in a]
@@ -104,7 +109,7 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return the trajectory of a scaled scene in the units of the scene."""
+    """Return the trajectory of a scaled scene in the units of the original scene."""
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

@@ -1,4 +1,4 @@
-"""The same problem from another side: axes turned, signs changed, begun later."""
+"""Equivalent scenes: with rotated axes or changed signs, or with a later start."""
 
 import math
 from collections.abc import Callable
@@ -11,9 +11,10 @@ from pyharness.model.trajectory import Array
 
 
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
-    """Return the scene with every vector of the body turned, the body too where it takes part.
+    """Return the scene with `turn` applied to every vector, and if `body` to the moments too.
 
-    A torque about the axes of space stays; the attitude is the caller's.
+    A torque about the axes of space is unchanged. The attitude is also unchanged, so that the
+    caller has to transform it.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -33,9 +34,9 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
 def restarted_at(
     scene: Scene, omega: Array, by: float, attitude: Quaternion | None = None
 ) -> Scene:
-    """Return the problem that begins at the time `by` (s) with `omega` and `attitude`.
+    """Return the scene whose time 0 is the time `by` (s), with `omega` and `attitude` at that time.
 
-    InputError where a torque about the axes of space takes an attitude and none is given.
+    Raise InputError if the torque is about the axes of space and `attitude` is None.
     """
     law = scene.torque
     if law.in_space and attitude is None:

@@ -1,1 +1,1 @@
-"""Reports as text, CSV, Markdown and JSON; pictures and their numbers. Nothing is computed."""
+"""Output formats of reports, and pictures with their numbers; nothing is computed here."""

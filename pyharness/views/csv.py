@@ -1,4 +1,4 @@
-"""The table of a report as CSV, its numbers in full."""
+"""The data of a report as CSV, with numbers in full."""
 
 import csv
 import io
@@ -7,13 +7,13 @@ from pyharness.model.report import Report, Table
 
 
 def write(report: Report) -> str:
-    """Return the data of a report."""
+    """Return the data of a report as CSV."""
     assert report.data is not None
     return csv_text(report.data)
 
 
 def csv_text(table: Table) -> str:
-    """Return the heads and the rows of a table."""
+    """Return the heads and the rows of a table as CSV."""
     buffer = io.StringIO()
     csv.writer(buffer, lineterminator="\n").writerows(table.in_full())
     return buffer.getvalue()

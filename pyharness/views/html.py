@@ -1,4 +1,4 @@
-"""Sections of a report as HTML, for pages that stand around them."""
+"""Sections of a report as HTML, for insertion into pages."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
@@ -7,19 +7,19 @@ from pyharness.model.report import Field, Line, Report, Section, Table
 
 
 def write(report: Report) -> str:
-    """Return the text of a report."""
+    """Return the text of a report as HTML."""
     return sections(report.text)
 
 
 def sections(text: Sequence[Section]) -> str:
-    """Return sections one after another; numbers as people read them."""
+    """Return sections as HTML, in their order, with numbers formatted for people."""
     return "\n".join(part for section in text if section for part in _parts(section))
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
-    """Return a table, which scrolls by itself where it is wider than the page.
+    """Return a table as HTML, in a block that scrolls if the table is wider than the page.
 
-    `links` are targets by the text of a cell.
+    `links` maps the text of a cell to the target of its link.
     """
     (head, *rows), columns = given.written(), given.columns
     lines = [
@@ -46,7 +46,7 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 
 
 def _parts(section: Section) -> Iterator[str]:
-    """Give a section: lines that are left as they are together, everything else by itself."""
+    """Yield the HTML of a section; successive lines, or successive fields, form one element."""
     lines: list[str] = []
     fields: list[str] = []
     for each in [*section, ""]:

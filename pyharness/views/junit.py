@@ -1,4 +1,4 @@
-"""The checks of a report as the XML that services for continuous integration read."""
+"""The checks of a report as JUnit XML, which services for continuous integration read."""
 
 from xml.etree import ElementTree as xml
 
@@ -6,7 +6,7 @@ from pyharness.model.report import Report
 
 
 def write(report: Report) -> str:
-    """Return a suite with a case for each check."""
+    """Return a JUnit test suite with a test case for each check."""
     suite = xml.Element(
         "testsuite",
         name=report.title,

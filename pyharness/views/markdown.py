@@ -1,11 +1,11 @@
-"""A report in Markdown: its page, or the table of its numbers in full."""
+"""A report in Markdown: its page, or its data with numbers in full."""
 
 from pyharness.model.report import Report, Section, Table
 from pyharness.views.table import paragraph
 
 
 def write(report: Report) -> str:
-    """Return the page of a report, or its data."""
+    """Return the page of a report, or its data if it has no page, as Markdown."""
     if report.page is not None:
         return "\n".join(map(_section, report.page))
     assert report.data is not None
@@ -16,7 +16,7 @@ def _section(section: Section) -> str:
     parts: list[str] = []
     for each in section:
         if isinstance(each, Table):
-            # Without a blank line before it, it would be none.
+            # Markdown recognises a table only after a blank line.
             parts += ["\n"] if parts else []
             parts.append(_table(each.written()))
         else:

@@ -1,4 +1,4 @@
-"""Saving a picture: the same bytes in every run, and its numbers beside it."""
+"""Files of a picture: an image with the same bytes in every run, and its numbers as CSV."""
 
 import io
 import textwrap
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg", "pdf")
-# Without a salt of its own and with a date, a file would have other bytes in every run.
+# Without a fixed salt, or with a date, a file would have different bytes in every run.
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 _DATES: dict[str, dict[Any, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-# Of a title in letters of size 10.
+# Of a title in font size 10.
 _LETTERS_PER_INCH = 12.5
 _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Refuse a picture that can't be made, before anything is computed for it."""
+    """Raise InputError if a picture can't be made, before anything is computed for it."""
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
     check_matplotlib("--plot")
 
 
 def check_matplotlib(what: str) -> None:
-    """Refuse to draw where matplotlib is missing."""
+    """Raise InputError if matplotlib is missing; `what` names the option or verb."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
@@ -39,12 +39,12 @@ def check_matplotlib(what: str) -> None:
 
 
 def numbers_beside(path: str) -> str:
-    """Return where the numbers of a picture go."""
+    """Return the path of the CSV file with the numbers of a picture."""
     return str(Path(path).with_suffix(".csv"))
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return content by path: the picture in the format of each suffix, and its numbers as CSV."""
+    """Return file contents by path: the picture in the format of each suffix, and a CSV file."""
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
     return content | {numbers_beside(paths[0]): csv_text(picture.numbers).encode()}
@@ -55,7 +55,7 @@ def _form(path: str) -> str:
 
 
 def _set_title(picture: Picture) -> None:
-    """Write the title in as many lines as the width takes."""
+    """Set the title of the figure, wrapped to the figure's width."""
     if not picture.title:
         return
     room = int(_LETTERS_PER_INCH * picture.figure.get_figwidth())
@@ -74,7 +74,7 @@ def _image(figure: "Figure", form: str) -> bytes:
 
     buffer = io.BytesIO()
     with matplotlib.rc_context(_REPRODUCIBLE), warnings.catch_warnings():
-        # A box stands for a letter that the font lacks, as everywhere.
+        # A letter that the font lacks is drawn as a box, as is usual.
         warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
         figure.savefig(buffer, format=form, dpi="figure", metadata=_DATES.get(form))
     return buffer.getvalue()

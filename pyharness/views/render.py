@@ -1,4 +1,4 @@
-"""A report in the form asked for: each form is a module of this room, named as in `--format`."""
+"""Choice of an output format: each format is a module of this package, named as in `--format`."""
 
 from importlib import import_module
 

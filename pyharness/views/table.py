@@ -5,13 +5,13 @@ import textwrap
 from pyharness.model.report import Field, Line, Report, Section, Table
 
 _WIDTH = 100
-_NARROWEST = 12  # that a last column is wrapped to
+_NARROWEST = 12  # least width to which a last column is wrapped
 _MOST_ROWS = 200
 _END_ROWS = 10
 
 
 def write(report: Report) -> str:
-    """Return the sections of a report with a blank line between them."""
+    """Return the sections of a report as text, with a blank line between them."""
     sections = ["\n".join(_lines(section)) for section in report.text if section]
     return "\n\n".join(sections) + "\n"
 
@@ -24,19 +24,19 @@ def _lines(section: Section) -> list[str]:
 
 
 def paragraph(told: str | Field) -> list[str]:
-    """Return the lines of a text of any length; never none."""
+    """Return the wrapped lines of a paragraph, at least one line."""
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Field):
         indent = " " * len(told.label)
         return textwrap.wrap(told.text, _WIDTH, initial_indent=told.label, subsequent_indent=indent)
-    # A name with a hyphen stays whole, for it is there to be typed.
+    # A name with a hyphen is not broken, because users type it.
     lines = textwrap.wrap(told, _WIDTH, subsequent_indent="  ", break_on_hyphens=False)
     return lines or [""]
 
 
 def _aligned(table: Table) -> list[str]:
-    """Return the lines of a table; those in the middle are left out where there are many."""
+    """Return the aligned lines of a table, without those in the middle if the table is long."""
     n = len(table.rows)
     if n > _MOST_ROWS:
         table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])

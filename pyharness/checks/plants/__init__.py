@@ -1,1 +1,1 @@
-"""Faults that are planted, so that each check is seen to fail."""
+"""Planted faults, which show that each check can fail."""

@@ -1,4 +1,4 @@
-"""Twins with one fault: a copy of their text in which one place is another."""
+"""Python twins with one fault: copies of their source in which one place is changed."""
 
 import importlib
 import itertools
@@ -20,7 +20,7 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program with a faulty twin, which also stands for the compiled program where `both`."""
+    """A program with a faulty twin; if `both`, the twin also replaces the compiled program."""
 
     module: ModuleType
     both: bool = True
@@ -28,7 +28,7 @@ class PlantedTwin(Program):
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the faulty twin, or the compiled program as it is."""
+        """Run the faulty twin, or the unchanged compiled program."""
         if self.both or implementation == "python":
             lipschitz, may_stop, _ = options
             found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
@@ -39,7 +39,7 @@ class PlantedTwin(Program):
 def plant_in_twin(
     program: str, file: str, old: str, new: str, folder: Path, both: bool = True
 ) -> PlantedTwin:
-    """Copy the twins into `folder`, replace `old` by `new` in one file, import the copy."""
+    """Copy the twins into `folder`, replace `old` by `new` in one file, and import the copy."""
     package = f"planted_{next(_COUNT)}"
     target = folder / package
     ignore = shutil.ignore_patterns("__pycache__")

@@ -1,7 +1,7 @@
-"""Plants: one fault at a time, put where it would be made, to see which check catches it.
+"""Planted faults: one fault at a time, planted to see which check detects it.
 
-A plant is made in the running process and gone when its context ends; the compiled programs are
-altered at their door, the twins in a copy of their text.
+A fault is planted in the running process and removed when its context ends. The compiled programs
+are altered at their entry point, the twins in a copy of their source.
 """
 
 import itertools
@@ -36,9 +36,10 @@ _BOTH = "pyharness.original.programs.Program.run"  # in either language
 
 @dataclass(frozen=True)
 class Plant:
-    """A fault: what is wrong, and where; what makes the context in which it is so.
+    """A fault with its name, its description, and the context manager that plants it.
 
-    `kinds` are kinds of checks that can see it, beside the golden record; the self-test runs these.
+    `kinds` are kinds of checks that can detect it, besides the golden record. The self-test runs
+    these.
     """
 
     name: str
@@ -48,13 +49,13 @@ class Plant:
 
 
 def instead(target: str, faulty: Callable[..., Any]) -> AbstractContextManager[Any]:
-    """Put ``faulty(right, ...)`` in the place of `right`, what the dotted name `target` means."""
+    """Replace `target`, a dotted name, by ``faulty(right, ...)``; `right` is the original."""
     right = pkgutil.resolve_name(target)
     return patch(target, lambda *rest, **named: faulty(right, *rest, **named))
 
 
 def changed(target: str, change: Callable[[Any], Any]) -> AbstractContextManager[Any]:
-    """Change what `target`, a dotted name, returns."""
+    """Apply `change` to the results of the function of the dotted name `target`."""
     return instead(target, lambda right, *rest, **named: change(right(*rest, **named)))
 
 
@@ -67,7 +68,7 @@ def _twin(program: str, file: str, old: str, new: str, both: bool) -> Iterator[N
 
 
 def _method(name: str, faulty: Callable[..., Trajectory]) -> AbstractContextManager[Any]:
-    """Put ``faulty(right, scene, times, ...)`` in the place of a method."""
+    """Replace the `solve` of a method by ``faulty(right, scene, times, ...)``."""
     known = METHODS[name]
     return patch.dict(METHODS, {name: replace(known, solve=partial(faulty, known.solve))})
 
@@ -101,7 +102,7 @@ def _half_step_label(run: Trajectory) -> Trajectory:
 
 
 def _stale() -> Callable[[Trajectory], Trajectory]:
-    """Return the result of the call before where it has as many rows."""
+    """Return a change that gives the previous trajectory if it has as many rows."""
     before: dict[int, Trajectory] = {}
 
     def change(run: Trajectory) -> Trajectory:
@@ -112,12 +113,13 @@ def _stale() -> Callable[[Trajectory], Trajectory]:
     return change
 
 
-# What the kernel of a prepared solver returns: omega, status, steps, error and growth.
+# Results of the kernel of a prepared solver: omega, status, steps, and an array of error and
+# growth.
 _Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextManager[Any]:
-    """Change what the kernel of a prepared solver returns, given what was packed for it."""
+    """Change the result of the kernel of a prepared solver; `change` also gets the packed input."""
     entry = extension.extension().solve_packed
     kernel = SimpleNamespace(
         solve_packed=lambda packed, *rest: change(packed, entry(packed, *rest))
@@ -126,7 +128,7 @@ def _prepared(change: Callable[[Array, _Answer], _Answer]) -> AbstractContextMan
 
 
 def _stale_solver() -> AbstractContextManager[Any]:
-    """Every second call of a prepared solver returns what the call before did."""
+    """Make every second call of a prepared solver return the result of the previous call."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -148,7 +150,7 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 
 def _too_large(packed: Array, answer: _Answer) -> _Answer:
-    """Let the results of the fixed-step methods and of Gauss collocation be too large."""
+    """Enlarge the results of the methods with a fixed step and of Gauss collocation by 1 %."""
     omega, status, steps, found = answer
     return (omega * 1.01 if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
 
@@ -158,7 +160,7 @@ def _half_step(scene: Scene) -> Scene:
 
 
 def _half_step_compiled(run: Callable[..., Trajectory], scene: Scene, *rest: Any) -> Trajectory:
-    """Take half a step; the labels stay."""
+    """Run with half the step size and return the times of whole steps."""
     found, labels = run(_half_step(scene), *rest), run(scene, *rest)
     if found.steps != labels.steps:
         return found
@@ -182,7 +184,7 @@ def _label_both(
 def _shifted(
     solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float], *rest: float
 ) -> Trajectory:
-    """Solve half a step later: energy and momentum are conserved as they should be."""
+    """Solve for times half a step later; energy and momentum are conserved nevertheless."""
     half = 0.5 * scene.step_size if times[-1] >= 0.0 else -0.5 * scene.step_size
     found = solve(scene, [t + half for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
@@ -190,7 +192,7 @@ def _shifted(
 
 
 def _wrong_card() -> AbstractContextManager[Any]:
-    """Let the compiled programs read one flag in place of its neighbour."""
+    """Exchange two flags that the compiled programs read, so that they correct other cards."""
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 

@@ -1,4 +1,4 @@
-"""Self-test of `verify`: one plant after another, which check catches which, and its report."""
+"""Self-test of `verify`: which checks detect each planted fault, and the report of it."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -13,21 +13,21 @@ from pyharness.checks.report import checks_report
 from pyharness.checks.selection import Selection
 from pyharness.model.report import Report
 
-# What is recorded can't tell a fault from a change that was meant.
+# The golden record can't distinguish a fault from an intended change.
 _NOT_ENOUGH = "golden"
 _DRAWS = 12
 
 
 @dataclass(frozen=True)
 class Caught:
-    """How a plant fared, or the control, without a fault.
+    """The checks that failed with a planted fault, or without any fault as the control.
 
     Attributes
     ----------
     failed : mapping of str to int
-        Failed checks by kind.
+        Number of failed checks by kind.
     example : str
-        The name of one check that failed, not of the record where there is another.
+        The name of one check that failed, not one of the golden record if there is another.
     """
 
     plant: Plant | None
@@ -36,17 +36,20 @@ class Caught:
 
     @property
     def passed(self) -> bool:
-        """Whether a check that is not the record caught it; of the control, whether none did."""
+        """Return whether a check besides the golden record detected the fault.
+
+        For the control, return whether no check failed.
+        """
         return bool(self.failed.keys() - {_NOT_ENOUGH}) if self.plant else not self.failed
 
     @property
     def counts(self) -> str:
-        """How many checks of each kind failed."""
+        """Return the number of failed checks of each kind, as text."""
         return ", ".join(f"{kind} {count}" for kind, count in self.failed.items())
 
 
 def self_test(seed: str, record: Path) -> Iterator[Caught]:
-    """Verify a part of everything without a fault, and with each plant the kinds that see it."""
+    """Run a part of every kind without a fault, and the kinds that can detect each fault."""
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     yield _caught(None, chosen)
     for plant in PLANTS:
@@ -66,7 +69,7 @@ def _caught(plant: Plant | None, chosen: Selection) -> Caught:
 
 
 def as_check(caught: Caught) -> Check:
-    """Return the finding as a check."""
+    """Return the result for a planted fault as a check."""
     name = Name("self-test", caught.plant.name if caught.plant else "none")
     value = float(caught.failed.total() - caught.failed[_NOT_ENOUGH])
     again = "python -m pyharness verify --self-test"
@@ -75,7 +78,7 @@ def as_check(caught: Caught) -> Check:
 
 
 def self_test_report(title: Sequence[str], found: Sequence[Caught], seed: str) -> Report:
-    """Report each fault, and how many checks of each kind caught it."""
+    """Report each fault, and how many checks of each kind detected it."""
     told = []
     for caught in found:
         plant = caught.plant or Plant("none", "no fault: nothing may fail", nullcontext, ())

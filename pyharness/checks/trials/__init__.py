@@ -1,1 +1,1 @@
-"""One module for each trial."""
+"""The trials of `stress`, one module for each."""

@@ -1,4 +1,4 @@
-"""Attitude without torque: separatrix, symmetry, a million revolutions, poles of the angles."""
+"""Trial of torque-free attitude: separatrix, symmetry, a million revolutions, poles of angles."""
 
 import math
 import random
@@ -42,11 +42,11 @@ from pyharness.theory.conditioning import ATTITUDE, ROUNDING, Conditioning, cond
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
-# A closed form does not need the flow of a million revolutions.
+# The closed form does not need the conditioning of a million revolutions.
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
-# An angle in degrees is rounded when it is formed, converted and read again, and three add up.
+# An angle in degrees is rounded when it is formed, converted and read again. Three angles add up.
 _ANGLES = 64.0 * ROUNDING
 _BODIES = 8
 
@@ -60,7 +60,7 @@ _MOTIONS = {
 
 @dataclass(frozen=True)
 class Turn:
-    """A problem turned as a whole, body or space, and its attitude turned back."""
+    """A rotation of a whole problem, in the body or in space, and the inverse for its attitude."""
 
     scene: Callable[[Scene], Scene]
     back: Callable[[Array], Array]
@@ -77,10 +77,10 @@ def _about_body(turn: Quaternion, vectors: Callable[[Triple], Triple], moments: 
 
 
 TURNS = {
-    # Axes 1, 2, 3 of the turned body are 2, 3, 1 of the body.
+    # Axes 1, 2, 3 of the rotated body are axes 2, 3, 1 of the original body.
     "cyclic": _about_body((0.5, 0.5, 0.5, 0.5), lambda v: (v[1], v[2], v[0]), True),
     "half-turn": _about_body((0.0, 1.0, 0.0, 0.0), lambda v: (v[0], -v[1], -v[2]), False),
-    # The axes of space are anybody's choice.
+    # The axes of space can be chosen at will.
     "space": Turn(
         lambda scene: replace(scene, attitude=product(POINTED, scene.attitude or POINTED)),
         lambda q: _from_left((POINTED[0], -POINTED[1], -POINTED[2], -POINTED[3]), q),
@@ -100,7 +100,7 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
 
 
 POLICY = Policy(_limit, refusable)
-"""The rounding of a closed form; else the tolerance, and rounding, amplified."""
+"""Policy that grants a closed form its rounding, others their tolerance and rounding, amplified."""
 
 
 def _truth(scene: Scene, time: float, flow: Callable[[], Conditioning]) -> Truth:
@@ -140,10 +140,10 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
-    """Judge a method's angle by the truth, and by the same limit what the motion conserves."""
+    """Judge a method's angle by the true solution; check quaternion norm and angular momentum."""
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
-    # Not the angle alone: signs are continuous.
+    # Quaternions are compared with their signs, since the sign is continuous in time.
     yield judge(name.of("angle"), tried, truth, POLICY)
     answer = tried.answer
     if answer.attitude is None:
@@ -151,14 +151,14 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
     yield name.of("length").bounded(off, 8.0 * ROUNDING)
     if name.subject in FORMS:
-        # An angle turns the angular momentum by no more than itself; moments multiply, and the
-        # turning takes two products.
+        # An error of the angle changes the angular momentum by at most that angle. The moments
+        # multiply omega, and the rotation takes two products.
         limit = ATTITUDE + _omega_limit(scene)
         yield name.of("momentum").bounded(_momentum_drift(scene, answer), limit)
 
 
 def _omega_limit(scene: Scene) -> float:
-    """Return what the error of omega, 16 roundings, makes of the angular momentum, relative."""
+    """Return the relative error of the angular momentum for an omega error of 16 roundings."""
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum)) or 1.0
     largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
@@ -174,10 +174,11 @@ def _momentum_drift(scene: Scene, found: Answer) -> float:
 
 
 def _montgomery(name: Name) -> Check:
-    """Hold the turn of one period about the angular momentum to the area that omega goes round.
+    """Check the rotation in one period about the angular momentum by Montgomery's formula.
 
-    It is 2 E T/L less the solid angle on the side of the axis that keeps its sign: no invariant,
-    and the only check that sees a wrong rate of the turn.
+    The angle is 2 E T/L less the solid angle that the angular momentum encloses in the body, on the
+    side of the axis on which it keeps its sign. The angle is no invariant. No other check detects a
+    wrong rate of this rotation.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -199,9 +200,9 @@ def _montgomery(name: Name) -> Check:
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
-    """Return the solid angle of the path of the angular momentum in the body.
+    """Return the solid angle enclosed by the path of the angular momentum in the body.
 
-    Trapezoids are as good as any rule for what is periodic and smooth; omega comes from the
+    For a smooth periodic function no rule is better than the trapezoidal rule. omega comes from the
     elliptic functions in decimals.
     """
     moments = np.array(scene.moments)
@@ -215,7 +216,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
         axes = [(third + 1) % 3, (third + 2) % 3, third]
         m, omega = m[:, axes], rows[:, axes]
         if m[0, 2] < 0.0:
-            # A half turn about the first axis.
+            # Rotate by half a turn about the first axis.
             m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
         rate = np.cross(m, omega)
         found = float(((m[:, 0] * rate[:, 1] - m[:, 1] * rate[:, 0]) / (1.0 + m[:, 2])).mean())
@@ -225,7 +226,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
 
 
 def _turned(turn: Turn, name: Name) -> Check:
-    """Hold the attitude of the turned problem, turned back, to that of the problem itself."""
+    """Compare the attitude of the rotated problem, rotated back, with the original attitude."""
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     plain, other = (
         solve(each, [time], method, tolerance, attitude=True).attitude
@@ -239,7 +240,7 @@ def _turned(turn: Turn, name: Name) -> Check:
 
 
 def _back(name: Name) -> Check:
-    """Hold a way forth and back to the start."""
+    """Check that integrating forward and back gives the initial attitude."""
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     there = solve(scene, [time], method, tolerance, attitude=True)
     assert there.attitude is not None
@@ -249,7 +250,7 @@ def _back(name: Name) -> Check:
     again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
     forth, back = conditioning(scene, time), conditioning(start, -time)
-    # The error of omega at the end of the first part turns the second.
+    # The error of omega at the end of the first part rotates the body in the second part.
     made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
     turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
     limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)
@@ -257,7 +258,7 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Hold angles beside a pole to what SciPy's matrices make of them."""
+    """Check Euler angles near a pole by converting them back with SciPy's rotations."""
     from scipy.spatial.transform import Rotation
 
     sequence = name.circumstance

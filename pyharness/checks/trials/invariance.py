@@ -1,7 +1,8 @@
-"""Invariance: what must come out the same, or turned, when the problem is turned.
+"""Trial of invariance: results must transform with a problem that is rotated or rescaled.
 
-Where the operations of a method are those of the turned problem in another order of axes, with
-other signs or other exponents, not a bit may differ; where they are not, the bound holds.
+Some methods perform the same operations on the changed problem, in another order of axes, with
+other signs or with other exponents. Their results must then be bit-for-bit identical. The other
+results must agree within the bound.
 """
 
 import random
@@ -50,10 +51,10 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A way to turn a problem: the scene, and the result back.
+    """A transformation of a problem: the changed scene, and the result transformed back.
 
-    The turned motion takes the time over `faster`. `bitwise` are the methods and programs whose
-    operations turn with it, so that no bit may differ.
+    The changed problem takes the time divided by `faster`. `bitwise` are the methods and programs
+    whose operations change in the same way, so that their results must be bit-for-bit identical.
     """
 
     turn: Callable[[Scene], Scene]
@@ -70,8 +71,8 @@ def _signs(first: float, second: float, third: float) -> Symmetry:
         lambda scene: rotated(scene, turn, body=False),
         1.0,
         lambda omega: omega * [first, second, third],
-        # Rounding to nearest knows no sign. Radau and LSODA difference their Jacobian in a
-        # direction of their own.
+        # Rounding to nearest does not depend on the sign. Radau and LSODA difference their Jacobian
+        # in a direction that does not change sign with the problem.
         (*OURS, *_PREPARED, "dop853", "rk45", *FIXED_STEP, *PROGRAMS),
     )
 
@@ -80,12 +81,14 @@ def _faster(factor: float, *bitwise: str) -> Symmetry:
     return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
 
 
-# Exponents alone change, and ours compare only what has the same unit. SciPy's first step is
-# not so, and the implicit row scaling of LEQT1F compares powers of the step.
+# Only exponents change, and our methods compare only quantities with the same unit. SciPy's choice
+# of the first step does not do so, and the implicit row scaling of LEQT1F compares powers of the
+# step.
 _POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
-    # Each axis does what the next does: products of the next two, in this order. The series of
-    # Taylor and the sums of the others add over the axes, or multiply them, in a fixed order.
+    # The methods listed treat each axis alike, by products of the next two axes in this order. The
+    # Taylor series and the sums of the other methods add or multiply over the axes in a fixed
+    # order.
     "cyclic": Symmetry(
         lambda scene: rotated(scene, lambda v: (v[1], v[2], v[0]), body=True),
         1.0,
@@ -134,12 +137,12 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
-    """Return omega at `time`; NaN where a prepared kernel did not get there."""
+    """Return omega at `time`; NaN if a prepared kernel did not get there."""
     return run_method(name, scene, time, tolerance).omega
 
 
 def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
-    """Hold the rotated problem against the problem itself."""
+    """Compare the changed problem with the original problem."""
     scene, method = scene_of(name), name.subject
     try:
         plain = end(scene, time, method, tolerance)
@@ -152,7 +155,7 @@ def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Ch
     difference = float(np.abs(plain - other).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference)
-    # Either may be wrong by what the method is allowed.
+    # Each of the two results may have the error that the method is allowed.
     return name.bounded(difference, 2.0 * flow.limit(tolerance))
 
 
@@ -160,7 +163,7 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     there = end(scene, time, method, tolerance)
     start = restarted_at(scene, there, time)
-    # A method of SciPy may meet a little less on the way back.
+    # In the backward run, a method of SciPy may be able to meet only a coarser tolerance.
     coarser = tolerance
     if method in SCIPY_METHODS:
         coarser = max(tolerance, 1.1 * finest(method, start, -time))
@@ -169,14 +172,14 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     difference = float(np.abs(again - scene.omega).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference, "not reversible")
-    # The error of the way there is an error of the start of the way back.
+    # The error of the forward run is an initial error of the backward run.
     limit = flow.limit(tolerance) * back.amplification + back.limit(coarser)
     return name.bounded(difference, limit)
 
 
 def _split(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
-    # Always the same three.
+    # The seed is fixed, so that the three cuts are always the same.
     source = random.Random("cuts")
     cuts = sorted(source.uniform(0.0, time) for _ in range(3))
     omega = np.array(scene.omega)
@@ -186,7 +189,7 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
         omega = end(restarted_at(scene, omega, begin), stop - begin, method, tolerance)
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
-        # The rest of the way propagates the error of each piece.
+        # The rest of the trajectory propagates the error of each piece.
         limit += piece.limit(tolerance) * rest
     whole = end(scene, time, method, tolerance)
     difference = float(np.abs(omega - whole).max()) / flow.largest

@@ -1,4 +1,4 @@
-"""Length: a million revolutions; energy, momentum and phase against Brouwer's law."""
+"""Trial of length: energy, momentum and phase over a million revolutions, against Brouwer's law."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -25,29 +25,31 @@ from pyharness.theory import brouwer
 from pyharness.theory.brouwer import LAWS, Noise, Orbit
 from pyharness.truth.elliptic import torque_free
 
-# A revolution is 2 pi over the largest component of omega: the body's own turn.
+# A revolution takes 2 pi over the largest component of omega, as the body's own rotation.
 REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
 MOTIONS = {
-    # Case 4: quick precession about the axis of the spin.
+    # Case 4: fast precession about the axis of the spin.
     "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0)),
-    # All three components take part, and the modulus is large.
+    # All three components take part, and the elliptic modulus is large.
     "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
 }
-# With so many, over two decades, chance takes a walk for a drift less than once in a thousand.
+# With so many starts, over two decades of steps, a random walk is mistaken for a drift with a
+# probability below one in a thousand.
 STARTS = 12
-# Below it the last rounding of a result still counts beside those before it.
+# Below this number of revolutions the rounding of the result itself is not negligible.
 _FIT_FROM = 10**2.5
-# Midway between what chance makes of rounding and what a preference does.
+# Half the difference between the exponents of random rounding and of biased rounding.
 _HALFWAY = 0.25
-# A phase error (rad) beyond which its linear measure says only that it is large.
+# Beyond this phase error (rad), its linear measure says only that it is large.
 _LOST = 0.1
 
-# At the finest tolerance the last two terms of the series have no larger part of omega.
+# Bound on the last two terms of the series at the finest tolerance, as a fraction of omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
-# Steps of Gauss collocation, in radians of the fastest rate: with 8 stages truncation is far below
-# rounding, with 4 it leads the phase and must leave energy alone.
+# Step of Gauss collocation by number of stages, in radians of the fastest rate. With 8 stages
+# truncation is far below rounding. With 4 stages truncation dominates the phase error and must not
+# change the energy.
 _PARTS = {8: 1.0, 4: 0.25}
-# A value of the closed form, at any time: tests/methods/test_closed_form.py.
+# Error bound of a value of the closed form at any time: tests/methods/test_closed_form.py.
 _CLOSED_FORM = 16.0 * brouwer.ROUNDING
 
 Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
@@ -55,16 +57,18 @@ Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Marcher:
-    """A method: how it runs, the noise of its steps, and how far it is followed.
+    """A method with the noise of its steps and the length of its runs.
 
     Attributes
     ----------
     run : callable
-        ``run(scene, times)``: omega at the times, shape (n, 3), and the steps until then.
+        ``run(scene, times)`` returns omega at the times, shape (n, 3), and the steps until then.
+    noise : callable
+        ``noise(orbit, scene, step)`` returns bounds on what a step of that size (s) may add.
     revolutions, others : float
-        The longest run, of one start and of the others.
+        Revolutions in the longest run of the first start, and of the other starts.
     preference : bool
-        Whether what a step adds is known to prefer a direction: then powers of 1 and 2 are due.
+        Whether the errors of a step are known to be biased. The expected powers are then 1 and 2.
     """
 
     run: Runner
@@ -99,9 +103,9 @@ def _rate(scene: Scene) -> float:
 
 
 MARCHERS = {
-    # What a series leaves out keeps its sign; and its steps fall in with a periodic motion, so
-    # that the rounding of a step comes back with every revolution. The last two terms are at most
-    # SLACK shares; what follows them falls at least by halves.
+    # The truncation error of a series keeps its sign. Its steps also lock to the periodic motion,
+    # so that the rounding of a step recurs in every revolution. The last two terms are at most
+    # SLACK times the local tolerance. Each later term is at most half of the term before it.
     "taylor": Marcher(
         _taylor,
         partial(brouwer.taylor_noise, order=Series.MOST_ORDER, left_out=_LEFT_OUT),
@@ -109,7 +113,7 @@ MARCHERS = {
         10**5.5,
         preference=True,
     ),
-    # Equal steps of a part of a radian; ten times as costly as a Taylor step.
+    # Equal steps of a fraction of a radian. A step costs ten times as much as a Taylor step.
     "gauss-8": Marcher(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
     "gauss-4": Marcher(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
 }
@@ -126,7 +130,7 @@ def _attempts() -> Iterator[Attempt]:
         yield Attempt(replace(name, subject="closed-form"), _closed_form)
         for method in ("dop853", "lsoda"):
             yield Attempt(replace(name, subject=method, setting="100"), _scipy)
-        # A hundred steps for each of 1e4 revolutions.
+        # A hundred steps in each of 1e4 revolutions.
         step = 2.0 * math.pi / orbit_of(motion).largest / 100.0
         stepped = replace(scene, step_size=step, steps=1_000_000)
         for listing in LISTINGS:
@@ -135,7 +139,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def hold(marcher: Marcher, name: Name) -> Iterator[Check]:
-    """Hold one method to Brouwer's law: a bound at each horizon, and the power of the growth."""
+    """Compare a method with Brouwer's law: a bound at each horizon, and the power of the growth."""
     motion = name.circumstance
     for what, found, steps, limits in measured(marcher, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -151,7 +155,7 @@ def hold(marcher: Marcher, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The error of one method over the number of steps, its bound, and by how many starts."""
+    """The error of one method against the number of steps, its bound, and the number of starts."""
 
     motion: str
     method: str
@@ -175,9 +179,10 @@ def curves() -> Iterator[Drift]:
 def measured(
     marcher: Marcher, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
-    """Yield what is watched, its errors, the steps to each horizon and the bounds there.
+    """Yield a quantity, its errors, the steps to each horizon, and the bounds there.
 
-    The errors have a row for each start and a column for each horizon, NaN beyond its run.
+    The quantities are energy, momentum and phase. The errors have a row for each start and a column
+    for each horizon, with NaN beyond the end of the run.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * marcher.revolutions]
@@ -204,14 +209,14 @@ def orbit_of(motion: str) -> Orbit:
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return states of one motion, so that no lucky phase decides."""
+    """Return several initial states of one motion, to average over the phase."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
     return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
 
 
 def _prepared(name: Name) -> Check:
-    """Hold a prepared solver, which takes the same steps, to the bits of the rows."""
+    """Compare a prepared solver bit for bit with the method's own run; both take the same steps."""
     method, scene = name.subject, MOTIONS[name.circumstance]
     time = 1e4 * 2.0 * math.pi / orbit_of(name.circumstance).largest
     rows, _ = MARCHERS[method].run(scene, [time])
@@ -239,7 +244,7 @@ def _scipy(name: Name) -> Iterator[Check]:
 
 
 def _program(listing: Listing, name: Name) -> Iterator[Check]:
-    """Say what a program makes of 10 and of 1e4 revolutions."""
+    """Describe the errors of a program after 10 and after 1e4 revolutions."""
     scene = scene_of(name)
     found = unstopped(listing).rows(scene)
     for count in (1_000, 1_000_000):

@@ -1,4 +1,4 @@
-"""The collocation matrices at steps from 1e-10 to 10 s, and when they are declared singular."""
+"""Trial of the collocation matrices at steps from 1e-10 to 10 s, and of their singularity."""
 
 import math
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from pyharness.theory.collocation_matrices import (
 )
 
 STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
-# Steps of runs in which the four-term program meets the singularity.
+# Step sizes (s) of runs in which the four-term program meets the singularity.
 _RUN_STEPS = (1e-7, 1e-6, 1e-5, 1e-4)
 
 
@@ -62,18 +62,22 @@ def _condition_note(found: Solved) -> str:
 
 
 def _threshold(name: Name) -> Check:
-    """Hold the step below which IER is 129 against the exact last pivot."""
+    """Compare the step below which IER is 129 with the step from the exact last pivot."""
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
-    # The pivot goes with a power of the step: its rounding counts by the root.
+    # The last pivot is proportional to a power of the step. Its relative rounding error is
+    # therefore divided by that power.
     _, rounding = solved(program, 1.01 * wanted).pivoting
     limit = rounding / (len(PARTS[program]) - 1)
     return name.bounded(abs(found / wanted - 1.0), limit, f"{found:.6g} s")
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Count the steps of a run that print 129; original the points move out of danger."""
+    """Check the number of steps of a run that print IER = 129.
+
+    In the original programs the points move away from the singularity in later steps.
+    """
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier
     assert ier is not None

@@ -1,4 +1,4 @@
-"""Bodies that are all but symmetric, symmetric, all but spheres, and spheres."""
+"""Trial of nearly symmetric and symmetric bodies, and of near-spheres and spheres."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -9,7 +9,7 @@ from pyharness.checks.judge import unknown_flow
 from pyharness.checks.stress import Trial
 from pyharness.scenes.extreme import LONG, SYMMETRIC_START
 
-# The closed form alone needs no bound on the amplification of errors.
+# The closed form is the only method that needs no bound on the error amplification.
 _UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 
 

@@ -1,4 +1,4 @@
-"""Linear stability of each program: its own steps against the amplification matrix derived."""
+"""Trial of linear stability: each program's own steps against its derived amplification matrix."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -24,7 +24,8 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.theory.amplification import amplification, weight_of_squares
 
-# A, B, C and a steady omega, with few binary digits: eigenvalues of all kinds on both sides.
+# A, B, C and a steady omega, with few binary digits. The eigenvalues are real, imaginary and
+# complex, in both half-planes.
 _STEADY: dict[str, tuple[Triple, Triple]] = {
     "spin": ((0.5, -0.5, 0.25), (0.0, 0.0, 1.0)),
     "middle-axis": ((0.5, 0.5, 0.25), (0.0, 0.0, 1.0)),
@@ -42,7 +43,7 @@ _DIRECTIONS = {"real": -1.0 + 0.0j, "imaginary": 1.0j}
 
 
 def _attempts() -> Iterator[Attempt]:
-    """Hold the steps of every program against its matrix; Runge-Kutta with either defect too."""
+    """Compare the steps of every program with its matrix, Runge-Kutta also with each defect."""
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
         label = "-".join(sorted(listing.defects)) if listing in halves else listing.label
@@ -69,7 +70,7 @@ def _parts(listing: Listing, name: Name) -> Iterator[Attempt]:
     if listing.program != "runge-kutta":
         yield from _collocation(listing, name)
     elif listing.defects == {"base-not-restored"}:
-        return  # two eigenvalues of like size: no one growth to look for
+        return  # two eigenvalues of similar size: no single growth rate
     for kind, direction in _DIRECTIONS.items():
         yield _probed(name, f"boundary-{kind}", partial(observed_boundary, listing, direction))
     for case in (2, 3, 4):
@@ -109,7 +110,7 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Say by what factor the wobble of a case's spin about axis 3 grows in a step."""
+    """Describe the growth per step of the wobble of a case's spin about axis 3."""
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

@@ -1,4 +1,4 @@
-"""Angular velocities from 1e-300 to 1e300 rad/s, time scaled to match."""
+"""Trial of angular velocities from 1e-300 to 1e300 rad/s, with the time scaled accordingly."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -23,17 +23,17 @@ from pyharness.theory.conditioning import Conditioning, conditioning
 _DRIVEN = replace(
     ORDINARY, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
 )
-# Squares and cubes of the scale have to be numbers too.
+# Squares and cubes of the factor must be in the range of binary64 too.
 _DRIVEN_TWOS = (-320, -100, 100, 320)
 
 
 def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) -> Iterator[Attempt]:
-    """Hold one of our methods to the same digits where a power of two scales the motion."""
+    """Check that one of our methods gives the same digits if a power of two scales the motion."""
     time = scene.step_size * scene.steps
     plain = cache(lambda: _tried(method, scene, time))
 
     def same(factor: float, name: Name) -> Check:
-        # In the order of the calls: the motion itself first.
+        # Compute the original motion first.
         first, run = plain(), _tried(method, scene_of(name), time / factor)
         with np.errstate(invalid="ignore"):
             wrong = float(np.abs(run.omega / factor - first.omega).max())
@@ -48,7 +48,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
 
 def _beyond(name: Name) -> Check:
-    """Hold a method to say so where omega leaves the range of numbers."""
+    """Check that a method reports when omega leaves the range of binary64."""
     run = _tried(name.subject, scene_of(name), 1e300)
     silent = run.has_result
     note = "a silent wrong number" if silent else run.ended
@@ -68,7 +68,10 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return the truth: the flow does to a scaled motion what it does to the motion."""
+    """Return the true solution, with the conditioning of the unscaled motion.
+
+    A scaled motion has the same error amplification as the motion itself.
+    """
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
 
@@ -83,7 +86,7 @@ def _attempts() -> Iterator[Attempt]:
         if method not in (*SCIPY_METHODS, "closed-form"):
             yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)
     law = TorqueLaw((1e10, 2e10, -1e10))
-    # A sphere, as no coupling of its axes makes it turn ever faster.
+    # A sphere, because coupling between the axes of another body would change omega as well.
     scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
     for method in ALL:
         yield Attempt(named("scales", method, "beyond", scene=scene), _beyond)

@@ -1,4 +1,4 @@
-"""Spin about the middle axis, disturbed by ever less and by nothing, over several flips."""
+"""Trial of spin about the middle axis over several flips, with perturbations down to 0."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ _STAYS = 50.0  # s
 
 
 def _undisturbed() -> Iterator[Attempt]:
-    """Hold every method to the exact answer: a disturbance of 0 stays 0 for ever."""
+    """Compare every method with the exact solution: a perturbation of 0 stays 0 for ever."""
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS
     )
@@ -25,7 +25,8 @@ def _undisturbed() -> Iterator[Attempt]:
         method = name.subject
         run = run_method(method, scene, _STAYS, None if method in FIXED_STEP else MIDDLING)
         wrong = float(np.abs(run.omega - scene.omega).max())
-        # What is exactly zero keeps zero; the spin may be rounded where units are changed.
+        # A component that is exactly 0 must stay 0. `quick` may round the spin, since it changes
+        # units.
         limit = 2.0**-52 if method == "quick" else 0.0
         stays = run.omega[0] == run.omega[2] == 0.0 and run.has_result
         note = "" if stays else "it left the axis"

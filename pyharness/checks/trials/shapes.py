@@ -1,4 +1,4 @@
-"""Needles, coins, flat plates, and moments that no body has."""
+"""Trial of extreme shapes: needles, coins, flat plates, and moments that no body can have."""
 
 from pyharness.checks.hold import hold_all
 from pyharness.checks.stress import Trial

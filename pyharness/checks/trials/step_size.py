@@ -1,4 +1,4 @@
-"""Step sizes from 1 to 1e-6 s: truncation, rounding, where they cross, where runs diverge."""
+"""Trial of step sizes from 1 to 1e-6 s: truncation, rounding, their crossing, and divergence."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -31,7 +31,7 @@ TIME = 1.0
 SMALLEST = 1e-6
 # Half a decade apart.
 COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
-# Where runs diverge is looked for over a long time, down to a step that leaves them no excuse.
+# Divergence is searched for over a long time, down to a step with which no run should diverge.
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
 
@@ -45,7 +45,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attempt]:
-    """Judge the error at the end, for every step, where it is least, and where runs diverge."""
+    """Judge the error at the end for every step, its crossing with rounding, and divergence."""
     before = listing is not None and listing.label == "original"
     label = listing.label if listing else ""
     place = named("step-size", method, f"case-{case}", label, scene=case_scene(case))
@@ -67,7 +67,7 @@ def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attemp
         own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
         yield Attempt(own, partial(foretold, count))
     gauss = method.startswith("gauss")
-    # Nothing of order above 4 has truncation left at a step that shows rounding.
+    # At steps with visible rounding, a method of order above 4 has no truncation error left.
     if not (before or gauss) and SCHEMES[method].order in (2, 4):
         crossing = partial(_crossing, method, case, lambda count: error(count)[0])
         yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
@@ -76,23 +76,24 @@ def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Hold the step below which truncation no longer rules against that foretold.
+    """Compare the smallest step at which truncation dominates with the prediction.
 
-    It rules where the error is that of truncation, within a factor of 2.
+    Truncation dominates if the error equals the predicted truncation error within a factor of 2.
     """
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
-        # At smaller ones the matrix is declared singular.
+        # At smaller steps the matrix is declared singular.
         smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
     counts = [count for count in COUNTS if TIME / count >= smallest]
     ruled = [c for c in counts if 0.5 < error(c) / forecaster.at(c).truncation < 2.0]
     found = TIME / max(ruled, default=1)
     if found > TIME / counts[-1]:
-        # Somewhere on the way to the next one.
+        # The crossing is between this step and the next smaller one: take the middle on a
+        # logarithmic scale.
         found /= 10.0**0.25
     foretold = forecaster.crossing(smallest)
-    # Half a decade from one step to the next; rounding may be a tenth or ten times as large.
+    # The steps are half a decade apart. Rounding may be a tenth or ten times as large as predicted.
     limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
     best = min(counts, key=error)
     note = (
@@ -103,7 +104,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return the error at the end over the largest omega, and what else was seen."""
+    """Return the error at the end over the largest omega, and a note on the run."""
     largest = _path(case).flow.largest
     note = ""
     if listing is not None:
@@ -119,7 +120,7 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 
 
 def _end(scene: Scene, name: str) -> Array:
-    """Return what a modern method with a fixed step gives at the end; NaN after an overflow."""
+    """Return omega at the end by a modern method with a fixed step; NaN after an overflow."""
     if name in FIXED_STEP:
         rows = fixed_step(name)(scene, [TIME], 1.0).omega
         return rows[-1] if len(rows) else np.full(3, math.nan)
@@ -135,7 +136,7 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
-    """Say with which steps a run diverges, and where theory knows, hold it to that."""
+    """Find the step sizes for which a run diverges, and compare them with any prediction."""
     scene, method = case_scene(case), name.subject
     if listing is None:
         runner: Runner = partial(_rows, method)
@@ -148,7 +149,8 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
         return name.described(found, _from(found, TIME))
     seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
     note = f"{_from(seen.found, _LONG)}, foretold from {seen.foretold:.4g} s"
-    # Linear theory knows nothing of points that move, unless the equations are linear.
+    # Linear theory does not cover points that move from step to step, unless the equations are
+    # linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
         return name.bounded(abs(seen.found / seen.foretold - 1.0), seen.limit, note)
     return name.described(seen.found, note)

@@ -1,7 +1,7 @@
-"""Threads: the same calls from many threads at once give the same bits.
+"""Trial of threads: the same calls from many threads at once give bit-for-bit identical results.
 
-`choose_instructions` sets the level of the kernels for the whole process; it belongs before the
-threads, and is not called here.
+`choose_instructions` sets the instruction set of the kernels for the whole process. It must be
+called before threads start, and is not called here.
 """
 
 import random
@@ -29,7 +29,7 @@ from pyharness.original.programs import IMPLEMENTATIONS
 
 THREADS = 8
 _REPEATS = 30
-# The interpreter changes threads a hundred times as often as it does by itself.
+# Switch interval (s): the interpreter changes threads a hundred times as often as by default.
 _SWITCH = 5e-5
 _TOLERANCE = 1e-9
 _TIMES = (0.05, 0.1, 0.2)
@@ -48,7 +48,7 @@ SCENES = (
 
 @dataclass(frozen=True)
 class Job:
-    """A call, of a method or program, that gives the same bits whenever and wherever it is made."""
+    """A call of a method or program that must always give bit-for-bit identical results."""
 
     subject: str
     scene: Scene
@@ -56,7 +56,7 @@ class Job:
 
 
 def _run(only: Sequence[str]) -> Iterator[Check]:
-    """Make every call alone, then all of them at once, mixed, several times each."""
+    """Make every call alone, then all calls at once in mixed order, several times each."""
     asked = [job for job in jobs() if may_hold(f"threads/{job.subject}", only)]
     differing = different(asked)
     for subject in dict.fromkeys(job.subject for job in asked):
@@ -68,7 +68,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs whose bits in many threads were not those of a call alone, each time."""
+    """Return the jobs that gave other bits in many threads than in a call alone."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)
@@ -83,7 +83,7 @@ def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEA
 
 
 def bits(job: Job) -> bytes:
-    """Make the call; what it refuses is refused in the same words."""
+    """Make the call and return its bits; for a refusal, return its message."""
     try:
         return job.call()
     except InputError as refusal:
@@ -91,7 +91,7 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return the calls: every method, prepared solver, program and twin, and what they refuse."""
+    """Return the calls of every method, prepared solver, program and twin, and a refused call."""
     found = []
     for scene in SCENES:
         for name in METHODS:
@@ -126,7 +126,7 @@ def _prepared(scene: Scene, name: str) -> bytes:
 
 @cache
 def _shared(scene: Scene, name: str) -> Solver:
-    """Return the one solver that all threads call."""
+    """Return the single solver that all threads call."""
     return prepare(scene, name, 1e-7)
 
 
@@ -137,7 +137,7 @@ def _program(scene: Scene, listing: Listing, implementation: str) -> bytes:
 
 
 def _refusal(scene: Scene) -> bytes:
-    """Ask for a tolerance that no method claims to meet."""
+    """Request a tolerance that no method claims to meet."""
     return method_candidate("taylor", 1e-30).rows(scene, _TIMES).omega.tobytes()
 
 

@@ -1,4 +1,4 @@
-"""Torque: waves too fast for the step, huge and tiny torques, resonance with the precession."""
+"""Trial of torques: waves too fast for the step, huge and tiny torques, precession resonance."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -27,11 +27,11 @@ from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.axial_top import axial_top
 from pyharness.truth.reference import reference
 
-# Prepared solvers have kernels of their own.
+# Prepared solvers have separate kernels.
 _PREPARED = {"prepared-auto": "auto", "quick": "quick"}
 _OURS = ("taylor", "gauss-2", "gauss-4", "gauss-8", "auto")
 _ALL = (*_OURS, *_PREPARED, "dop853", "lsoda", "rk45", "radau")
-# What follows a wave for a million radians in seconds.
+# Methods that follow a wave for a million radians within seconds.
 _LONG = ("taylor", "auto", *_PREPARED)
 
 _BODY = (40.0, 30.0, 20.0)
@@ -41,9 +41,9 @@ _START = (0.3, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene that is tried until a time (s), and by what can take it.
+    """A scene that is tried until a time (s), and the methods that can take it.
 
-    Programs are tried, where `programs` says so, over the scene's steps.
+    If `programs` is set, the programs are also run over the scene's steps.
     """
 
     scene: Scene
@@ -54,11 +54,11 @@ class Circumstance:
 
 
 def axial(scene: Scene, time: float) -> Truth:
-    """Return the truth of a symmetric body whose torque acts along its axis.
+    """Return the true solution of a symmetric body whose torque acts along its axis.
 
-    Rounding of a wave's angle, frequency times t, is a matter of chance from one evaluation to
-    the next: of n of them, at least one a period, 4 sqrt(n) remain of the n that
-    `conditioning` counts (Hoeffding 1963).
+    The rounding error of a wave's angle, frequency times t, is random from one evaluation to the
+    next. `conditioning` counts n such errors in full, with n evaluations, at least one per period.
+    Only 4 sqrt(n) of them are counted here (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.torque.sines + scene.torque.cosines
@@ -70,7 +70,10 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the truth of a wave so fast that it can't matter: what it moves is the error."""
+    """Return the true solution without the wave, which is too fast to matter.
+
+    The effect of the wave is added to the error of the solution.
+    """
     moments = np.array(scene.moments)
     waves = scene.torque.sines + scene.torque.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)
@@ -79,9 +82,9 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the truth of a sphere, whose closed form takes the angle in two words.
+    """Return the true solution of a sphere, whose closed form has its angle in double-double.
 
-    It has then no rounding of the angle: what is left are those of the terms of one sum.
+    The angle then has no rounding error. Only the rounding of the terms of one sum is left.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())
@@ -91,7 +94,7 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Take a torque on all axes that moves omega by about a radian per second in a period."""
+    """Return a scene with torques about all axes that change omega by about 1 rad/s per period."""
     size = 10.0 * frequency
     law = TorqueLaw(
         sines=(((4.0 * size, 0.0, 2.0 * size), frequency),),
@@ -110,7 +113,7 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Take a constant torque, for some fifty radians of the motion that it makes."""
+    """Return a scene with a constant torque, for some fifty radians of the motion it causes."""
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
     scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
     return Circumstance(scene, math.sqrt(4e3 / size), programs=size == 1e6)
@@ -123,7 +126,7 @@ def _tiny(size: float) -> Circumstance:
 
 
 def _resonant(moments: Triple) -> Circumstance:
-    """Take a torque across the axis that turns with the precession of Case 2, 5 rad/s."""
+    """Return a scene with a transverse torque that rotates at the precession of Case 2, 5 rad/s."""
     law = TorqueLaw(sines=(((0.0, -40.0, 0.0), 5.0),), cosines=(((40.0, 0.0, 0.0), 5.0),))
     scene = Scene("resonance", (0.0, 1.0, 10.0), moments=moments, torque=law, steps=2000)
     return Circumstance(scene, 20.0, programs=True)
@@ -147,7 +150,7 @@ CIRCUMSTANCES = {
     "no-digits-1e22": _no_digits(1e22, 2e23, sphere=True),
     "averaged-1e16": _no_digits(1e16, 10.0, sphere=False),
     **{f"huge-{size:.0e}": _huge(size) for size in (1e6, 1e9, 1e12)},
-    # Growth to 1e8 times the start, by the torque alone: no blow-up.
+    # omega grows to 1e8 times its initial value by the torque alone. This is no divergence.
     "huge-from-rest": _huge(1e4, (1e-6, 0.0, 0.0)),
     **{f"tiny-{size:.0e}": _tiny(size) for size in (1e-12, 1e-100, 1e-300, 5e-324)},
     "resonant": _resonant(_SYMMETRIC),
@@ -174,7 +177,7 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
-    """Judge one method by the truth: tolerance and rounding, amplified by the flow."""
+    """Judge one method by the true solution, with tolerance and rounding amplified by the flow."""
     assert tolerance is not None
     method = name.subject
     kind = prepared_candidate if method in _PREPARED else method_candidate
@@ -185,7 +188,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def _describe_axial(name: Name) -> Iterator[Attempt]:
-    """Say what steps a hundred radians of a wave apart make of it."""
+    """Describe the results of runs whose steps are a hundred radians of a wave apart."""
     scene = scene_of(name)
     truth = cache(lambda: brouwer.floats(axial_top(scene, scene.times())))
 

@@ -1,1 +1,1 @@
-"""The statements of the thesis, judged."""
+"""The claims of the thesis and the verdicts on them."""

@@ -1,6 +1,7 @@
-"""The atlas of history: over starts all over the sphere, which claims of the thesis hold where.
+"""The atlas of claims: which claims of the thesis hold from which initial omega.
 
-Verdicts count as in the evidence: 1 for reproduced, 1/2 in part, 0 otherwise, and no weights.
+The starts, values of omega(0), cover the sphere at several magnitudes. A verdict counts as in
+`evidence`: 1 if reproduced, 1/2 if in part, 0 otherwise, without weights.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +37,11 @@ Codes = NDArray[np.int8]
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """What a sweep found: codes of each claim over reading, steps, magnitude, height, longitude."""
+    """The verdict codes of each claim over a grid of readings, steps and starts.
+
+    The axes of each array are reading, steps, magnitude of omega(0) (rad/s), height (omega3 divided
+    by the magnitude) and longitude (rad).
+    """
 
     codes: Mapping[str, Codes]
     readings: Sequence[str]
@@ -47,24 +52,24 @@ class Atlas:
 
     @property
     def n_starts(self) -> int:
-        """How many starts there are, of any reading and steps."""
+        """Return the number of starts for each choice of reading and steps."""
         return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
 
     def choices(self) -> list[tuple[str, int]]:
-        """Return all readings with all steps, in the order of the arrays."""
+        """Return all pairs of a reading and a number of steps, in the order of the arrays."""
         return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the points of all claims (magnitude, height, longitude)."""
+        """Return the sum of the points of all claims, shape (magnitude, height, longitude)."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return from where every claim is reproduced, at least in part."""
+        """Return for each start whether every claim is reproduced, at least in part."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
     def start(self, at: Sequence[int] | NDArray[Any]) -> Triple:
-        """Return omega(0) at a place of the grid (rad/s)."""
+        """Return omega(0) (rad/s) at the grid indices `at`."""
         size, height = self.magnitudes[at[0]], self.heights[at[1]]
         across, longitude = np.sqrt(1.0 - height * height), self.longitudes[at[2]]
         found = size * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
@@ -74,7 +79,7 @@ class Atlas:
 def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
     """Return the atlas of a sweep's claims; `axes` are its dimensions with their values, in order.
 
-    InputError where they are not those of an atlas.
+    Raise InputError if they are not the axes of an atlas, or if the sweep is incomplete.
     """
     if tuple(axes) != (*CHOSEN, *WHERE) or not codes:
         allowed = ", ".join((*CHOSEN, *WHERE))
@@ -90,7 +95,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the points that verdicts add up to."""
+    """Return the sum of the points of several verdicts."""
     values = np.zeros(len(_CODES) + 1)
     for code, points in _POINTS.items():
         values[code] = points
@@ -98,15 +103,16 @@ def sum_of_points(codes: Sequence[Codes]) -> Array:
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the shares of starts where a claim is reproduced, in part, and not."""
+    """Return the fractions of starts from which a claim is reproduced, in part, and not at all."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:
-    """Return how much the verdict tells of the start, on average: its entropy.
+    """Return the entropy of a claim's verdict over the starts, in bits.
 
-    0 where it is the same from every start, 1 where it halves them.
+    It is 0 if the verdict is the same from every start, and 1 if each of two verdicts comes from
+    half of the starts.
     """
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
@@ -114,7 +120,7 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return the claims about one case each, by the case."""
+    """Return the claims that are about a single case, by the number of the case."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -124,7 +130,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the codes of claims from the starts that the thesis shows, and from ours."""
+    """Return the verdict codes of claims from the starts that the thesis shows, and from ours."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

@@ -1,4 +1,4 @@
-"""The report of `claims --atlas`: claims that discriminate, starts that are likely; a picture."""
+"""The report of `claims --atlas`: discriminating claims, likely initial omegas, and a picture."""
 
 import math
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Report an atlas: of the first reading and steps, but where others are told."""
+    """Report an atlas, with the first reading and number of steps unless a table shows others."""
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
@@ -154,7 +154,10 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _turned(atlas: Atlas) -> Table:
-    """Return how many verdicts another reading turns, or more steps: one of them at a time."""
+    """Return the fraction of verdicts that another reading changes, or another number of steps.
+
+    Only one of the two is changed at a time.
+    """
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []
@@ -167,7 +170,7 @@ def _turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Draw the points over the sphere at some magnitudes, and each claim over all of them."""
+    """Draw the points over the sphere at some magnitudes, and each claim over all magnitudes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")
@@ -201,7 +204,7 @@ def atlas_picture(atlas: Atlas) -> Picture:
 def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
     import matplotlib as mpl
 
-    # Not the ends, which look like what is beside them.
+    # Leave out the first and last magnitude, whose maps look like the maps beside them.
     count = len(atlas.magnitudes)
     inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
     chosen = np.unique(inside) if count > _MAPS else np.arange(count)
@@ -260,7 +263,7 @@ def _draw_claims(figure: "Figure", atlas: Atlas, names: Sequence[str], means: An
 
 
 def _edges(values: Array) -> Array:
-    """Return where the places of values meet on a logarithmic axis."""
+    """Return the edges of the cells around `values` on a logarithmic axis."""
     if len(values) < 2:
         return np.array([values[0] / 2.0, values[0] * 2.0])
     middles = np.sqrt(values[1:] * values[:-1])

@@ -1,9 +1,10 @@
-"""Evidence in place of yes or no: every combination of what the thesis leaves open, scored.
+"""Evidence on the choices that the thesis leaves open: a score for every combination of them.
 
-A combination chooses omega(0), one for all cases in which it is not given or those that we adopt,
-the readings, the conjectures and the number of steps. It is scored by the claims about the original
-programs: one point for each that is reproduced, a half for one reproduced in part, none otherwise;
-claims that are not testable do not count. Nothing is weighted and nothing is tuned.
+A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
+either one value for all cases without a given start, or the values that we adopt. The score is the
+sum of the points of the claims about the original programs. A claim has one point if it is
+reproduced, half a point if it is reproduced in part, and otherwise none. Claims that are not
+testable do not count. There are no weights and no tuned parameters.
 """
 
 from collections.abc import Iterator
@@ -25,23 +26,23 @@ KINDS = ("result", "design")
 
 @dataclass(frozen=True)
 class Combination:
-    """One choice of everything, the verdicts of all testable claims, and what they add up to."""
+    """One combination of the open choices, the verdicts on all testable claims, and its score."""
 
     assumptions: Assumptions
     verdicts: dict[str, str]
 
     @property
     def score(self) -> float:
-        """Points of all claims."""
+        """Return the sum of the points of all claims."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
     def holding(self) -> int:
-        """Claims that are reproduced, at least in part."""
+        """Return how many claims are reproduced, at least in part."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Say what was chosen, axis by axis."""
+        """Return the choice on each axis, as text."""
         given = self.assumptions
         start = given.start or ()
         return {
@@ -56,7 +57,7 @@ class Combination:
 
 
 def evidence() -> Iterator[Combination]:
-    """Give every combination with its verdicts, as they are computed."""
+    """Compute and yield every combination with its verdicts, one by one."""
     for assumptions in combinations():
         verdicts = {}
         for entry in claims():
@@ -69,7 +70,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def evidence_rule() -> str:
-    """Say how a combination is scored."""
+    """Return the description of how a combination is scored."""
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
         "readings, conjectures and steps, scored by the claims about results and design of the "
@@ -104,7 +105,7 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return the part of a combination on which a claim hangs; the rest is as adopted."""
+    """Return the choices on which a claim depends; all other choices are the adopted ones."""
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
     named = [each for each in hangs_on if each.startswith("conjecture ")]

@@ -1,4 +1,4 @@
-"""The report of `claims --evidence`: combinations by score, and what tells them apart."""
+"""The report of `claims --evidence`: combinations by score, and the claims that discriminate."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -34,7 +34,7 @@ _SHORT = {
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Report the best combinations and the worst, the claims that discriminate, what stays open."""
+    """Report the best and worst combinations, the discriminating claims, and the open choices."""
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())
     columns = [

@@ -1,4 +1,4 @@
-"""Where claims are tested: the programs in one state, under stated assumptions, run once each."""
+"""The laboratory that tests claims: programs under stated assumptions, each run only once."""
 
 import math
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ from pyharness.truth.reference import Reference, reference
 
 @dataclass(frozen=True)
 class Assumptions:
-    """What the thesis does not say.
+    """The choices that the thesis leaves open.
 
-    `start` is omega(0) of the cases whose start is not given (rad/s), None for those of
-    `cases.toml`; `readings` are those selected that are not the adopted ones; `conjectures` what is
-    assumed where no card exists, None for what the original assumes; `word` the arithmetic of the
-    programs.
+    `start` is omega(0) (rad/s) of the cases without a given start; None takes the values in
+    `cases.toml`. `readings` are the selected readings that are not adopted. `conjectures` are the
+    assumptions where no card exists; None takes those of the original listing. `word` is the
+    arithmetic of the programs.
     """
 
     start: Triple | None = None
@@ -39,14 +39,14 @@ class Assumptions:
 
 @dataclass(frozen=True)
 class Laboratory:
-    """The three programs with their defects, but for those `fixed`, or corrected altogether."""
+    """The three programs: with their defects except those in `fixed`, or wholly corrected."""
 
     is_original: bool
     assumptions: Assumptions = field(default_factory=Assumptions)
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the program's listing in this state; corrected, it depends on no assumption."""
+        """Return the program's listing; the corrected listing depends on no assumption."""
         if not self.is_original:
             return corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
@@ -55,7 +55,7 @@ class Laboratory:
         return subset(program, "original", fixed, (), readings, assumed)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return a case under the assumptions, with `parts` in steps so much smaller."""
+        """Return the scene of a case under the assumptions, its step size divided by `parts`."""
         scene = _scene(case, self.assumptions.start, self.assumptions.steps)
         return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
 
@@ -66,15 +66,15 @@ class Laboratory:
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Run a listing on any scene, in the word that is assumed."""
+        """Run a listing on any scene, in the assumed arithmetic."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
-        """Return the true solution of a case at its steps."""
+        """Return the reference solution of a case at its steps."""
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case, for rules."""
+        """Run a program on a case, and return arrays for the rules."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -83,7 +83,7 @@ class Laboratory:
         return Runs(omega, np.asarray(len(reached)), complete, overflow)
 
     def solution(self, case: int) -> Array:
-        """Return the true omega of a case at its steps."""
+        """Return the reference omega (rad/s) of a case at its steps."""
         return self.truth(case).omega
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> float:
@@ -91,15 +91,15 @@ class Laboratory:
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega of the collocation model of so many terms, at points k/(n+1).
+        """Return omega of the collocation model with n = `terms` terms, at points k/(n+1).
 
-        In the original they leave the interval, and the torque must be constant.
+        In the original programs the points leave the interval; the torque must then be constant.
         """
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the Lipschitz constant (1/s) that lets the Runge-Kutta program run all steps."""
+        """Return the least Lipschitz constant (1/s) with which Runge-Kutta runs all steps."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -120,19 +120,19 @@ def starts() -> list[Triple]:
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference of any component at the rows that both have (rad/s)."""
+    """Return the largest difference of any component over the common rows (rad/s)."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
 
 
 def ranges(truth: Reference) -> Array:
-    """Return how far each component moves (rad/s)."""
+    """Return the range of each component over the steps (rad/s)."""
     return spread_of(truth.omega)
 
 
 def largest(truth: Reference) -> float:
-    """Return the largest component of omega (rad/s)."""
+    """Return the largest magnitude of any component of omega (rad/s)."""
     return float(largest_of(truth.omega))
 
 
@@ -177,17 +177,18 @@ def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
 
 
 LITERALS = ("DT=", "T=", "DT+")
-"""Where the collocation decks have the step: before the loop, as the interval's end, as growth."""
+"""The step literals of the collocation decks: DT before the loop, interval end, growth of DT."""
 
 
 @cache
 def by_literals(
     scenes: tuple[Scene, ...], terms: int, changed: frozenset[str], parts: int
 ) -> Array:
-    """Run original collocation decks in which some literals of the step are so much smaller.
+    """Run original collocation decks with the step's literals in `changed` divided by `parts`.
 
-    Of constant torque, to rounding, side by side; omega (rad/s) of every scene at the steps that
-    its deck has unchanged, shape (scenes, steps, 3); NaN from an overflow on.
+    All scenes run at once and must have constant torque. Return omega (rad/s) of every scene at the
+    steps of the unchanged deck, shape (scenes, steps, 3); NaN from an overflow on. It agrees with
+    the decks but for rounding.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -203,10 +204,11 @@ def march_models(
     omega: Array, coefficients: Array, torque: Array, terms: int,
     dt: float, end: float, growth: float, steps: int,
 ) -> Array:  # fmt: skip
-    """March collocation models of constant torque side by side, (n, 3), to rounding.
+    """Integrate collocation models of constant torque from n initial omegas at once.
 
-    The points lie in (0, dt), which grows by `growth` with every step, and each step is `end` long.
-    Return omega (n, steps, 3); NaN from an overflow on.
+    `omega`, shape (n, 3), has the initial omegas (rad/s). The points are in (0, dt), where dt (s)
+    grows by `growth` with every step; each step is `end` long. Return omega, shape (n, steps, 3),
+    which agrees with the programs but for rounding; NaN from an overflow on.
     """
     a, b, c = coefficients.T
 

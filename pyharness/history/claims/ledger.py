@@ -1,4 +1,4 @@
-"""The claims of the thesis, each with verdicts computed for the programs and for the methods."""
+"""The claims of the thesis, with verdicts computed for the original and corrected programs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ _ROOMS = (verdicts, methods, theory)
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts without one assumption, and whether both are what they were."""
+    """The verdicts with one assumption changed, and whether both stay the same."""
 
     assumption: str
     original: str
@@ -29,7 +29,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """An entry of `data/claims.toml` with its verdicts, and those without each assumption."""
+    """A claim of `data/claims.toml` with its verdicts, also with each assumption changed."""
 
     claim: dict[str, Any]
     original: Judged
@@ -39,9 +39,10 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """A start (rad/s) of a case that is not given, and the original programs' verdicts about it.
+    """An initial omega (rad/s) for a case without a given one, and the verdicts on its claims.
 
-    It holds where all are reproduced, at least in part.
+    The verdicts are on the original programs. `holds` is true if all of the claims are reproduced,
+    at least in part; claims that fail with every start do not count.
     """
 
     case: int
@@ -51,13 +52,13 @@ class Assignment:
 
 
 def claims() -> list[dict[str, Any]]:
-    """Return the entries of the ledger."""
+    """Return all claims, the entries of `data/claims.toml`."""
     entries: list[dict[str, Any]] = facts("claims")["claim"]
     return entries
 
 
 def claim(identity: str) -> dict[str, Any]:
-    """Return one entry; InputError where there is none of that name."""
+    """Return one claim; raise InputError if no claim has that identifier."""
     by_name = {each["id"]: each for each in claims()}
     if identity not in by_name:
         raise unknown("claim", identity, list(by_name))
@@ -65,7 +66,7 @@ def claim(identity: str) -> dict[str, Any]:
 
 
 def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
-    """Test one claim, also without each of its assumptions, with the programs in a word."""
+    """Test one claim in the arithmetic `word`, as assumed and with each assumption changed."""
 
     def verdicts(assumptions: Assumptions) -> tuple[Judged, Judged]:
         programs = outcome(entry, Laboratory(True, assumptions))
@@ -83,7 +84,7 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return what `judge` says of the entry of that name; it is computed once in a process."""
+    """Return the judgement of the claim with that identifier, computed once in a process."""
     return judge(claim(identity), word)
 
 
@@ -103,7 +104,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
         elif name == "steps":
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):
-            # What the original assumes is left out, the other is added to it.
+            # A conjecture of the original listing is removed; any other conjecture is added.
             conjecture, own = name.removeprefix("conjecture "), original(PROGRAMS[0]).conjectures
             told = "without" if conjecture in own else "with"
             yield f"{told} {name}", Assumptions(conjectures=own ^ {conjecture})
@@ -112,11 +113,11 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 
 
 def assignments() -> list[Assignment]:
-    """Return, for every case whose start is not given and every start, what holds.
+    """Return the assignments of initial omegas to the cases for which the thesis gives none.
 
-    The claims of a case depend on no other case's start, so all claims hold at once for the
-    assignments that choose, in every case, a start that holds there. Claims that fail with every
-    start do not count.
+    The claims about a case do not depend on the start of another case. All claims therefore hold at
+    once if every case has a start with which its own claims hold. Claims that fail with every start
+    do not count.
     """
     found = []
     for case in facts("claims")["assumed"]["cases"]:

@@ -1,4 +1,4 @@
-"""Tests of the claims about programs and methods over several cases, as in `verdicts`."""
+"""Tests of the claims about programs and methods over several cases; see `verdicts`."""
 
 import math
 from collections.abc import Sequence
@@ -36,9 +36,9 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Compare collocation with Runge-Kutta, at the steps that all of them ran.
+    """Compare collocation with Runge-Kutta, at the steps that all three programs ran.
 
-    The cases `shown` have their numbers and do not count.
+    The numbers of the cases in `shown` are reported, but do not affect the verdict.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -54,7 +54,7 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 
 
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Hold the program's quotient against the norm of the Jacobian, the most that eq. 19 allows."""
+    """Compare the program's quotient with the norm of the Jacobian, its upper bound by eq. 19."""
     numbers: dict[str, float] = {}
     for case in cases:
         a, b, c = lab.scene(case).euler_coefficients
@@ -65,7 +65,7 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
             for x, y, z in points
         )
         if lab.listing("runge-kutta").has("lipschitz-tests-velocity"):
-            # The equations of V are linear in V and in omega, with these coefficients.
+            # The equations of V are bilinear in V and omega; their derivatives have these norms.
             assert run.velocity is not None
             norm += float(np.linalg.norm(points, axis=1).max())
             norm += float(np.linalg.norm(run.velocity, axis=1).max())
@@ -76,13 +76,13 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Measure what models of more terms gain over four."""
+    """Measure how much models of more than four terms reduce the error."""
     numbers = {}
     for case in cases:
         truth = lab.truth(case).omega
         four, *more = (float(np.abs(lab.models(case, n) - truth).max()) for n in (4, *terms))
         for n, error in zip(terms, more, strict=True):
-            # An overflow is no gain.
+            # An overflow counts as no gain.
             gain = four / error if math.isfinite(error) else 0.0
             numbers[f"case {case}: error of four terms over that of {n}"] = gain
     most = max(numbers.values())
@@ -90,13 +90,13 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 
 
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Find the constants that all steps need."""
+    """Find the smallest Lipschitz constants with which every step passes the stop test."""
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
 
 
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
-    """Count the runs of the thesis's cases that the stop test ends: bounded ones, and others."""
+    """Count the bounded and the unbounded runs of the cases that the stop test ends."""
     alarms = unbounded = caught = 0
     for case in cases:
         run = lab.run("runge-kutta", case)
@@ -106,7 +106,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
         if free.ended == "overflow" or float(np.abs(free.omega).max()) > bound:
             unbounded += 1
             caught += run.stop is not None
-    # Each component is 1 / (1 - t): unbounded at t = 1 whatever the method.
+    # Every component is 1 / (1 - t), which is unbounded at t = 1 s with any method.
     ours = Scene("unbounded", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0), steps=200)
     numbers = {
         "bounded runs stopped": float(alarms),
@@ -123,7 +123,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 
 
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
-    """Measure what a tenth of the step gains the collocation programs."""
+    """Measure how much a tenth of the step reduces the errors of the collocation programs."""
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
         constant = [case for case in cases if not lab.scene(case).torque.varies]
@@ -132,7 +132,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Count the cases that improve, by which of the step's literals were changed to a tenth."""
+    """Count the cases that improve, for each subset of the step's literals divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -149,14 +149,14 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
 
 
 def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Measure what a tenth of the step gains the Runge-Kutta program, without its stop test."""
+    """Measure how much a tenth of the step reduces Runge-Kutta's error, without the stop test."""
     return judged(rules.small_step_runge_kutta(lab, cases))
 
 
 def suffices(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float, enough: int
 ) -> Judged:
-    """Count the cases in which models of three and four terms stay near the truth."""
+    """Count the cases in which the models of three and four terms stay near the reference."""
     numbers, good = {}, 0
     for case in cases:
         truth = lab.truth(case)
@@ -171,7 +171,7 @@ def suffices(
 
 
 def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
-    """Count the floating-point operations of a step on the cards, with our own LEQT1F."""
+    """Count the floating-point operations per step on the cards and in our own LEQT1F."""
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers, inside = {}, []
     for way, told in (("written", "as written"), ("once", "common terms once")):
@@ -186,7 +186,7 @@ def execution_time(lab: Laboratory, low: float, high: float) -> Judged:
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Count operations: nothing of today's machines tells of that one's seconds."""
+    """Count operations, because run times today say nothing about the original machine."""
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers = {
         f"{program}: operations in 100 steps": 100.0 * each.written
@@ -214,7 +214,7 @@ def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
 
 
 def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Try the other weightings on the cases whose solution is known."""
+    """Measure the errors of the other weightings in the cases with a known solution."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers, useless, worst = {}, False, 0.0
@@ -226,7 +226,7 @@ def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
                 error = _error(lab, case, Member(weighting, n))
                 numbers[f"case {case}, {weighting}, {n} terms: error (rad/s)"] = error
                 useless |= error > scale
-                # Errors of rounding are equally good.
+                # Errors at the level of rounding count as equal.
                 worst = max(worst, error / max(best, 1e-12 * scale))
     return graded(numbers, useless, worst > 10.0)
 
@@ -234,9 +234,10 @@ def others_failed(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 def computer_error(
     lab: Laboratory, limit: float, words: Sequence[str], cases: Sequence[int]
 ) -> Judged:
-    """Measure rounding alone: Case 1, which every member solves exactly, at ever smaller steps.
+    """Measure rounding error alone, in Case 1, at ever smaller steps.
 
-    And the methods as IV.2 describes them, in words of the machine.
+    Every member of the family solves Case 1 exactly but for rounding. Also compare the methods as
+    IV.2 describes them, run in words of the machine, with binary64.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -247,7 +248,7 @@ def computer_error(
             found = run(scene, Member(weighting, 4)).omega[parts - 1 :: parts]
             error = distance(found, lab.truth(1).omega)
             numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
-    # The machine's own words, the products written out: what they differ by is rounding.
+    # With products written out, runs in the machine's own words differ by rounding alone.
     for weighting in _OTHERS:
         floats = {case: march(lab.scene(case), weighting) for case in cases}
         for word in words:
@@ -259,7 +260,7 @@ def computer_error(
 
 
 def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -> Judged:
-    """Measure the error of every other weighting over that of collocation."""
+    """Measure the error of every other weighting, divided by the error of collocation."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {}
@@ -276,7 +277,7 @@ def only_collocation(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]
 def all_succeed(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float
 ) -> Judged:
-    """Measure the error of every weighting over the largest omega."""
+    """Measure the error of every weighting, divided by the largest omega."""
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
     numbers = {
@@ -292,7 +293,10 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Compare the corrected programs with one prediction and one correction of the family."""
+    """Compare the corrected programs with collocation members that make one correction.
+
+    Also measure the error of four-term collocation with zero to three corrections.
+    """
     best = Laboratory(False, lab.assumptions)
     numbers = {}
     for case in cases:

@@ -1,8 +1,8 @@
-"""Claims over many starts at once: the rules of the ledger on a bench of arrays.
+"""Verdicts on claims from many initial omegas at once, by the rules of the ledger on arrays.
 
-A sweep gives the starts, the listing, the readings and the steps; one start stands for all cases
-in which the thesis gives none. `getattr` of this module, by the name of a claim in `JUDGED`, is the
-function that a sweep calls.
+A sweep supplies the starts (values of omega(0)), the listing, the readings and the steps. Each
+start is used in all cases in which the thesis gives none. A sweep calls the attribute of this
+module with the name of a claim in `JUDGED`; `__getattr__` returns the function.
 """
 
 from collections.abc import Callable
@@ -28,19 +28,19 @@ from pyharness.original.many import run_many
 from pyharness.scenes.rotated import restarted_at
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
-# Arrays of a batch that say what the cases of Table 1 do.
+# Arrays of a batch that would replace values of the cases in Table 1.
 _OF_CASES = {"moments", "coefficients", "torque_constant", "torque_rate"}
-_EFFORT = 1e9  # of a sweep, whose time was told before
+_EFFORT = 1e9  # work limit, in effect none: a sweep reports its expected time beforehand
 
 
 class Starts:
-    """A bench of n starts, where the case's is not given; the listing and the rest as one's.
+    """A bench of n starts for the cases without a given one; all else is as in `one`.
 
-    The solution is marched from row to row by the series, each to 1e-12.
+    The Taylor series integrates the reference solution from row to row, each row to 1e-12.
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Run nothing yet."""
+        """Store the laboratory and the starts, without running anything yet."""
         self._one, self._omega0 = one, omega0
         self._solution = cache(self._marched)
         self._error = cache(partial(rules.largest_error, self))
@@ -48,24 +48,24 @@ class Starts:
         self._models = cache(self._modelled)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return a case; its own start stands for those of the bench."""
+        """Return the scene of a case; its omega(0) is not a start of the bench."""
         return self._one.scene(case, parts)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case; (n, steps, 3), or (steps, 3) where the start is given."""
-        # Runs of smaller steps are asked for once, for their error, which is kept.
+        """Run a program on a case; shape (n, steps, 3), or (steps, 3) if the start is given."""
+        # Runs with smaller steps are requested once, for their error, which is cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def solution(self, case: int) -> Array:
-        """Return the true omega of a case at its steps, with shapes as of `runs`."""
+        """Return the reference omega (rad/s) of a case at its steps, with shapes as in `runs`."""
         return self._solution(case)
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest errors (rad/s) at the steps of the case; inf on overflow."""
+        """Return the largest errors of omega (rad/s) at the steps of the case; inf on overflow."""
         return self._error(program, case, may_stop, parts)
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega of the collocation models, in arithmetic that is theirs to rounding."""
+        """Return omega of the collocation models, equal to `Laboratory.models` but for rounding."""
         return self._models(case, terms)
 
     def _starts(self, case: int) -> Array:
@@ -112,9 +112,9 @@ class Starts:
 
 
 JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))
-"""The claims that have a rule over starts."""
+"""The identifiers of the claims that have a rule for many starts."""
 FUNCTIONS = {name: f"{__name__}:{name}" for name in JUDGED}
-"""Where the function of each stands, for a sweep."""
+"""The import path of the function of each claim, for a sweep."""
 
 
 def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
@@ -124,10 +124,11 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return for each start of a sweep whether a claim holds of the programs.
+    """Return the verdict code of a claim about the programs for each start of a sweep.
 
-    Silent where the sweep is of no case of Table 1, or varies more of it than starts, readings and
-    steps. Of the case a claim is about nothing is asked: it is the claim's own.
+    The code is SILENT if the sweep's scene is no case of Table 1, or if the sweep varies more than
+    starts, readings and steps. The claim itself determines which cases are run, whatever the case
+    of the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -140,7 +141,7 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return the codes of a claim over the n starts of a bench."""
+    """Return the verdict codes of a claim from the n starts of a bench."""
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)
@@ -148,12 +149,12 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 
 @lru_cache(maxsize=2)
 def _bench(one: Laboratory, batch: Batch) -> Starts:
-    # Two: of the steps asked for, and of those of claims that do not hang on them.
+    # Two benches: with the requested steps, and for claims that do not depend on the steps.
     return Starts(one, batch.omega0)
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
-    """Return where claims about a sweep are tested; None where they say nothing of it."""
+    """Return the laboratory that tests claims for a sweep; None if claims do not apply to it."""
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None
     deck = facts("cases")["deck"]

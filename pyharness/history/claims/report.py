@@ -1,4 +1,4 @@
-"""The reports of `claims`: the ledger, the story of one claim, the assignments."""
+"""The reports of `claims`: all verdicts, one claim in detail, and initial omegas."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from typing import Any
 from pyharness.history.claims.ledger import Assignment, Judgement
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, short, words
 
-# A verdict in the ledger, and below it.
+# How a verdict is written in the ledger, and in the legend below the ledger.
 _VERDICTS = {
     "reproduced": ("yes", "reproduced (yes)"),
     "reproduced in part": ("in part", "in part"),
@@ -36,7 +36,7 @@ KINDS = {
     "history": "what others did, and what the author did",
     "recommendation": "neither true nor false, and so not testable",
 }
-"""The kinds of claims, and what they are about."""
+"""The kinds of claims, each with its subject."""
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
@@ -77,7 +77,7 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 
 
 def explanation(judgement: Judgement) -> Report:
-    """Report the story of one claim."""
+    """Report one claim: its quotation, its rule, its verdicts and the numbers behind them."""
     entry = judgement.claim
     text: list[Section] = [
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
@@ -103,7 +103,7 @@ def explanation(judgement: Judgement) -> Report:
 
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
-    """Report which starts let the claims of each case hold, for the original programs."""
+    """Report with which initial omegas the claims on each case hold for the original programs."""
     text: list[Section] = [
         [
             "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
@@ -146,7 +146,7 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
-    """Return the assumptions without which a verdict turns, each once."""
+    """Return the assumptions on which a verdict depends, each once."""
     turning = (
         each.assumption.replace("conjecture ", "").replace("reading ", "")
         for each in judgement.survivals
@@ -156,7 +156,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number of a claim as people read it."""
+    """Return a number of a claim as text for readers."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

@@ -1,8 +1,8 @@
-"""Rules of claims that hang on starts: of one start, or of many side by side.
+"""Rules of the claims that depend on the initial omega (the start), for one start or many.
 
-A bench gives runs and solutions: `Laboratory` those of one start, `Starts` those of many. Their
-arrays end in (steps, 3), and what stands before that is the starts' shape: () or (n,). A rule gives
-numbers of this shape, and where they reproduce the claim as a whole, or in part.
+A bench supplies runs and solutions: `Laboratory` for one start, `Starts` for n starts. Their arrays
+have the shape (..., steps, 3), where ... is the shape of the starts, () or (n,). A rule returns
+numbers of this shape, and flags that say where the claim is reproduced as a whole, or in part.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,9 +20,9 @@ Flags = NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
-    """Runs of a program: omega (..., steps, 3) is NaN where a run has no row.
+    """The runs of a program from one start or many.
 
-    `steps` is how many rows it has.
+    `omega` (rad/s), shape (..., steps, 3), is NaN where a run has no row. `steps` counts the rows.
     """
 
     omega: Array
@@ -32,7 +32,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """What a rule found: its numbers, where the claim is reproduced, and where in part."""
+    """The result of a rule: its numbers, where the claim is reproduced, and where in part."""
 
     numbers: Mapping[str, Any]
     whole: Any
@@ -40,38 +40,41 @@ class Grade(NamedTuple):
 
 
 class Bench(Protocol):
-    """What rules ask for; `parts` makes steps so much smaller, and keeps the rows of the case."""
+    """The runs and solutions that rules need.
+
+    `parts` divides the step size by this factor; the rows are still at the steps of the case.
+    """
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return a case; its own start stands for those of the bench."""
+        """Return the scene of a case; its omega(0) need not be a start of the bench."""
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         """Run a program on a case."""
 
     def solution(self, case: int) -> Array:
-        """Return the true omega of a case at its steps."""
+        """Return the reference omega (rad/s) of a case at its steps."""
 
     def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return what `largest_error` finds."""
+        """Return the result of `largest_error`."""
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega of the collocation model of so many terms; NaN from an overflow on."""
+        """Return omega of the collocation model with `terms` terms; NaN from an overflow on."""
 
 
 def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
-    """Measure how far the third component moves."""
+    """Measure the range of omega3."""
     moved = spread_of(bench.solution(case))[..., 2]
     return Grade({"range of omega3 (rad/s)": moved}, moved > limit)
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Hold all programs against the known solution, at the precision of the page."""
+    """Compare all programs with the known solution, at the precision of the printed page."""
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
 
 def concur(bench: Bench, case: int, share: float) -> Grade:
-    """Hold the two collocation programs against one another."""
+    """Compare the two collocation programs with each other."""
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
     apart = _farthest(two.omega, four.omega)
@@ -90,7 +93,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """See how the Runge-Kutta program ended, and how far from the truth."""
+    """Find how the Runge-Kutta program ended, and how large its error is."""
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
     ended, far = ~runs.complete, error > share
@@ -99,20 +102,20 @@ def fails(bench: Bench, case: int, share: float) -> Grade:
 
 
 def diverged(bench: Bench, case: int) -> Grade:
-    """See whether the two-term run left its bounds."""
+    """Test whether the two-term run diverged."""
     runs, error = bench.runs("two-term", case), bench.error("two-term", case)
     numbers = {"steps": runs.steps, "largest error (rad/s)": error}
     return Grade(numbers, runs.overflow | (error > largest_of(bench.solution(case))))
 
 
 def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -> Grade:
-    """Hold models of several numbers of terms against one another."""
+    """Compare models with different numbers of terms."""
     first, *others = terms
     model, largest = bench.models(case, first), largest_of(bench.solution(case))
     numbers = {}
     for n in others:
         other = bench.models(case, n)
-        # What overflowed concurs with nothing.
+        # A run that overflowed agrees with no other run.
         lost = ~(np.isfinite(other) & np.isfinite(model)).all(axis=(-1, -2))
         apart = np.where(lost, np.inf, _farthest(other, model).max(axis=-1)) / largest
         numbers[f"{n} terms against {first}, over the largest omega"] = apart
@@ -120,7 +123,7 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 
 
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
-    """Measure the largest angular acceleration of the four-term run, case by case."""
+    """Measure the largest angular acceleration of the four-term run in each case."""
     rates = {}
     for each in range(1, 8):
         omega = bench.runs("four-term", each).omega
@@ -134,7 +137,7 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 
 
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
-    """Measure what a tenth of the step gains the collocation programs."""
+    """Measure how much a tenth of the step reduces the errors of the collocation programs."""
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
         for case in cases:
@@ -152,7 +155,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 
 
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
-    """Measure what a tenth of the step gains the Runge-Kutta program, without its stop test."""
+    """Measure how much a tenth of the step reduces Runge-Kutta's error, without the stop test."""
     numbers = {}
     for case in cases:
         before, after = (
@@ -174,7 +177,7 @@ def largest_error(
 
 
 def share_of_range(omega: Array, truth: Array) -> Array:
-    """Return the largest error of a component that moves, over its range."""
+    """Return the largest error of any varying component, divided by the range of the component."""
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]
     with np.errstate(all="ignore"):
@@ -183,17 +186,17 @@ def share_of_range(omega: Array, truth: Array) -> Array:
 
 
 def spread_of(omega: Array) -> Array:
-    """Return how far each component moves (rad/s), (..., 3)."""
+    """Return the range of each component over the steps (rad/s), shape (..., 3)."""
     return np.moveaxis(np.ptp(_by_component(omega), axis=-1), 0, -1)
 
 
 def largest_of(omega: Array) -> Array:
-    """Return the largest component of omega (rad/s), (...)."""
+    """Return the largest magnitude of any component of omega (rad/s), shape (...)."""
     return np.asarray(np.abs(omega).max(axis=(-1, -2)))
 
 
 def _farthest(first: Array, second: Array) -> Array:
-    """Return the largest difference of each component at the rows that both have, (..., 3)."""
+    """Return the largest difference of each component over the common rows, shape (..., 3)."""
     with np.errstate(all="ignore"):
         apart = _by_component(first - second)
         np.abs(apart, out=apart)
@@ -201,7 +204,7 @@ def _farthest(first: Array, second: Array) -> Array:
 
 
 def _by_component(omega: Array) -> Array:
-    """Return (3, ..., steps), in whose rows NumPy is ten times as fast."""
+    """Return omega as a contiguous (3, ..., steps) array, which NumPy reduces ten times as fast."""
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 

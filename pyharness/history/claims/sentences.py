@@ -1,4 +1,4 @@
-"""Sections V and VI of the thesis, sentence by sentence: which claims judge each, or why none."""
+"""The sentences of sections V and VI of the thesis, each with its claims or a reason for none."""
 
 from typing import NamedTuple
 
@@ -6,22 +6,22 @@ from pyharness.model.facts import facts
 
 
 class Sentence(NamedTuple):
-    """A sentence of the thesis; what it does not have is empty.
+    """A sentence of the thesis; fields that do not apply are empty.
 
     Attributes
     ----------
     where : str
-        Its section, with the paragraph, the case or the recommendation.
+        The section, with the paragraph, the case or the recommendation.
     quote : str
-        A few words of it.
+        A few words of the sentence.
     claims : tuple of str
-        The claims that judge it.
+        The identifiers of the claims that the sentence makes.
     why : str
-        Where there is none, what the sentence does instead.
+        For a sentence without claims, its function in the text.
     laboratory : str
-        The run that shows it best: ``case=2&program=two-term``, in words of the command line.
+        The run that shows the sentence best, as options of `run`: ``case=2&program=two-term``.
     command : str
-        What shows it better than its claims explained, without ``pyharness``.
+        A command, without ``pyharness``, that shows more than `claims --explain` of its claims.
     """
 
     where: str

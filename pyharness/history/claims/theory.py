@@ -1,4 +1,4 @@
-"""Tests of the claims of sections I to IV that are not about a run: history, theory, orders.
+"""Tests of the claims about history, theory and orders, most of them in sections I to IV.
 
 Each function is the `test` of entries in `data/claims.toml`, as in `verdicts`.
 """
@@ -25,7 +25,10 @@ Weights = Sequence[Callable[[Array], Any]]
 
 
 def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Hold Jacobi's elliptic functions against the reference in cases said to have no solution."""
+    """Compare Jacobi's elliptic functions with the reference.
+
+    The thesis says that the solutions of these cases are not known.
+    """
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -37,7 +40,7 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Judge a statement of history, which no run can test, as its sources do."""
+    """Return the verdict of the sources on a statement of history, which no run can test."""
     return Judged(REPRODUCED if holds else FALSE, {})
 
 
@@ -49,7 +52,7 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
     scene, truth = lab.scene(case), lab.truth(case)
     assert scene.moments is not None
     moments = scene.moments
-    # Any attitude will do, away from the singular one; angles 3-1-3.
+    # Any attitude serves that is not near the singular one; the angles are 3-1-3 (rad).
     begin = (0.3, 1.1, -0.4)
     momenta = _angle_rates_to_omega(begin).T @ (np.array(moments) * scene.omega)
     found = solve_ivp(
@@ -63,7 +66,7 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
-    """Return the matrix that turns rates of the angles 3-1-3 into omega in body axes."""
+    """Return the matrix that maps the rates of the 3-1-3 angles to omega in body axes."""
     _, theta, psi = angles
     return np.array(
         [
@@ -75,14 +78,14 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 
 
 def _omega(moments: Triple, state: Array) -> Array:
-    """Return omega from angles and momenta."""
+    """Return omega (rad/s) from the 3-1-3 angles and their conjugate momenta."""
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
     rates: Array = momentum / np.array(moments)
     return rates
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq of H = sum I omega**2 / 2."""
+    """Return dH/dp and -dH/dq of the Hamiltonian H = sum I omega**2 / 2."""
     theta, psi = float(state[1]), float(state[2])
     omega = _omega(moments, state)
     matrix = _angle_rates_to_omega(state[:3])
@@ -108,7 +111,7 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 
 
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
-    """Form quotients of a bounded function, the square root on (0, 1), ever nearer to 0."""
+    """Compute quotients (f(y) - f(x)) / (y - x) of the square root on (0, 1), ever nearer to 0."""
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
     numbers = {"bound of the function": 1.0, "largest quotient": float(quotients.max())}
@@ -118,7 +121,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Measure the power of the step with which the error of one step falls."""
+    """Measure the power p for which the error of one step of size h is O(h**p)."""
     numbers = {}
     for case in cases:
         numbers[f"case {case}: power of the step"] = _power(
@@ -129,7 +132,7 @@ def local_error(
 
 
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Hold one step of Runge-Kutta against the Taylor series with its terms to h**4."""
+    """Compare one step of Runge-Kutta with the Taylor series up to h**4."""
     numbers, same, near = {}, True, True
     for case in cases:
         scene = lab.scene(case)
@@ -147,7 +150,7 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 
 def _stepped(scene: Scene, method: str) -> Array:
-    """Return omega at the end of a scene by a method of fixed steps, which takes no tolerance."""
+    """Return omega at the end of a scene, by a fixed-step method without a tolerance."""
     omega: Array = solve(scene, scene.times(), method).omega[-1]
     return omega
 
@@ -157,7 +160,7 @@ def _power(
     method: Callable[[Scene], Array],
     truth: Callable[[Scene], Array] | None = None,
 ) -> float:
-    """Return the power of the step with which one step of a method nears the truth."""
+    """Return the power of the step size with which one step of a method approaches the truth."""
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
         short = replace(scene, step_size=step_size, steps=1)
@@ -167,7 +170,7 @@ def _power(
 
 
 def _taylor_step(scene: Scene, order: int) -> Array:
-    """Return omega after one step by its Taylor series; the torque is constant."""
+    """Return omega after one step of its Taylor series; the torque must be constant."""
     coefficients = np.array(scene.euler_coefficients)
     torque = np.array(scene.normalized_torque(0.0))
     terms = [np.array(scene.omega)]
@@ -183,10 +186,10 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 
 
 def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
-    """Solve dx/dt = -x, x(0) = 1 on (0, 1) by 1 + c1 t + c2 t**2, weighted in four ways."""
+    """Solve dx/dt = -x, x(0) = 1 on (0, 1) with 1 + c1 t + c2 t**2, by four weightings."""
     t, weight = np.polynomial.legendre.leggauss(12)
     t, weight = (t + 1.0) / 2.0, weight / 2.0
-    # The residual of c1 and of c2, and of neither: R = base + c1 r1 + c2 r2.
+    # The residual is R = base + c1 r1 + c2 r2; the columns are for r1, r2 and -base.
     rows = {
         "collocation": np.array([[1 + s, 2 * s + s**2, -1.0] for s in (1 / 3, 2 / 3)]),
         "subdomain": _weighted(t, weight, (lambda s: s < 0.5, lambda s: s >= 0.5)),
@@ -208,7 +211,7 @@ def crandall_example(lab: Laboratory, best: list[str]) -> Judged:
 
 
 def _weighted(t: Array, weight: Array, by: Weights) -> Array:
-    """Return, a row for each weighting, the integrals that c1 and c2 have to balance."""
+    """Return the linear equations for c1 and c2, a row of integrals for each weight function."""
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
     for function in by:
@@ -221,7 +224,7 @@ def _weighted(t: Array, weight: Array, by: Weights) -> Array:
 
 
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Hold Re Q of eq. 32 against the growth of a small disturbance of each steady rotation."""
+    """Compare Re Q of eq. 32 with the growth rate of a perturbation of each steady rotation."""
     numbers, told = {}, True
     for case in cases:
         scene = lab.scene(case)
@@ -229,7 +232,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
             disturbance = 1e-8 * math.hypot(*each.omega) * np.array([0.6, 0.5, 0.4])
             start = tuple((each.omega + disturbance).tolist())
             rate = each.rates[0].real
-            # Later what shrinks is gone, and sooner what grows is small.
+            # By then the decaying part has vanished, and the growing part is still small.
             times = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
             if rate:
                 times = np.array([8.0, 10.0]) / rate
@@ -248,7 +251,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 
 
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
-    """Hold trial solutions of eq. 32 about axis 3, at the start's own omega3, against the truth."""
+    """Compare trial solutions of eq. 32 about axis 3, at the initial omega3, with the reference."""
     numbers = {}
     for case in cases:
         scene, truth = lab.scene(case), lab.truth(case)
@@ -263,7 +266,7 @@ def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 
 def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Run the linear trial function on a linear top."""
+    """Integrate a linear top by the linear trial function, with one term."""
     found = run(lab.scene(case), Member("collocation", 1))
     truth = lab.truth(case)
     share = distance(found.omega, truth.omega) / largest(truth)
@@ -272,7 +275,7 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
-    """Look for products that are left in symmetric bodies: the sphere, and the top."""
+    """Test whether the coefficients of the products vanish in symmetric bodies."""
     left = {
         f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
         for case in cases
@@ -294,7 +297,7 @@ def step_on_cards(lab: Laboratory, step: float) -> Judged:
 
 
 def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
-    """Count the steps whose points of collocation all lie inside the interval."""
+    """Measure the fraction of steps whose collocation points are all inside the interval."""
     (case,) = cases
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
@@ -308,7 +311,7 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def possible_bodies(lab: Laboratory, cases: list[int]) -> Judged:
-    """Hold the moments of every case against the triangle inequality of rigid bodies."""
+    """Test whether the moments of every case satisfy the triangle inequality of rigid bodies."""
     excess = {}
     for case in cases:
         first, second, third = sorted(lab.scene(case).moments or (), reverse=True)

@@ -1,8 +1,8 @@
-"""Tests of the claims: a laboratory and parameters in, a verdict and its numbers out.
+"""Tests of the claims about one case; each test returns a verdict with its numbers.
 
-Each function is the `test` of entries in `data/claims.toml`, whose `rule` says in words what the
-function decides, and whose `parameters` are its keywords. No number is typed in. First those of
-one case, then those of several, of what the programs cost, and of what is beyond the listed ones.
+Each function is the `test` of one or more entries in `data/claims.toml`. The entry's `rule` says in
+words what the function decides, and its `parameters` are keyword arguments. All numbers are
+computed. The tests over several cases are in `methods`.
 """
 
 import math
@@ -28,7 +28,7 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True)
 class Judged:
-    """A verdict with the numbers that it rests on."""
+    """A verdict with the numbers that support it."""
 
     verdict: str
     numbers: dict[str, float]
@@ -37,40 +37,40 @@ class Judged:
 def graded(
     numbers: dict[str, float], whole: bool, part: bool = False, otherwise: str = NOT_REPRODUCED
 ) -> Judged:
-    """Return the verdict: reproduced as a whole, in part, or otherwise."""
+    """Return the verdict: reproduced if `whole`, in part if `part`, else `otherwise`."""
     return Judged(REPRODUCED if whole else IN_PART if part else otherwise, numbers)
 
 
 def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
-    """Return the verdict of a rule on one start."""
+    """Return the verdict that the grade of a rule gives for one start."""
     numbers = {name: float(each) for name, each in grade.numbers.items()}
     return graded(numbers, bool(grade.whole), bool(grade.part), otherwise)
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Measure how far the solution moves."""
+    """Measure by how much the solution varies."""
     moved = float(ranges(lab.truth(case)).max())
     return graded({"change over the run (rad/s)": moved}, moved <= 1e-12, otherwise=FALSE)
 
 
 def known_solution(lab: Laboratory, case: int) -> Judged:
-    """Hold the printed solution against the reference."""
+    """Compare the solution printed in the thesis with the reference."""
     truth = lab.truth(case)
     t = truth.time
     printed = np.column_stack([np.sin(5 * t), np.cos(5 * t), np.full_like(t, 10.0)])
     apart = distance(printed, truth.omega)
-    # The phase 5 t is itself rounded.
+    # The phase 5 t is itself rounded, so the bound grows with t.
     allowed = 1e-15 * (1.0 + 5.0 * float(t[-1]))
     return graded({"distance from the reference (rad/s)": apart}, apart <= allowed, False, FALSE)
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Measure how far the third component moves."""
+    """Measure the range of omega3."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Hold all programs against the known solution, at the precision of the page."""
+    """Compare all programs with the known solution, at the precision of the printed page."""
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
         other = replace(lab, assumptions=replace(lab.assumptions, start=start))
@@ -84,7 +84,7 @@ def _shown(start: Triple) -> str:
 
 
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
-    """Hold collocation against the known solution, on the scale of the graph."""
+    """Compare collocation with the known solution, on the scale of the graph."""
     numbers = {}
     for program in COLLOCATION:
         runs, truth = lab.runs(program, case), lab.solution(case)
@@ -94,7 +94,7 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
-    """Measure the largest error as a part of the amplitude."""
+    """Measure the largest error of collocation as a fraction of the amplitude."""
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     numbers = {
         f"{program}: largest error over the amplitude": lab.error(program, case) / amplitude
@@ -104,14 +104,14 @@ def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
 
 
 def poor(lab: Laboratory, case: int, share: float) -> Judged:
-    """Measure the Runge-Kutta program's largest error as a part of the amplitude."""
+    """Measure the largest error of the Runge-Kutta program as a fraction of the amplitude."""
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     found = lab.error("runge-kutta", case) / amplitude
     return graded({"largest error over the amplitude": found}, found > share)
 
 
 def error_constant(lab: Laboratory, case: int) -> Judged:
-    """Hold the error at the end of the run against that at its beginning."""
+    """Compare the error in the last fifth of the run with the error in the first fifth."""
     truth = lab.truth(case).omega
     numbers = {}
     for program in COLLOCATION:
@@ -123,7 +123,7 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 
 
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
-    """Find the step at which the stop test ended the run, and who else stops there."""
+    """Find the step at which the stop test ended the run, and which other listings stop there."""
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
     every = [
@@ -148,7 +148,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Hold the first component at the end of the run against the solution there."""
+    """Compare omega1 at the end of the run with the solution at that time."""
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
@@ -156,7 +156,7 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Measure what there was to find: what correcting everything gains at the steps that ran."""
+    """Measure how much the corrected program reduces the error, at the steps that the run has."""
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
     truth = lab.truth(case).omega[: run.steps]
@@ -165,35 +165,35 @@ def search(lab: Laboratory, case: int) -> Judged:
 
 
 def concur(lab: Laboratory, case: int, share: float) -> Judged:
-    """Hold the two collocation programs against one another."""
+    """Compare the two collocation programs with each other."""
     return judged(rules.concur(lab, case, share))
 
 
 def fails(lab: Laboratory, case: int, share: float) -> Judged:
-    """See how the Runge-Kutta program ended, and how far from the truth."""
+    """Find how the Runge-Kutta program ended, and how large its error is."""
     return judged(rules.fails(lab, case, share))
 
 
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
-    """Measure the difference of the collocation programs over the largest omega."""
+    """Measure the difference of the collocation programs, relative to the largest omega."""
     two, four = (lab.run(program, case).omega for program in COLLOCATION)
     apart = distance(two, four) / largest(lab.truth(case))
     return graded({"difference over the largest omega": apart}, apart > share)
 
 
 def more_reliable(lab: Laboratory, case: int) -> Judged:
-    """Measure the four-term error over the two-term one."""
+    """Measure the ratio of the four-term error to the two-term error."""
     ratio = lab.error("four-term", case) / lab.error("two-term", case)
     return graded({"four-term error over two-term error": ratio}, ratio <= 0.5, ratio <= 0.8)
 
 
 def diverged(lab: Laboratory, case: int) -> Judged:
-    """See whether the two-term run left its bounds."""
+    """Test whether the two-term run diverged."""
     return judged(rules.diverged(lab, case))
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
-    """See whether motion or program is to blame: hold the corrected models against each other."""
+    """Compare the corrected models, to tell whether the motion or the program causes the error."""
     numbers = {}
     for start in starts():
         best = Laboratory(False, replace(lab.assumptions, start=start))
@@ -204,10 +204,10 @@ def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
 
 
 def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]) -> Judged:
-    """Hold models of several numbers of terms against one another."""
+    """Compare models with different numbers of terms."""
     return judged(rules.models_concur(lab, case, share, terms))
 
 
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
-    """Measure the largest angular acceleration of the four-term run, case by case."""
+    """Measure the largest angular acceleration of the four-term run in each case."""
     return judged(rules.dynamic(lab, case, factor))

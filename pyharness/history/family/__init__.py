@@ -1,1 +1,1 @@
-"""The weighted residual methods as one family: orders derived, and orders measured."""
+"""The weighted residual methods as one family, with derived and measured orders."""

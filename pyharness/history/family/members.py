@@ -1,11 +1,11 @@
-"""The weighted residual family of III.1 and IV.2: any weighting, number of terms, corrections.
+"""The weighted residual family of III.1 and IV.2: any weighting, terms and corrections.
 
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
-omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, as it is at the beginning;
-each correction takes f along the estimate before it and chooses the c's so that the integrals of
-W (omega' - f) vanish (eq. 26). The thesis does one correction.
+omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant, with its value at the
+beginning of the step. Each correction evaluates f along the previous estimate, and chooses the c's
+so that the integrals of W (omega' - f) vanish (eq. 26). The thesis makes one correction.
 
-What a correction does is the same in every step: see `pyharness.theory.tableau`.
+A correction has the same coefficients in every step: see `pyharness.theory.tableau`.
 """
 
 import math
@@ -24,18 +24,19 @@ WEIGHTINGS = ("collocation", "subdomain", "galerkin", "least-squares")
 POINTS = ("thesis", "gauss")
 MOST_TERMS = 12
 MOST_CORRECTIONS = 100
-# Beyond it, the points lie so close together that half the digits are lost.
+# Above this condition number the points are so close together that half the digits are lost.
 _WORST_CONDITION = 1e8
 
 
 @dataclass(frozen=True)
 class Member:
-    """One method of the family; InputError where there is no such method.
+    """One method of the family; the constructor raises InputError if there is no such method.
 
-    The weighting of least squares is that of f held (eq. 25 with dR/dc_i = i t**(i-1)); there are n
-    terms, the powers of t in the trial function, and k corrections of the first estimate. Points
-    are where collocation, and it alone, makes the residual vanish, in parts of the step: k/(n+1),
-    those of Gauss and Legendre, or n different numbers from 0 to 1.
+    `terms` is n, the number of powers of t in the trial function. `corrections` counts the
+    corrections of the first estimate. Least squares takes its weights with f held constant (eq. 25
+    with dR/dc_i = i t**(i-1)). `points` is for collocation only: the points where the residual
+    vanishes, as fractions of the step. They are k/(n+1) (`thesis`), the points of Gauss and
+    Legendre (`gauss`), or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -44,7 +45,7 @@ class Member:
     corrections: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse what is no method."""
+        """Raise InputError if the fields do not define a method."""
         if self.weighting not in WEIGHTINGS:
             raise unknown("weighting", self.weighting, WEIGHTINGS)
         if not 1 <= self.terms <= MOST_TERMS:
@@ -77,7 +78,7 @@ class Member:
 
     @property
     def points_label(self) -> str:
-        """What a table calls the points."""
+        """Return the name of the points in a table."""
         if self.points is None:
             return "-"
         if isinstance(self.points, str):
@@ -86,7 +87,7 @@ class Member:
 
 
 def converged_order(member: Member) -> int:
-    """Return the order of a member after ever more corrections (derived in docs/family.md)."""
+    """Return the order of a member with enough corrections, as derived in docs/family.md."""
     n = member.terms
     if member.weighting == "galerkin":
         return n
@@ -103,9 +104,10 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the power of h with which the error at a fixed time falls, for general motions.
+    """Return the order of a member: for general motions its global error is O(h**order).
 
-    The first estimate has order 1 and a correction gains one, up to the converged order.
+    The first estimate has order 1. Each correction raises the order by one, up to the converged
+    order.
     """
     return min(member.corrections + 1, converged_order(member))
 
@@ -113,9 +115,9 @@ def predicted_order(member: Member) -> int:
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene with one member (Jacobs 1982, III.1, eq. 20-27, and IV.2); no velocity.
 
-    The first estimate takes the torque at the beginning of the step, the corrections take it at
-    the true times. Error: the power `predicted_order` of the step, and about a unit in the last
-    place a step.
+    The first estimate evaluates the torque at the beginning of the step, and the corrections
+    evaluate it at the true times. The global error is O(h**p), with p from `predicted_order`. The
+    rounding error is about one unit in the last place per step.
     """
     omega = march(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -134,16 +136,16 @@ def run(scene: Scene, member: Member) -> Trajectory:
 
 
 def march(scene: Scene, members: Sequence[Member]) -> Array:
-    """Integrate a scene with several members side by side, which costs hardly more than one.
+    """Integrate a scene with several members at once, at hardly more cost than with one.
 
-    Returns omega (rad/s), shape (members, steps, 3); from an overflow on, what is not finite.
+    Return omega (rad/s), shape (members, steps, 3). It is not finite from an overflow on.
     """
-    # Those with many corrections first: those that still go on are then side by side in memory.
+    # Most corrections first: the members that still need one are then contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
     members = [members[i] for i in order]
     schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
     width = max(len(scheme.nodes) for scheme in schemes)
-    # Nodes that a member does not have stand at the beginning of the step and count nothing.
+    # Padding nodes are at the beginning of the step and have no weight.
     nodes = np.zeros((len(members), width))
     matrix = np.zeros((len(members), width, width))
     weights = np.zeros((len(members), 1, width))
@@ -179,7 +181,7 @@ def march(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return `_sums` of a matrix whose last axis is that of the members, three times as fast."""
+    """Return the product of `_sums`, three times as fast; members are the matrix's last axis."""
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)
@@ -191,20 +193,20 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
 
 def _sums(factors: Array, rates: Array) -> Array:
-    """Return a product of matrices for every member, summed in order and not by a BLAS."""
+    """Return the matrix product for every member, summed in order and not by a BLAS."""
     total: Array = np.einsum("mij,mjk->mik", factors, rates)
     return total
 
 
 def _rates(scene: Scene, torque: Array, omega: Array) -> Array:
-    rates = np.empty(omega.shape)  # rows as they are in memory decide how matmul rounds
+    rates = np.empty(omega.shape)  # C order, because the memory layout decides how matmul rounds
     for i, (a, j, k) in enumerate(zip(scene.euler_coefficients, (1, 0, 0), (2, 2, 1), strict=True)):
         rates[..., i] = torque[..., i] + a * omega[..., j] * omega[..., k]
     return rates
 
 
 def _torque(scene: Scene, times: Array) -> Array:
-    """Return the normalized torque at many times, shape (..., 3); one for all if constant."""
+    """Return the normalized torque at `times`, shape (..., 3), or (3,) if it is constant."""
     law = scene.body_torque
     torque = np.array(law.constant)
     if law.varies:

@@ -1,4 +1,4 @@
-"""What the members of the family are worth: orders measured against orders derived, errors."""
+"""The errors of the family's members, and their measured and derived orders."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,13 +19,13 @@ SCHEMES: tuple[tuple[str, str | None], ...] = (
     ("galerkin", None),
     ("least-squares", None),
 )
-# Steps over the horizon: every other entry halves the step. The horizon is first short, where an
-# error soon falls with its power alone, then longer for what is lost in rounding there, then
-# shorter still for scenes that are long.
+# Numbers of steps over the horizon; every other entry halves the step. The first horizon is short,
+# so that the leading term of the error dominates early. Longer ones follow for members whose error
+# is lost in rounding there. The last ones are shorter than the first, for long scenes.
 _LADDER = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 _HORIZONS = (1 / 4, 1 / 2, 1, 1 / 16, 1 / 64, 1 / 256)
-# Slopes count between these errors (relative to the largest omega at the horizon): above, the
-# error is not small, below, it is rounding, which stays under 1e-15 here.
+# A slope counts if both its errors, relative to the largest omega at the horizon, are in this
+# range. Above it, the error is not small. Below it, rounding error (at most 1e-15 here) matters.
 _LARGEST, _SMALLEST = 1e-2, 5e-14
 _SLOPES_WANTED = 4
 _SETTLED = 0.1
@@ -35,11 +35,11 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """One member in one scene: the order derived in docs/family.md, and that measured.
+    """The order of one member in one scene, as derived in docs/family.md and as measured.
 
-    None where the error is that of rounding, or never gets small; settled where it changed by less
-    than a tenth when the step was last halved. The error is the largest of any omega over the
-    scene's own steps (rad/s), infinite after an overflow.
+    `measured` is None if the error is rounding error alone, or never gets small. `settled` is true
+    if the last two measured values of the order differ by at most a tenth. `error` is the largest
+    error of any omega over the scene's own steps (rad/s), infinite after an overflow.
     """
 
     member: Member
@@ -50,19 +50,19 @@ class OrderFinding:
 
     @property
     def deviation(self) -> float:
-        """Measured less predicted; NaN where nothing was measured."""
+        """Return the measured minus the predicted order; NaN if no order was measured."""
         return math.nan if self.measured is None else self.measured - self.predicted
 
     @property
     def misses(self) -> bool:
-        """Whether the order is below that derived: above it may be, where a scene is special."""
+        """Return whether the order settled below the derived one; special scenes may exceed it."""
         return self.settled and self.deviation < -SLACK
 
 
 def family_members(
     terms: Sequence[int] = range(1, 6), corrections: Sequence[int] = range(1, 9)
 ) -> list[Member]:
-    """Return the members of the table: every scheme, these terms, these corrections."""
+    """Return a member for every scheme, number of terms and number of corrections."""
     return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
 
 
@@ -71,9 +71,9 @@ def order_table(
     members: Sequence[Member] | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[OrderFinding]:
-    """Measure orders and errors of many members, `family_members()` by default, side by side.
+    """Measure the orders and errors of many members at once, by default of `family_members()`.
 
-    InputError where the solution itself leaves every bound, or the steps are too many.
+    Raise InputError if the solution itself becomes unbounded, or if the scene has too many steps.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")
@@ -114,7 +114,7 @@ def order_table(
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the error at the horizon for ever smaller steps, shape (rungs, members)."""
+    """Return the errors at the horizon for ever smaller steps, shape (step sizes, members)."""
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
     for steps in _LADDER:
@@ -127,7 +127,7 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the powers between rungs that halve the step, where both errors count."""
+    """Return the orders that each halving of the step shows, where both errors are in range."""
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)

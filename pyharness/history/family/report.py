@@ -1,4 +1,4 @@
-"""The report of `family`."""
+"""The report of `family`: the orders and errors of its members."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from pyharness.model.scene_report import heading
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Report orders and errors, a row for each weighting and n."""
+    """Report orders and errors, with one row for each weighting, set of points and n."""
     names = ("predicted", "measured", "settled", "error")
     measures = [{name: getattr(each, name) for name in names} for each in found]
     data = [
@@ -37,7 +37,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Say how the orders measured stand to those derived."""
+    """Return sentences that compare the measured orders with the derived orders."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

@@ -1,1 +1,1 @@
-"""What turns a scene into a trajectory: the plan, the registry, one file for each family."""
+"""Methods that solve a scene: the plan, the registry, and one module for each family."""

@@ -1,4 +1,4 @@
-"""Pictures of an attitude: where the body's axes and omega point in space, and a turning brick."""
+"""Pictures of an attitude: the body's axes and omega in space, and an animated brick."""
 
 import io
 from pathlib import Path
@@ -16,16 +16,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ANIMATIONS = ("gif", "html")
-_COLORS = ("#c1272d", "#0a7d3c", "#1f4e9e")  # of the body's axes
-_PAUSE = 0.05  # s between frames; a GIF counts hundredths
-_SHORTEST, _LONGEST = 2.0, 10.0  # s of an animation in true time; else it takes the nearer one
+_COLORS = ("#c1272d", "#0a7d3c", "#1f4e9e")  # of the three axes of the body
+_PAUSE = 0.05  # s between frames; a GIF stores it in hundredths of a second
+# Limits of the length of an animation (s): between them it runs in true time.
+_SHORTEST, _LONGEST = 2.0, 10.0
 _EDGES = [
     (a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1
-]  # of a brick, whose corners are counted by the signs of their coordinates
+]  # of a brick, as pairs of corners; the bits of a corner's number are the signs of its coordinates
 
 
 def draw_sphere(axes: Any, found: Trajectory) -> None:
-    """Draw the unit sphere of space: where each axis of the body points, and where omega does."""
+    """Draw the paths of the body's axes and of the direction of omega on the unit sphere in space.
+
+    Dots and a cross mark their ends.
+    """
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -54,7 +58,10 @@ def _frame(axes: Any) -> None:
 
 
 def check_animation(path: str, scene: Scene) -> None:
-    """Refuse an animation that can't be made, before anything is computed for it."""
+    """Raise InputError if an animation of the scene can't be made or written to `path`.
+
+    The check needs no solution, so that it can come first.
+    """
     if _form(path) not in ANIMATIONS:
         raise InputError(f"--animate '{path}': allowed: a file .gif or .html")
     if scene.moments is None:
@@ -64,9 +71,10 @@ def check_animation(path: str, scene: Scene) -> None:
 
 
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
-    """Return a brick of these moments that turns until `end` (s), as GIF or as a page of its own.
+    """Return an animation of a brick with the scene's moments until `end` (s), as GIF or HTML page.
 
-    In true time where that takes 2 to 10 s; else the title says how much slower or faster.
+    A motion of 2 to 10 s is shown in true time. A shorter or longer one is stretched to 2 s or
+    compressed to 10 s, and the title states how much slower or faster it runs.
     """
     from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
@@ -104,7 +112,10 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 
 
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
-    """Draw what stays, and return what draws a frame."""
+    """Draw the static parts and return the function that draws a frame.
+
+    `rate` is the motion's time per second of the animation.
+    """
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
     assert found.attitude is not None
@@ -133,7 +144,7 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 
 
 def _brick(scene: Scene) -> Array:
-    """Return the corners of the brick with these moments, shape (8, 3), in a unit ball."""
+    """Return the corners of a brick with the scene's moments, shape (8, 3), in the unit ball."""
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

@@ -1,4 +1,4 @@
-"""Batches: a scene and the arrays in which others differ from it, solved by one call."""
+"""Batches of scenes: one scene, and arrays of the quantities that differ between the scenes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,16 +23,17 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.original.many import ProgramEnsemble, run_many
 
-# What programs take as arrays, and methods do not.
+# Quantities that may be arrays for a program, but not for a method.
 OF_PROGRAMS = ("step_size", "lipschitz")
-_EFFORT = 1e9  # the caller has requested the whole batch, and knows how long it takes
+_EFFORT = 1e9  # in effect no work limit: the caller has requested the whole batch
 
 
 @dataclass(frozen=True)
 class Solver:
     """The method or program that solves the scenes of a batch, with its settings.
 
-    Exactly one of `method` and `program` is given. `t_end` is None where the scene's steps say it.
+    Exactly one of `method` and `program` is given. If `t_end` (s) is None, the end is the product
+    of the scene's step size and its number of steps.
     """
 
     method: str | None = "auto"
@@ -49,22 +50,23 @@ class Solver:
 class Batch:
     """Scenes that share the method or program that solves them, and their results.
 
-    A result is computed when it is first read. The functions of claims may read `omega0`, `omega`,
-    `status`, `n_rows` and `stop_variable`, and call `rows` and `by_method`.
+    A result is computed when it is first read. The functions that check claims may read `omega0`,
+    `omega`, `status`, `n_rows` and `stop_variable`, and call `rows` and `by_method`.
 
     Attributes
     ----------
     scene : Scene
-        What all scenes have in common.
+        The quantities that all scenes have in common.
     solver : Solver
-        What solves them.
+        The method or program that solves the scenes, with its settings.
     listing : Listing, or None
         The listing of the program; None for a method.
     t_end : ndarray, shape (n,)
-        The times of the ends, s.
+        The final time of each scene, s.
     arrays : mapping
-        What the scenes differ in, by the names of arguments of `solve_many` and `run_many`, a row
-        for each scene: always `omega0`; for programs `step_size` and `lipschitz` too.
+        The quantities that differ between the scenes, one row for each scene. The keys are names of
+        arguments of `solve_many` and `run_many`: always `omega0`; for programs `step_size` and
+        `lipschitz` too.
     """
 
     scene: Scene
@@ -75,54 +77,57 @@ class Batch:
 
     @property
     def omega0(self) -> Array:
-        """Initial angular velocities, (n, 3), rad/s."""
+        """Return the initial angular velocities, shape (n, 3), rad/s."""
         return self.arrays["omega0"]
 
     @property
     def step_sizes(self) -> Array:
-        """Step sizes, (n,), s."""
+        """Return the step sizes, shape (n,), s."""
         return self.arrays.get("step_size", np.full(len(self.omega0), self.scene.step_size))
 
     @property
     def bodies(self) -> Array:
-        """Moments, (n, 3), or (1, 3) where all scenes have the same."""
+        """Return the moments, shape (n, 3), or (1, 3) if all scenes have the same body."""
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
     @property
     def is_program(self) -> bool:
-        """Whether a program solves the batch, and not a method."""
+        """Return whether a program solves the batch, and not a method."""
         return self.listing is not None
 
     @cached_property
     def omega(self) -> Array:
-        """Omega at the end, (n, 3); NaN where the end was not reached."""
+        """Return omega at the end, shape (n, 3), rad/s; NaN for a scene that did not reach it."""
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
     @property
     def status(self) -> NDArray[np.int8]:
-        """How each scene ended, (n,), as in `pyharness.model.codes.Statuses`."""
+        """Return how each scene ended, shape (n,), as codes of `pyharness.model.codes.Statuses`."""
         return (self._program if self.is_program else self._ends).status
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """The number of steps for which a program gave a row, (n,)."""
+        """Return the number of steps for which the program gave a row, shape (n,)."""
         return self._program.n_rows
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """The variable that ended a program, (n,), from 1 as in `STOP_VARIABLES`; 0 for none."""
+        """Return the variable that stopped each run of a program, shape (n,).
+
+        The numbers count the names in `STOP_VARIABLES` from 1. A run that was not stopped has 0.
+        """
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
-        """Return the steps of a program that are nearest to `samples` equal parts of the time."""
+        """Return the program's steps nearest to the ends of `samples` equal parts of the time."""
         steps = self.scene.steps
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
     def rows(self, samples: int) -> Array:
-        """Return omega at the ends of `samples` equal parts of the time, (n, samples, 3).
+        """Return omega at the ends of `samples` equal parts of the time, shape (n, samples, 3).
 
-        A method solves each anew from the start, so that errors do not add up; a program has the
-        steps nearest to them.
+        A method solves each scene anew for each of these times, so that the errors of the parts do
+        not add up. A program supplies the rows of the nearest steps.
         """
         if samples not in self._rows:
             if self.is_program:
@@ -135,7 +140,10 @@ class Batch:
         return self._rows[samples]
 
     def attitudes(self, samples: int) -> Array:
-        """Return quaternions at the same times, (n, samples, 4), from (1, 0, 0, 0) at the start."""
+        """Return the attitudes at the times of `rows`, as quaternions, shape (n, samples, 4).
+
+        The attitude at time 0 is (1, 0, 0, 0).
+        """
         ends = []
         for i in range(samples):
             part = (i + 1) / samples
@@ -145,27 +153,28 @@ class Batch:
         return np.stack(ends, axis=1)
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
-        """Return omega (n, 3) by another method, after a `part` of the time."""
+        """Return omega by another method after the fraction `part` of the time, shape (n, 3)."""
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return the same batch from other starts, (n, 3)."""
+        """Return the same batch with other initial angular velocities, shape (n, 3), rad/s."""
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Return the rows of all scenes by the program, at steps in ascending order.
+        """Return the rows of all scenes by the program at the steps `at`, in ascending order.
 
-        A scene that the program can't take is refused alone; there is then no IER.
+        A scene that the program can't take is refused alone. The scenes are then run one by one,
+        and the result has no IER.
         """
-        if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all
+        if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
                 return self._run(self.scene, self.arrays, at)
-            except InputError:  # of some scene
+            except InputError:  # raised by at least one scene
                 pass
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return the scene with index `i`; InputError where its numbers are no scene."""
+        """Return the scene with index `i`; raise InputError if its numbers are not allowed."""
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(replace(self.scene, attitude=None), own, i)
 
@@ -188,7 +197,7 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the ends of all scenes by a method: in one call where it takes arrays."""
+        """Return the final states of all scenes by a method, in one call if it accepts arrays."""
         if method not in PREPARED:
             return self._solve_each(method, tolerance, t_end)
         tolerance = max(tolerance, REGISTRY[method].finest)
@@ -204,7 +213,7 @@ class Batch:
             try:
                 finest = METHODS[method].finest
                 found = solve(self.scene_of(i), float(t_end[i]), method, max(tolerance, finest))
-            except InputError:  # of this scene alone
+            except InputError:  # refuses this scene alone
                 continue
             status[i] = ENDS.index(found.ended)
             if found.has_all_rows:
@@ -232,7 +241,7 @@ class Batch:
                     rate = own.pop("torque_rate")[0]
                     scene = replace(scene, torque=replace(scene.torque, rate=rate))
                 part = self._run(scene, own, at)
-            except InputError:  # of this scene alone
+            except InputError:  # refuses this scene alone
                 continue
             for name in ("omega", "status", "n_rows", "stop_variable", "stop_quotient"):
                 getattr(found, name)[i] = getattr(part, name)[0]

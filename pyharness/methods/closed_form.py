@@ -1,4 +1,4 @@
-"""Known solutions: a sphere, or any body without torque by elliptic functions."""
+"""Solutions in closed form: of a sphere, and by elliptic functions of any body without torque."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,10 @@ from pyharness.model.trajectory import Trajectory
 def known_solution(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene that has a closed form; the tolerance tells only whether it is sensitive."""
+    """Return the solution of a scene in closed form; raise InputError if there is none.
+
+    `tolerance` decides only whether the result counts as sensitive.
+    """
     work = np.array([effort, 0.0])
     attitudes = None
     if scene.attitude is not None:

@@ -1,4 +1,4 @@
-"""The results of many bodies, and the arrays that they are written into."""
+"""The results of many bodies, and the arrays into which they are written."""
 
 from dataclasses import dataclass
 
@@ -12,24 +12,36 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(BatchResult):
-    """The ends of many scenes.
+    """The final states of many scenes, as `solve_many` returns them.
 
     Attributes
     ----------
     omega : ndarray, shape (n, 3)
-        Angular velocities about the body axes, rad/s; NaN where there is no result.
+        Angular velocities about the body axes at the end, rad/s; NaN for a body without a result.
     status : ndarray of int8, shape (n,)
-        How each body ended: 0 complete, 2 overflow, 3 refused, 4 gave up, 6 sensitive. A sensitive
-        result is a result too.
+        How each body ended: 0 `complete`, 2 `overflow`, 3 `refused`, 4 `gave up` (work limit
+        exceeded, or no digit of the phase left), 6 `sensitive`. A sensitive body has a result, but
+        the rounding errors that its motion amplifies exceed the tolerance.
     attitude : ndarray, shape (n, 4), or None
-        Quaternions from body to space, scalar first; None if they were not requested.
+        Unit quaternions from body to space at the end, scalar first; None if they were not
+        requested.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, solve_many
+    >>> starts = [[0.0, 1.0, 10.0], [0.0, 2.0, 5.0]]
+    >>> found = solve_many(case_scene(2), 1.0, omega0=starts)
+    >>> found.omega.shape
+    (2, 3)
+    >>> found.has_result
+    array([ True,  True])
     """
 
     attitude: Array | None = None
 
 
 def place_for(out: "Ensemble | Array | None", n: int, with_attitude: bool) -> Ensemble:
-    """Return arrays for the results of n bodies; InputError for others than fit."""
+    """Return arrays for the results of n bodies; raise InputError if `out` does not fit them."""
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):
         omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")

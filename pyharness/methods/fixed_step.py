@@ -1,4 +1,4 @@
-"""The methods of III.2 in steps of the scene's size."""
+"""The single-step methods of section III.2 of the thesis, with the scene's fixed step size."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,10 @@ from pyharness.model.trajectory import Trajectory
 
 
 def fixed_step(name: str) -> Integrator:
-    """Return a solver without error control; a step is shortened to hit each time asked for."""
+    """Return a solver with a fixed step and without error control.
+
+    A step that would pass a requested time is shortened to end there.
+    """
     number = getattr(Methods, name.upper().replace("-", "_"))
 
     def solve(

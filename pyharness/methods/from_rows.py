@@ -1,4 +1,4 @@
-"""Attitude of a table of omega, as a program of the thesis leaves one."""
+"""Attitudes computed from a table of omega, such as the output of a program of the thesis."""
 
 import math
 
@@ -8,19 +8,21 @@ from pyharness.model.attitude import IDENTITY, Quaternion, product
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-# Gauss points of a step, and what a stage takes of omega at the first and at the second.
+# The Gauss points of a step are _EARLY and 1 - _EARLY. Each exponential has the weights _MORE and
+# _LESS of omega there.
 _EARLY = 0.5 - math.sqrt(3.0) / 6.0
 _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
-    """Return attitudes, shape (n, 4), beside rows of omega (n, 3) at times (n,) in order (s).
+    """Return the attitudes at the times of a table of omega, as quaternions, shape (n, 4).
 
-    From the start of the scene on, a commutator-free step of order 4 from row to row (Celledoni,
-    Marthinsen and Owren 2003): two exponentials of omega at the Gauss points, which come from a
-    cubic through the rows and their slopes by Euler's equations. NaN from where a turn is beyond
-    every number.
+    `omega` has shape (n, 3), rad/s, `time` shape (n,), s, in order. The integration begins with the
+    attitude of the scene at time 0 and takes one commutator-free step of order 4 from row to row
+    (Celledoni, Marthinsen and Owren 2003). A step is a product of two exponentials of omega at the
+    Gauss points. Omega there comes from a cubic through the rows and their derivatives by Euler's
+    equations. From the first rotation that overflows the attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -44,7 +46,7 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
 
 
 def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
-    """Return omega at a part of each step, by Hermite's cubic."""
+    """Return omega at the fraction `part` of each step, by cubic Hermite interpolation."""
     rest = 1.0 - part
     ends = (
         rest * rest * (1.0 + 2.0 * part) * rows[:-1] + part * part * (1.0 + 2.0 * rest) * rows[1:]

@@ -1,4 +1,4 @@
-"""Gauss collocation, steps halved until two solutions agree."""
+"""Gauss collocation with equal steps, which are halved until two solutions agree."""
 
 import math
 from collections.abc import Sequence
@@ -15,22 +15,23 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 from pyharness.scenes.rescaled import omega_by_torque
 
-# Right-hand sides of all trial steps of Gauss collocation together, some ten seconds; a wave costs
-# as much as half of one.
+# Work limit in right-hand sides of all trial integrations together, some ten seconds. A wave of
+# the torque costs half as much as a right-hand side.
 _MOST_EVALUATIONS = 200_000_000
-_ORDER_THAT_SHOWS = 8
-# Two solutions that differ by so many units in the last place will not get closer.
+_ORDER_THAT_SHOWS = 8  # highest order that the error estimate relies on
+# Two solutions with a relative difference below this do not come closer with shorter steps.
 _ROUNDING = 16 * 2.0**-53
-# Of the range of numbers (rad/s): a solution that reached it twice leaves it.
+# rad/s, near the end of the range of binary64: two solutions that both reach it overflow.
 _NEAR_THE_END = 1e300
 
 
 def gauss(stages: int) -> Integrator:
-    """Return the solver by Gauss collocation, steps halved until two solutions agree.
+    """Return a solver by Gauss collocation that halves its steps until two solutions agree.
 
-    The error of the finer one is taken to be their difference over ratio**order - 1, where their
-    steps differ by that ratio, and twice that for safety. No more than order 8 is counted on: steps
-    of high order are long, and the coarser ones too long for the order to show.
+    The steps of two successive solutions differ by a factor `ratio`. The estimated error of the
+    finer solution is their difference over ratio**order - 1, doubled for safety. The estimate uses
+    at most order 8. Steps of higher order are long, and the coarser ones are too long for the error
+    to fall with the full order.
     """
 
     def solve(
@@ -45,14 +46,14 @@ def gauss(stages: int) -> Integrator:
         lengths = lengths[lengths > 0.0]
         step, spent, reached = _first_step(scene, float(lengths.min())), 0, 0.0
         most = effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
-        more = 1.0  # times the steps of the next try that will be needed, as far as known
-        pace = 2.0 * stages  # right-hand sides of a step
+        more = 1.0  # estimate: steps that will be needed over the steps of the next solution
+        pace = 2.0 * stages  # right-hand sides per step
         before: _Solution | None = None
-        last = math.inf  # difference of the two solutions before (rad/s)
+        last = math.inf  # the previous difference of two solutions (rad/s)
         growth: float | None = None
         counts = previous = _counts(lengths, step)
         while True:
-            # Each step takes two iterations at the least.
+            # Each step takes at least two iterations.
             steps = float(counts.sum())
             if not step or spent + 2.0 * stages * steps > most:
                 needed = spent + steps * (pace * (more - 1.0) + 2.0 * stages * more)
@@ -73,14 +74,16 @@ def gauss(stages: int) -> Integrator:
                 n = found.n_rows
                 scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
                 difference = float(np.abs(found.rows[:, :n] - before.rows[:, :n]).max(initial=0.0))
-                # Where an interval has as many steps as before, the difference tells nothing.
+                # If an interval has as many steps as before, the difference does not measure an
+                # error: `known` is then 0.
                 ratio = float((counts / previous).min(initial=2.0))
                 known = ratio ** min(2 * stages, _ORDER_THAT_SHOWS) - 1.0
                 count = int(counts.sum())
                 noise = torque_noise(scene, scene.omega, times[-1], count, scale)
                 floor = _ROUNDING * scale * (1.0 + noise)
                 if growth is None and difference > 0.5 * last:
-                    # Shorter steps no longer help: it is rounding, or the steps are still too long.
+                    # Shorter steps did not help: rounding dominates, or the steps are still too
+                    # long.
                     growth = motion_growth(scene, times[-1])
                 if growth is not None and is_sensitive(growth, tolerance, noise):
                     floor *= growth
@@ -91,13 +94,13 @@ def gauss(stages: int) -> Integrator:
                     excess = difference / (allowed * (known + 1.0))
                     more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
                 if close and found.status == COMPLETE:
-                    # Rounding parts a motion from what was asked for, whatever solves it.
+                    # The motion amplifies rounding errors whatever the method.
                     growth = motion_growth(scene, times[-1])
                     is_blurred = is_sensitive(growth, tolerance, noise)
                     status = SENSITIVE if is_blurred else COMPLETE
                     error = 2.0 * difference / (known * scale) if difference else 0.0
                     if difference > tolerance * scale * known / 2.0:
-                        # Of rounding alone, which does not fall with the step.
+                        # The difference comes from rounding, which does not fall with the step.
                         error = difference / scale
                     error += ROUNDING * (growth or 1.0) * (1.0 + noise)
                     return trajectory_of(times, found.rows, n, status, count, spent, error, growth)
@@ -119,14 +122,15 @@ class _Solution:
     evaluations: int
 
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
-        """Whether it ended where the coarser one did, at an omega without bound.
+        """Return whether this and the coarser solution both end where omega grows without bound.
 
-        That grows as steps fall, or is at the end of the range of numbers. `start` is the omega
-        of the beginning, or what torque alone would make of it: there may be no row.
+        Both must end at nearly the same time. The largest omega there must grow as the steps
+        shrink, or be near the end of the range of binary64. `start` (rad/s) is the largest initial
+        omega, or the larger omega that torque alone would give; it is needed if there is no row.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
-        # What only grows with time is as far from the coarser one in time as in size.
+        # An omega that grows slowly is larger in the finer solution only because that ends later.
         if abs(self.reached[0] - coarser.reached[0]) > 0.01 * abs(self.reached[0]):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
@@ -135,15 +139,16 @@ class _Solution:
 
 
 def _counts(lengths: Array, step: float) -> Array:
-    """Return the steps that the kernel takes in each interval: equal, `step` at the most."""
+    """Return how many equal steps, none longer than `step`, the kernel takes in each interval."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
 
 def _first_step(scene: Scene, shortest: float) -> float:
-    """Return a step in which the phase grows by about a half, a whole part of the shortest way.
+    """Return a first step (s) in which the phase grows by at most about half a radian.
 
-    Equal intervals have then twice as many steps when it is halved.
+    The step divides the interval `shortest`. Intervals of equal length therefore have exactly twice
+    as many steps when the step is halved.
     """
     rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
     for amplitude, frequency in scene.torque.sines + scene.torque.cosines:

@@ -1,4 +1,4 @@
-"""How a prepared solver's last call ended, and how good its result is."""
+"""The status of a prepared solver's last call, and the error estimates of its result."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -18,10 +18,10 @@ from pyharness.model.values import Triple
 
 
 class LastCall:
-    """What a solver, with attitude or without, says of this thread's last call."""
+    """The base class of all prepared solvers, which reports on the last call in this thread."""
 
     plan: Plan
-    _given: tuple[float, str, float]  # tolerance, method and effort as asked for
+    _given: tuple[float, str, float]  # tolerance, method and effort as requested
 
     if TYPE_CHECKING:
 
@@ -29,54 +29,64 @@ class LastCall:
         def _ending(self) -> tuple[int, int, float, float, Triple, float] | None: ...
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let a copy, in this process or another, be prepared as this one was."""
+        """Return the class and arguments from which a copy is prepared, here or elsewhere."""
         return type(self), (self.plan, *self._given)
 
     def __repr__(self) -> str:
-        """Say the scene and the method."""
+        """Return a text with the class, the scene and the method."""
         return f"<{type(self).__name__} of '{self.plan.scene.name}' by {self.plan.method}>"
 
     @property
     def status(self) -> str:
-        """How this thread's last call ended: complete, sensitive, overflow, refused or gave up.
+        """Return how this thread's last call ended.
 
-        ``sensitive`` is a result too, but what the motion makes of rounding exceeds the tolerance:
-        `digits` says what is left. A closed form and Gauss collocation work that out when they are
-        asked, in microseconds and milliseconds. ``complete``, in 0 steps, before a call. What was
-        refused at the door, or interrupted, is none.
+        The values are ``complete``, ``sensitive``, ``overflow``, ``refused`` and ``gave up``, which
+        means that the work limit was exceeded or that no digit of the phase was left. A
+        ``sensitive`` call has a result, but rounding errors amplified by the motion exceed the
+        tolerance; `digits` is the number of digits left. After a closed form or Gauss collocation
+        the sensitivity is computed when the status is read, which takes microseconds and
+        milliseconds respectively. Before the first call the status is ``complete`` and `steps` is
+        0. A call that raised an InputError or was interrupted does not count.
         """
         return self._found()[0]
 
     @property
     def error(self) -> float | None:
-        """Estimated error of this thread's last result, over the largest omega on the way.
+        """Return the estimated error of this thread's last result.
 
-        With attitude the larger of that and of the angle's (rad). None where the method estimates
-        none, and where there is no result.
+        The error of omega is relative to the largest omega from 0 to the end. With attitude the
+        estimate is the larger of that and the error of the angle (rad). It is None if the method
+        estimates no error, or if there is no result.
         """
         return self._found()[1]
 
     @property
     def growth(self) -> float | None:
-        """What the motion of this thread's last call makes of a small difference, at least 1.
+        """Return the error amplification of the motion of this thread's last call, at least 1.
 
-        The largest norm of the derivative of omega at the end by omega at any time before; None
-        where it is unknown.
+        It is the largest norm of the state-transition matrices, the derivatives of omega at the end
+        with respect to omega at any earlier time. It is None if it is unknown.
         """
         return self._found()[2]
 
     @property
     def digits(self) -> float | None:
-        """Decimal digits that are left of this thread's last result; None where unknown."""
+        """Return the number of correct decimal digits of the last result; None if unknown."""
         return digits_left(self.error)
 
     @property
     def steps(self) -> int:
-        """Steps of this thread's last call; right-hand sides of Gauss, 0 of a closed form."""
+        """Return the number of steps of this thread's last call.
+
+        For Gauss collocation it is the number of right-hand sides, for a closed form 0.
+        """
         return abs(self._counted())
 
     def _counted(self) -> int:
-        """Return the steps of this thread's last call, as the kernel counts them."""
+        """Return the steps of the last call; a negative count means that the kernel chose `quick`.
+
+        The kernel chooses only where the plan's method is `quick or taylor`.
+        """
         ending = self._ending
         return 0 if ending is None else ending[1]
 

@@ -1,6 +1,6 @@
-"""Many bodies in one call: side by side in the kernel, and on several cores if requested.
+"""Solution of many bodies in one call, side by side in the kernel and in several threads.
 
-The result of a body depends on that body alone: it is bit for bit the same whatever the other
+The result of a body depends on that body alone. It is bit-for-bit identical whatever the other
 bodies, their order and the number of threads.
 """
 
@@ -71,51 +71,56 @@ def solve_many(
     threads: int = 1,
     out: "Ensemble | Array | None" = None,
 ) -> Ensemble:
-    """Solve many scenes, each to its end.
+    """Solve many scenes in one call, each to its own final time.
 
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        The scene that supplies what no array supplies; or all scenes, without arrays.
+        The scene that supplies every quantity for which no array is given; or a sequence of all
+        scenes, without arrays.
     t_end : float, or array of shape (n,)
-        Times of the results, s, on either side of 0.
+        Time of each result, s; positive, negative or 0.
     omega0, moments, coefficients, torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Initial angular velocities (rad/s), moments (kg m2) or A, B, C, torques (N m; 1/s2 for
-        bodies given by coefficients) and their rates. An array of one row is shared by all bodies.
+        Initial angular velocities (rad/s), moments (kg m2), coefficients A, B, C, constant torques
+        (N m) and their rates (N m/s). For bodies given by coefficients the torques are divided by
+        the moments (1/s2, 1/s3). An array of one row is shared by all bodies.
     inertia : array, shape (n, 3, 3) or (3, 3)
         Full inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the
-        axes of the matrix. Finding the principal axes takes some tenths of a millisecond a body.
+        axes of the matrix. The principal axes take some tenths of a millisecond per body.
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        Waves of torque: three components of the amplitude, and the frequency (rad/s).
+        Waves of torque: three components of the amplitude (units as in `torque_constant`), and the
+        frequency (rad/s).
     attitude0 : array, shape (n, 4) or (4,)
-        Quaternions at time 0, from body to space, scalar first. If they are given, attitudes are
-        returned.
+        Quaternions at time 0, from body to space, scalar first; by default the scene's. Attitudes
+        are returned if there are initial ones.
     method : str
-        A name in `PREPARED`; `auto` is the closed form for each body without torque and for each
-        sphere, and the series for any other.
+        A name in `pyharness.methods.solver.PREPARED`. `auto` takes the closed form for each body
+        without torque and for each sphere, and the Taylor series for any other body.
     tolerance : float
-        The largest error at the end, relative to the largest omega from 0 to the end, as in
-        `prepare`; by default the method's own.
+        The largest error of any component at the end, relative to the largest omega from 0 to the
+        end, as in `prepare`; by default the method's own.
     step : float, optional
         Step size of the methods with a fixed step, s; by default the scene's.
     effort : float
-        Factor on the work limit of a body, beyond which its status is `gave up`.
+        Factor on the work limit of a body. A body that exceeds the limit has the status `gave up`.
     threads : int
-        The number of threads: the kernel releases the interpreter's lock.
+        Number of threads. The kernel releases the interpreter's lock (GIL).
     out : Ensemble, or array of shape (n, 3), optional
-        Where to write: the result of an earlier call with as many bodies, or an array for omega.
+        Where the results are written: the result of an earlier call with as many bodies, or an
+        array for omega.
 
     Returns
     -------
     Ensemble
-        The ends. A body that can't be solved, such as one with a number that is not finite or a
-        moment that is not above 0, has NaN and a status that says so; it affects no other body.
+        The final states. A body that can't be solved has NaN and a status that gives the reason,
+        and does not affect any other body. Examples are a number that is not finite, and a moment
+        that is not above 0.
 
     Raises
     ------
     InputError
-        If the arrays differ in their numbers of rows, or the method is unknown or can't solve such
-        bodies.
+        If the arrays differ in their numbers of rows, if the method is unknown or can't solve the
+        bodies, or if the tolerance or the effort is out of range.
     NotBuiltError
         If the extension is not built.
 
@@ -154,7 +159,7 @@ def solve_many(
             given["axes"].about_principal(given, own)
             own = {}
         else:
-            if scene.inertia is not None:  # other bodies are given
+            if scene.inertia is not None:  # the arrays give other bodies
                 scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
             given = from_scene(scene)
     else:
@@ -200,7 +205,7 @@ def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Solve scenes that differ in the axes of body and torque, each kind in a call of its own."""
+    """Solve scenes with different kinds of body and torque axes, with one call for each kind."""
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.in_space for each in scenes):
         raise InputError(NO_ATTITUDE)
@@ -210,7 +215,7 @@ def _solve_groups(
     found = place_for(out, n, scenes[0].attitude is not None)
     groups: dict[int, list[int]] = {}
     for row, each in enumerate(scenes):
-        # A torque about the axes of space is solved alone, whatever the body is about.
+        # A scene with a torque about the axes of space is solved alone, whatever its body's axes.
         kind = row if each.torque.in_space else -1 if each.inertia is not None else -2
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
@@ -258,7 +263,7 @@ class _Bodies:
             )
 
     def solve(self, threads: int, out: "Ensemble | Array | None") -> Ensemble:
-        """Return the ends."""
+        """Return the final states of all bodies."""
         found = place_for(out, self.n, self.attitude is not None)
         for_each_piece(partial(self._enter, found), self.n, threads)
         return found
@@ -280,7 +285,7 @@ class _Bodies:
 
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
-    """Return the number by which the kernel knows a method, and the tolerance."""
+    """Return the kernel's code of a method and the tolerance; raise InputError for a wrong one."""
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)

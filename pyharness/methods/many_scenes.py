@@ -1,4 +1,4 @@
-"""Scenes as the arrays of `solve_many`; full inertia matrices as principal moments and axes."""
+"""Conversion of scenes to the arrays of `solve_many`, about principal axes where necessary."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -19,11 +19,11 @@ class Axes:
     """The principal axes of bodies with full inertia matrices; one row is shared by all bodies."""
 
     def __init__(self, axes: Array, turns: Array) -> None:
-        """Take axes, columns of (n, 3, 3), and the same rotations as quaternions, (n, 4)."""
+        """Store the axes, columns of (n, 3, 3), and the same rotations as quaternions, (n, 4)."""
         self.axes, self.turns = axes, turns
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Replace starts and attitudes about the bodies' axes by those about principal axes."""
+        """Convert initial omegas and attitudes from the bodies' axes to principal axes."""
         if "omega0" in names:
             rows = rows_of("omega0", given["omega0"], 3)
             self._check("omega0", rows)
@@ -35,7 +35,7 @@ class Axes:
             given["attitude0"] = turned_back(attitudes, conjugate)
 
     def give_back(self, omega: Array, attitude: Array | None) -> None:
-        """Replace results about principal axes by those about the bodies' axes, in place."""
+        """Convert results from principal axes to the bodies' axes, in place."""
         omega[:] = rotated(omega, self.axes)
         if attitude is not None:
             attitude[:] = turned_back(attitude, self.turns)
@@ -46,10 +46,10 @@ class Axes:
 
 
 def from_rows(rows: Sequence[Scene | None]) -> dict[str, Any]:
-    """Return bodies with a full inertia matrix as arrays about principal axes, a row for each.
+    """Return scenes with a full inertia matrix as arrays about principal axes, one row for each.
 
-    Where there is no scene, the row is one that is refused. Bodies are given by coefficients, which
-    `principal` knows to more digits than those of rounded moments.
+    For None the row is one that the kernel refuses. The arrays contain coefficients instead of
+    moments, because `principal` computes them to more digits than rounded moments would give.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -80,13 +80,13 @@ def _full_row(scene: Scene) -> dict[str, Any]:
 
 
 def _filled(laws: list[Any]) -> list[Any]:
-    """Return the waves of several laws; waves without amplitude fill up the shorter laws."""
+    """Return the waves of several laws; waves of amplitude 0 fill up the shorter laws."""
     most = max(map(len, laws))
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as arrays of one row."""
+    """Return a scene as arrays of one row each."""
     law = checked_scene(scene).body_torque
     return {
         "by_moments": scene.moments is not None,
@@ -103,7 +103,7 @@ def from_scene(scene: Scene) -> dict[str, Any]:
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
-    """Refuse scenes of which some have an attitude, or of several step sizes."""
+    """Raise InputError if only some scenes have an attitude, or if the step sizes differ."""
     if len({each.step_size for each in scenes}) > 1:
         raise InputError("the scenes have more than one step size; allowed: one for all")
     if len({each.attitude is None for each in scenes}) > 1:
@@ -111,7 +111,7 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return scenes as arrays of a row each; InputError where they can't be side by side."""
+    """Return scenes as arrays with one row for each; raise InputError if they can't be combined."""
     if not scenes:
         raise InputError("there is no scene; allowed: a scene, or some")
     check_alike(scenes)
@@ -122,7 +122,7 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return arrays with a row of each body, and what all have in common as it is in the first."""
+    """Return arrays with one row for each body; all other entries are taken from the first row."""
     found = {**rows[0]}
     for name in ("body", "omega0", "torque_constant", "torque_rate"):
         found[name] = np.array([row[name] for row in rows])
@@ -134,7 +134,7 @@ def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def units_of(values: Any) -> Array:
-    """Return unit quaternions, shape (n, 4); NaN for four numbers that are no attitude."""
+    """Return unit quaternions, shape (n, 4); NaN for a row that can't be normalised."""
     found = rows_of("attitude0", values, 4)
     with np.errstate(all="ignore"):
         found = found / np.abs(found).max(axis=1, keepdims=True)

@@ -1,6 +1,6 @@
-"""Many bodies as single scenes: torques about the axes of space, and full inertia matrices.
+"""Many bodies as single scenes, for torques about the axes of space and full inertia matrices.
 
-Torques about the axes of space are solved one body after the other, by prepared solvers.
+Bodies under a torque about the axes of space are solved one after the other, by prepared solvers.
 """
 
 from collections.abc import Iterable, Mapping
@@ -30,7 +30,10 @@ NO_ATTITUDE = (
 
 
 def acts_in_space(scene: Scene, arrays: Iterable[object]) -> bool:
-    """Whether a torque about the axes of space acts: that of a scene, or arrays in its frame."""
+    """Return whether a torque about the axes of space acts, from the scene or from torque arrays.
+
+    Torque arrays have the frame of the scene's torque.
+    """
     named = any(each is not None for each in arrays)
     return scene.torque.in_space or (scene.torque.frame == "space" and named)
 
@@ -39,9 +42,10 @@ def solve_in_space(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, threads: int,
 ) -> Ensemble:  # fmt: skip
-    """Solve the bodies of a scene and of arrays, None where `solve_many` was given no array.
+    """Solve many bodies under a torque about the axes of space, given by a scene and arrays.
 
-    An InputError of a body refuses that body alone.
+    An entry of `arrays` is None if `solve_many` was called without that array. An InputError that a
+    body causes refuses that body alone.
     """
     check_torque(scene, method, attitude=True)
     if arrays["coefficients"] is not None or scene.coefficients is not None:
@@ -60,7 +64,7 @@ def solve_in_space(
     at_rest = replace(scene, omega=_REST, attitude=None)
     found = place_for(out, n, with_attitude=True)
     assert found.attitude is not None
-    # The starts may lie where the results go.
+    # `omega0` or `attitude0` may share memory with `out`.
     omega, attitude = np.full((n, 3), np.nan), np.full((n, 4), np.nan)
     found.status[:] = Statuses.REFUSED
 
@@ -83,7 +87,7 @@ def solve_in_space(
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return a scene for each full inertia matrix or torque; None for a body that is none."""
+    """Return a scene for each full inertia matrix or torque; None for a body that is refused."""
     rows = _rows(arrays)
     found: list[Scene | None] = []
     for i in range(count_bodies(rows)):
@@ -95,7 +99,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the arrays of bodies and torques that are given."""
+    """Return those arrays of bodies and torques that are not None."""
     shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
     rows = {}
     for name, values in arrays.items():
@@ -107,7 +111,10 @@ def _rows(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return a scene with the numbers of body `i` in place of its own; InputError for none."""
+    """Return the scene with the numbers of body `i` in place of its own.
+
+    Raise InputError if these numbers are not allowed.
+    """
     own = {name: row_of(each, i) for name, each in rows.items()}
     torque: dict[str, Any] = {
         name.removeprefix("torque_"): own.pop(name)

@@ -1,4 +1,4 @@
-"""Many starts of a prepared solver."""
+"""Solution of a prepared scene from many initial angular velocities in one call."""
 
 from typing import Any
 
@@ -14,9 +14,10 @@ from pyharness.model.trajectory import Array
 def many_starts(
     packed: Array, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Return the ends of many starts of a packed scene, and their statuses: see `Solver.many`.
+    """Return omega at the end and the status for many initial omegas of a packed scene.
 
-    InputError for what is not shape (n, 3), or no time, or none for each start.
+    The arguments are those of `Solver.many`. Raise InputError if `omega0` has not the shape (n, 3),
+    or if `t_end` is neither one time nor one time for each row.
     """
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)

@@ -1,4 +1,4 @@
-"""A scene packed for the kernels of prepared solvers."""
+"""Packing of a scene into one array for the kernels of prepared solvers."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from pyharness.model.trajectory import Array
 
 
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
-    """Return what a prepared kernel is given in every call: see `Places`."""
+    """Return the array that a prepared kernel gets in every call; `Places` defines its elements."""
     coefficients, constant, rate, sines, cosines = _torque_of(scene)
     packed = np.zeros(Places.WAVES)
     packed[Places.METHOD] = code
@@ -30,6 +30,6 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
 def _torque_of(scene: Scene) -> tuple[Array, ...]:
     if not scene.torque.in_space:
         return normalized(scene)
-    # What the moments do is in the packed array too.
+    # The kernel needs no ratios of the moments: the packed array contains the moments.
     coefficients, _, *torque = normalized_in_space(scene)
     return coefficients, *torque

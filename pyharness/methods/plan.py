@@ -1,4 +1,4 @@
-"""What a scene needs, and what is therefore not computed: decided before anything is computed."""
+"""The plan for a scene: which method solves it and what is computed, decided beforehand."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,15 +10,17 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 
 FINEST = REGISTRY["auto"].finest
-# For few digits Runge-Kutta takes fewer operations than a series; which, the kernel decides.
+# For few digits Runge-Kutta may take fewer operations than a series. The kernel chooses.
 RK4_OR_TAYLOR = "quick or taylor"
-FEW_DIGITS = 1e-7  # below it never, so that it is not asked
+# Smallest tolerances at which Runge-Kutta may be the faster one: with a constant torque, and with
+# a varying one.
+FEW_DIGITS = 1e-7
 _WAVES_DIGITS = 1e-9
 
 
 @dataclass(frozen=True)
 class Decision:
-    """One thing that could be computed; whether it is, and on what grounds."""
+    """A decision whether one part of a solution is computed, with the reason."""
 
     part: str
     kept: bool
@@ -27,23 +29,23 @@ class Decision:
 
 @dataclass(frozen=True)
 class Plan:
-    """What will be computed for a scene."""
+    """A plan of the computation for one scene."""
 
     scene: Scene
-    method: str  # the one chosen, or asked for
-    closed_form: str | None  # sphere, symmetric or elliptic, where one solves the scene
-    fallback: str | None  # the method that takes over where the one chosen finds that it can't
-    velocity: bool  # is asked for
-    rows: bool  # are asked for
+    method: str  # the one that was chosen or requested
+    closed_form: str | None  # sphere, symmetric or elliptic, if a closed form is used
+    fallback: str | None  # the method that is used if the chosen one refuses the scene
+    velocity: bool  # whether it is requested
+    rows: bool  # whether intermediate output is requested
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
-        """Part by part."""
+        """Return the decisions, part by part."""
         return tuple(_decisions(self))
 
     @property
     def skipped(self) -> frozenset[str]:
-        """The parts that are not computed."""
+        """Return the parts that are not computed."""
         return frozenset(each.part for each in self.decisions if not each.kept)
 
 
@@ -54,10 +56,10 @@ def plan(
     velocity: bool = False,
     rows: bool = False,
 ) -> Plan:
-    """Decide what a scene needs; `rows` are results between the beginning and the end.
+    """Return the plan for a scene; `rows` requests output between the beginning and the end.
 
-    Without a tolerance the plan is for the method's default. InputError where the method can't take
-    the scene, or the tolerance is out of range.
+    Without a tolerance the plan is for the method's default. Raise InputError if the method can't
+    take the scene, or if the tolerance is out of range.
     """
     tolerance = requested_tolerance(method, tolerance)
     finest = REGISTRY["quick"].finest if method == "quick" else FINEST
@@ -65,16 +67,17 @@ def plan(
         place = " for quick" if method == "quick" else ""
         raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
     form = closed_form(checked_scene(scene, any_torque=True))
-    # The plan has the attitude where the torque needs it.
+    # The plan includes the attitude if the torque needs it.
     check_torque(scene, method, attitude=True)
     fallback = None
     if method == "auto":
         few_digits = not scene.torque.in_space and tolerance >= (
             _WAVES_DIGITS if scene.torque.varies else FEW_DIGITS
         )
-        # Runge-Kutta gives the end alone.
+        # Runge-Kutta has no intermediate output.
         method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"
-        # A disturbance of the middle axis may be too faint for a closed form, not for a series.
+        # A perturbation from the middle axis may be too small for the closed form, which squares
+        # it, but not for the series.
         fallback = "taylor" if form else None
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
@@ -118,7 +121,7 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     if wanted and closed:
         wanted, why = False, "closed form"
     yield Decision("dense output", wanted, why)
-    # No solver that can be prepared needs either.
+    # No prepared solver uses the reference or SciPy.
     yield Decision("reference", False, "not asked for")
     yield Decision("SciPy", False, "ours")
 

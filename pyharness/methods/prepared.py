@@ -1,7 +1,7 @@
-"""Solvers: prepared once, called in a loop at little more than the cost of the kernel itself.
+"""Solvers that are prepared once; each call then costs little more than the kernel itself.
 
-`prepare` validates the scene, decides what it needs (`plan`) and packs it; a call then looks at
-three arguments and enters the kernel.
+`prepare` validates the scene, decides what it needs (`plan`) and packs it. A call then only checks
+its two or three arguments and enters the kernel.
 """
 
 from dataclasses import replace
@@ -44,31 +44,40 @@ def prepare(
     effort: float = 1.0,
     attitude: bool = False,
 ) -> "Solver | AttitudeSolver":
-    """Prepare a solver of a scene.
+    """Prepare a solver for many calls with the same scene.
 
     Parameters
     ----------
     scene : Scene
-        Its step size is that of the methods with a fixed step. One with a full inertia matrix is
-        solved about principal axes; its calls cost some microseconds more.
+        The scene, whose step size is used by the methods with a fixed step. A scene with a full
+        inertia matrix is solved about principal axes; each call then takes some microseconds more.
     method : str
-        A name in `PREPARED`; `auto` takes the fastest that meets the tolerance.
+        A name in `pyharness.methods.solver.PREPARED`; `auto` takes the fastest method that meets
+        the tolerance.
     tolerance : float
-        Largest error of any component at the end, relative to the largest |omega| until then; by
-        default the method's own, as in `solve`. Methods with a fixed step ignore it. Where the
-        motion amplifies perturbations K times, no method has an error below some 1e-15 K.
+        Largest error of any component at the end, relative to the largest |omega| from 0 to the
+        end. By default it is the method's own, as in `solve`. Methods with a fixed step ignore it.
+        If the motion amplifies perturbations K times, no method has an error below some 1e-15 K.
     effort : float
-        Factor on the work of a call, beyond which its status is `gave up`: 1 is some ten seconds.
+        Factor on the work limit of a call; 1 is some ten seconds. A call that exceeds the limit has
+        the status `gave up`.
     attitude : bool
-        Whether calls give the attitude too; a torque about the axes of space needs it.
+        Whether calls return the attitude too. A torque about the axes of space needs it.
+
+    Returns
+    -------
+    Solver or AttitudeSolver
+        A callable: ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s), with
+        `attitude` omega and a quaternion from body to space, scalar first, shape (4,).
 
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene or carry its attitude, or a tolerance
-        or an effort out of range.
+        If the method is unknown, or can't take the scene or propagate its attitude; if a torque
+        about the axes of space comes without `attitude`; if the tolerance or the effort is out of
+        range.
     NotBuiltError
-        Where the extension is not built.
+        If the extension is not built.
 
     Examples
     --------
@@ -94,6 +103,6 @@ def prepare(
         from pyharness.methods.prepared_attitude import prepared_attitude
 
         return prepared_attitude(scene, method, tolerance, effort)
-    # Who does not ask for it pays nothing.
+    # An attitude that was not requested is not computed.
     scene = replace(scene, attitude=None)
     return Solver(plan(scene, method, tolerance), tolerance, method, effort)

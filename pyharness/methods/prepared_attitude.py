@@ -1,4 +1,4 @@
-"""A scene prepared for calls that give the attitude beside omega."""
+"""Prepared solvers whose calls return the attitude together with omega."""
 
 from dataclasses import replace
 from functools import partial
@@ -19,30 +19,31 @@ if TYPE_CHECKING:
 else:
     try:
         from pyharness._solver import BoundAttitudeKernel
-    except ImportError:  # not built, as `extension` says when a solver is made
+    except ImportError:  # not built: `extension` raises NotBuiltError when a solver is made
         BoundAttitudeKernel = object
 
 
 class AttitudeSolver(LastCall, BoundAttitudeKernel):
-    """A scene prepared for one method, with attitude.
+    """A solver of a scene with attitude, prepared for one method.
 
-    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``: `omega0` three
-    numbers (rad/s), `t_end` in seconds on either side of 0, `attitude0` a quaternion, scalar first,
-    from body to space, by default the scene's, or the axes of space. It returns omega, shape (3,),
-    and the attitude, shape (4,), at `t_end`, both new; NaN where the kernel could not finish, and
-    `status` says why. What is none of these is refused with an InputError. Fastest are arrays of
-    floats, and an `attitude0` of length 1.
+    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``. `omega0` is three
+    numbers (rad/s), `t_end` a time in seconds, positive, negative or 0. `attitude0` is a quaternion
+    from body to space, scalar first. By default it is the scene's, and for a scene without attitude
+    that of a body whose axes are those of space. A call returns two new arrays: omega, shape (3,),
+    and the attitude, shape (4,), at `t_end`. They are NaN if the kernel could not finish, and
+    `status` gives the reason. Any other argument is refused with an InputError. Calls are fastest
+    with arrays of floats and a unit quaternion.
 
     Threads, copies and pickles are as with `Solver`.
 
     Attributes
     ----------
     plan : Plan
-        What was decided, and why.
+        The method and the parts that are computed, with the reasons.
     """
 
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Pack what does not change; `prepare` is the way to make one."""
+        """Pack the data that all calls share; users call `prepare` instead."""
         scene, code = chosen.scene, Methods.TAYLOR
         attitude = scene.attitude or IDENTITY
         if scene.torque.in_space:
@@ -51,7 +52,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
             code = Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else Methods.CLOSED_FORM
         kernel = extension().solve_packed_attitude
         packed, packed_with_gil = packed_scene(scene, code, tolerance, effort), None
-        if chosen.closed_form:  # without torque, so that it has no wave
+        if chosen.closed_form:  # then there is no torque, and no wave to make a call slow
             packed_with_gil = packed.copy()
             packed_with_gil[Places.METHOD] = Methods.CLOSED_FORM
         solver = super().__new__(
@@ -63,12 +64,15 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
 
 def prepared_attitude(scene: Scene, method: str, tolerance: float, effort: float) -> AttitudeSolver:
-    """Return a solver; InputError where the method carries no attitude."""
+    """Return a solver with attitude; raise InputError if the method can't propagate attitudes."""
     return AttitudeSolver(attitude_plan(scene, method, tolerance), tolerance, method, effort)
 
 
 def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
-    """Return the plan of a scene with attitude; InputError where the method carries none."""
+    """Return the plan of a scene with attitude.
+
+    Raise InputError if the method can't propagate attitudes.
+    """
     check_attitude(method)
     return plan(replace(scene, attitude=scene.attitude or IDENTITY), method, tolerance, rows=True)
 
@@ -76,7 +80,7 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Convert what a call was given and can't read at once; InputError for what is none."""
+    """Convert arguments that the C code can't read directly; raise InputError for invalid ones."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]
     return (*start, *attitude), time

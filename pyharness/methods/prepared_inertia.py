@@ -1,7 +1,7 @@
-"""Prepared solvers of scenes with a full inertia matrix: about principal axes, and back.
+"""Prepared solvers of scenes with a full inertia matrix, which rotate to principal axes and back.
 
-A scene about principal axes has the solvers of `prepared`, which enter the kernel from C. The
-solvers of this module rotate arguments and results in Python.
+The solvers of a scene about principal axes enter the kernel directly from C. The solvers of this
+module rotate their arguments and results in Python.
 """
 
 from dataclasses import replace
@@ -25,17 +25,17 @@ from pyharness.model.waves import with_merged_waves
 
 
 class InertiaSolver(Solver):
-    """A scene with a full inertia matrix, prepared: see `Solver`.
+    """A prepared solver of a scene with a full inertia matrix: see `Solver`.
 
-    Angular velocities are about the axes of the matrix. `plan` is that of the scene about principal
-    axes, and `growth` is a norm about them.
+    Angular velocities are about the axes of the matrix. `plan` is the plan of the scene about
+    principal axes, and `growth` is the norm of the state-transition matrix about these axes.
     """
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Prepare the scene about principal axes; `scene` is the one with the matrix."""
+        """Prepare the plan's scene, about principal axes; `scene` is the one with the matrix."""
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -43,10 +43,10 @@ class InertiaSolver(Solver):
         return solver
 
     _scene: Scene
-    _axes: Array  # columns
+    _axes: Array  # the principal axes, in columns
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let a copy, in this process or another, be prepared as this one was."""
+        """Return the class and arguments from which a copy is prepared, here or elsewhere."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(self, omega0: Numbers, t_end: Number, *, out: Array | None = None) -> Array:
@@ -64,7 +64,7 @@ class InertiaSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Solve many starts in one call, as `Solver.many` does."""
+        """Return the function that solves many initial omegas in one call: see `Solver.many`."""
         return self._many
 
     def _many(
@@ -78,21 +78,21 @@ class InertiaSolver(Solver):
         return ends, status
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return rows from another start (rad/s) at `times` (s), as `Solver.trajectory` does."""
+        """Return the trajectory from `omega0` (rad/s) at `times` (s): see `Solver.trajectory`."""
         return self._rows(replace(self._scene, omega=three("omega0", omega0)), times)
 
 
 class InertiaAttitudeSolver(AttitudeSolver):
-    """A scene with a full inertia matrix, prepared with attitude: see `AttitudeSolver`.
+    """A prepared solver with attitude of a scene with a full inertia matrix: see `AttitudeSolver`.
 
-    Angular velocities and attitudes are those of the axes of the matrix.
+    Angular velocities are about the axes of the matrix, and attitudes are attitudes of these axes.
     """
 
     def __new__(
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Prepare the scene about principal axes; `scene` is the one with the matrix."""
+        """Prepare the plan's scene, about principal axes; `scene` is the one with the matrix."""
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -100,17 +100,17 @@ class InertiaAttitudeSolver(AttitudeSolver):
         return solver
 
     _scene: Scene
-    _axes: Array  # columns
-    _turn: Quaternion  # from principal axes to those of the matrix
+    _axes: Array  # the principal axes, in columns
+    _turn: Quaternion  # from principal axes to the axes of the matrix
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let a copy, in this process or another, be prepared as this one was."""
+        """Return the class and arguments from which a copy is prepared, here or elsewhere."""
         return type(self), (self.plan, *self._given, self._scene)
 
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | None = None
     ) -> tuple[Array, Array]:
-        """Return angular velocity and attitude at `t_end`, those of the axes of the matrix."""
+        """Return angular velocity and attitude at `t_end`, both for the axes of the matrix."""
         start = np.array(three_floats("omega0", omega0))
         attitude = self._scene.attitude or IDENTITY
         if attitude0 is not None:
@@ -122,15 +122,16 @@ class InertiaAttitudeSolver(AttitudeSolver):
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
-    """Return the principal axes of a scene as columns, and as a quaternion."""
+    """Return the principal axes of a scene, as columns of a matrix and as a quaternion."""
     about_principal, axes = principal(replace(scene, attitude=IDENTITY))
     return axes, about_principal.attitude or IDENTITY
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the matrix times each vector, shape (3,) or (n, 3); (n, 3, 3) has one for each.
+    """Return the product of a matrix and each vector, shape (3,) or (n, 3).
 
-    Sums in a fixed order: the bits of a row do not depend on how many rows there are.
+    A `matrix` of shape (n, 3, 3) contains one matrix for each vector. The sums have a fixed order,
+    so that each row is bit-for-bit identical for any number of rows.
     """
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
@@ -140,7 +141,10 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return attitudes of principal axes, shape (4,) or (n, 4), as those of the matrix's axes."""
+    """Convert attitudes of principal axes, shape (4,) or (n, 4), to attitudes of the matrix's axes.
+
+    `turn` is the rotation from principal axes to the axes of the matrix.
+    """
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))
@@ -148,7 +152,7 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
 
 
 def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
-    """Return a solver of a scene with a full inertia matrix."""
+    """Return a prepared solver of a scene with a full inertia matrix."""
     from pyharness.methods.plan import plan
 
     about_principal = with_merged_waves(principal(replace(scene, attitude=None))[0])
@@ -158,7 +162,7 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
 def prepared_inertia_attitude(
     scene: Scene, method: str, tolerance: float, effort: float
 ) -> InertiaAttitudeSolver:
-    """Return a solver with attitude of a scene with a full inertia matrix."""
+    """Return a prepared solver with attitude of a scene with a full inertia matrix."""
     from pyharness.methods.prepared_attitude import attitude_plan
 
     about_principal, _ = principal(replace(scene, attitude=scene.attitude or IDENTITY))

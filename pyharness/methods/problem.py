@@ -1,4 +1,4 @@
-"""A scene as the modern kernels take it, and a trajectory of what they give."""
+"""Conversion of a scene to arguments of the modern kernels, and of their rows to a trajectory."""
 
 import math
 from collections.abc import Sequence
@@ -18,18 +18,20 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return what the modern kernels take: everything divided by the moments.
+    """Return the arguments of the modern kernels, in which torques are divided by the moments.
 
-    A, B, C; torque over moment (1/s2) and its rate (1/s3); sines and cosines, each of shape (4, n):
-    columns of amplitude (1/s2) and frequency (rad/s). InputError where one is no number.
+    They are A, B, C, then constant torque over moment (1/s2), its rate (1/s3), sines and cosines.
+    Sines and cosines have shape (4, n), with columns of amplitude (1/s2) and frequency (rad/s).
+    Raise InputError if a value is not finite.
     """
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 
 
 def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
-    """Return what the kernel of a torque about the axes of space takes; of a scene with moments.
+    """Return the arguments of the kernel for a torque about the axes of space.
 
-    A, B, C; the largest moment over each; torque over the largest moment, as in `normalized`.
+    They are A, B, C, the largest moment over each moment, and the torques as in `normalized`, but
+    divided by the largest moment. The scene must have moments.
     """
     moments = np.array(scene.moments)
     largest = moments.max()
@@ -42,14 +44,14 @@ def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
 
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
-    """Return the name of the kernel that solves a scene by series, and what it takes of it."""
+    """Return the name of the kernel that solves a scene by series, and its arguments."""
     if scene.torque.in_space:
         return "space_torque_rows", normalized_in_space(scene)
     return "taylor_rows", normalized(scene)
 
 
 def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, Array, Array, Array]:
-    # A wave without amplitude has no effect, and would cost its sine and cosine.
+    # A wave without amplitude has no effect, but its sine and cosine would take time.
     sines, cosines = (
         columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)
     )
@@ -64,9 +66,10 @@ def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, A
 
 
 def remainders(scene: Scene) -> Triple:
-    """Return what rounding takes off A, B, C: without it a phase of 1e6 radians has lost 1e-10.
+    """Return the exact A, B, C minus their rounded values.
 
-    Zeros where coefficients are given as such, and under torque, where no kernel asks.
+    Without these remainders a phase of 1e6 radians has an error of 1e-10. They are 0 if the body is
+    given by coefficients, and under torque, where no kernel uses them.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -79,7 +82,7 @@ def remainders(scene: Scene) -> Triple:
 
 
 def known(estimate: float) -> float | None:
-    """Return what a kernel estimated; None where it is below 0, which it is where unknown."""
+    """Return an estimate of a kernel, or None if it is negative, which means unknown."""
     return float(estimate) if estimate >= 0.0 else None
 
 
@@ -94,9 +97,9 @@ def trajectory_of(
     growth: float | None = None,
     attitudes: Array | None = None,
 ) -> Trajectory:
-    """Return the rows of a kernel, which come in columns, as a trajectory.
+    """Return the trajectory from the results of a kernel, which has one column for each time.
 
-    Error and growth are those at the last of the times, and unknown where that was not reached.
+    `error` and `growth` apply to the last time. They are dropped if it was not reached.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     found = rows_trajectory(times[:n_rows], rows.T[:n_rows], evaluations, steps, ended)
@@ -108,17 +111,18 @@ def trajectory_of(
 def rows_trajectory(
     times: Sequence[float], omega: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory without velocity, recorded at its true times."""
+    """Return a trajectory without velocity, whose recorded times are the true times."""
     time = np.array(times, dtype=float)
     return Trajectory(time, time, omega, None, steps, evaluations, ended)
 
 
 def closed_form(scene: Scene) -> str | None:
-    """Name the closed form that solves a scene, None where there is none."""
+    """Return the name of the closed form that solves a scene, or None if there is none."""
     if scene.torque.in_space:
         return None
     a, b, c = scene.euler_coefficients
-    # A body that is given by coefficients has no angular momentum to turn about.
+    # The closed form of the attitude needs the angular momentum, which is unknown for a body given
+    # by coefficients.
     if scene.attitude is not None and (not scene.torque.is_zero or scene.moments is None):
         return None
     if a == b == c == 0.0:
@@ -126,7 +130,8 @@ def closed_form(scene: Scene) -> str | None:
     if not scene.torque.is_zero:
         return None
     if 0.0 in (a, b, c):
-        # Two coefficients of opposite sign turn; of one sign, or one alone, they run away.
+        # With two coefficients of opposite sign omega oscillates. With two of one sign, or with one
+        # alone, it may grow without bound.
         rest = [x for x in (a, b, c) if x != 0.0]
         return "symmetric" if len(rest) == 2 and rest[0] * rest[1] < 0.0 else None
     return None if min(a, b, c) > 0.0 or max(a, b, c) < 0.0 else "elliptic"

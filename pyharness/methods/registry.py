@@ -1,4 +1,4 @@
-"""The one registry: every way to turn a scene into a trajectory, and what can be said of it."""
+"""The registry of all methods that turn a scene into a trajectory, with their properties."""
 
 import importlib
 from collections.abc import Sequence
@@ -13,40 +13,40 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, tolerance_of
 
-# Of 1 to 8 stages: low orders would need more steps than anyone waits for.
+# For 1 to 8 stages. Low orders would need too many steps for finer tolerances.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
 _GAUSS_DEFAULT = (1e-6, 1e-10, *6 * (1e-12,))
-# Of SciPy's methods. With attitude, over a hundred radians or where a perturbation grows a
-# thousandfold, none of them meets a tighter one; and Radau takes too long.
+# For SciPy's methods. With attitude, over a hundred radians or where perturbations grow a
+# thousandfold, no method of SciPy meets a finer tolerance, and Radau takes too long.
 _SCIPY_DEFAULT = 1e-8
 _DEFAULT = 1e-12
 
 
 @dataclass(frozen=True)
 class Method:
-    """What turns a scene into a trajectory, and is no program of the appendix."""
+    """A method that turns a scene into a trajectory, as distinct from a program of the appendix."""
 
     name: str
     title: str
     source: str
-    finest: float  # the smallest tolerance that it claims to meet; 1 where it takes none
-    # The tolerance where none is requested: the finest that it meets in ordinary scenes within
-    # a fraction of its work limit, but no finer than 1e-12; 1 where it takes none.
+    finest: float  # the smallest tolerance that it claims to meet; 1 if it takes no tolerance
+    # The tolerance if none is requested: the finest that the method meets in ordinary scenes
+    # within a fraction of its work limit, but no finer than 1e-12; 1 if it takes no tolerance.
     default: float
-    solve: Integrator  # called with checked times, of one side, that run away from 0
-    gives_rows: bool = True  # else omega at the end alone, as a prepared solver
-    # The power of the step size with which its global error falls, where one can be given; and
-    # right-hand sides of such a step, where they are always as many.
+    solve: Integrator  # called with checked times on one side of 0, in order away from 0
+    gives_rows: bool = True  # else omega at the end alone, from a prepared solver
+    # The order of the global error in the step size, if it is fixed, else 0; and the right-hand
+    # sides per step, if their number is fixed, else 0.
     order: int = 0
     evaluations: int = 0
-    any_scale: bool = False  # brings the scene near 1 itself, or forms no products in binary64
-    attitude: bool = False  # carries it beside omega, where the scene has one
-    space_torque: bool = False  # with it, takes a torque about the axes of space
-    scipy: str = ""  # the name that SciPy has for it; empty where it is ours
+    any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
+    attitude: bool = False  # propagates the attitude together with omega
+    space_torque: bool = False  # takes a torque about the axes of space, together with attitude
+    scipy: str = ""  # SciPy's name of the method; empty for our own methods
 
     @property
     def is_fixed_step(self) -> bool:
-        """Whether it goes in the scene's steps, whatever their error."""
+        """Return whether the method advances with the scene's step size, without error control."""
         return self.finest == 1.0
 
 
@@ -66,7 +66,7 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver of a room of `pyharness.methods`, which is imported when it is first used."""
+    """Return a solver from a module of `pyharness.methods`, imported when it is first used."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.methods.{room}"), name)
@@ -163,7 +163,7 @@ REGISTRY = {
             "quick",
             "Runge-Kutta in scaled unknowns, for few digits at the end",
             "fortran/modern/scaled_runge_kutta.f90",
-            # Below it the rounding of its many steps would count.
+            # At finer tolerances the rounding errors of its many steps would matter.
             1e-12,
             _DEFAULT,
             _no_rows,
@@ -171,32 +171,35 @@ REGISTRY = {
         ),
     )
 }
-# Those that give rows.
+# The methods that give rows at requested times.
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
-# With the names that SciPy has for them.
+# The methods of SciPy, by our names, with SciPy's names.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the requested tolerance as a float, or the method's default where it is None.
+    """Return the requested tolerance as a float, or the method's default if it is None.
 
-    InputError for a tolerance that is no number; its range is not checked.
+    Raise InputError if the tolerance is no number. Its range is not checked.
     """
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
 
 def check_attitude(method: str) -> None:
-    """Refuse a method that carries no attitude."""
+    """Raise InputError if a method can't propagate the attitude."""
     if not REGISTRY[method].attitude:
         able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
         raise InputError(f"method {method} carries no attitude; allowed: {able}")
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Refuse a torque about the axes of space where the method, or no attitude, can't take it."""
+    """Raise InputError for a torque about the axes of space that the method can't take.
+
+    Raise it too if such a torque acts and `attitude` is false.
+    """
     if not scene.torque.in_space:
         return
     if not REGISTRY[method].space_torque:

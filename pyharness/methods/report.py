@@ -45,11 +45,10 @@ def trajectory_report(
     form: str = "quaternion",
     word: str | None = None,
 ) -> Report:
-    """Report one trajectory; `listing` is None for a method that is no program.
+    """Return the report of one trajectory; `listing` is None for a method that is no program.
 
-    `word` is the arithmetic of a program, where it is not binary64.
-
-    An attitude is shown in a form of `model.attitude.FORMS`.
+    `word` is the arithmetic of a program that did not run in binary64. An attitude is shown as
+    `form`, a name in `model.attitude.FORMS`.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -64,7 +63,7 @@ def trajectory_report(
     rows = np.column_stack(parts)
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
-    # Nine numbers of a matrix leave no room for others in a terminal.
+    # The nine elements of a matrix leave no space for other columns in a terminal.
     kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
     counted = Table(
         [Column("step", digits(".0f")), *(columns[k] for k in kept)],
@@ -110,7 +109,7 @@ def _shown(attitude: Array, form: str) -> Array:
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
-    """Draw the components over time; say where they end, if not with the last step."""
+    """Draw the components of omega over time; a note says why they end before the last time."""
     from matplotlib.figure import Figure
 
     has_attitude = trajectory.attitude is not None and len(trajectory.time) > 0
@@ -137,14 +136,14 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Mark where a program ended, at the edge where it has left the frame."""
+    """Mark the last point of a trajectory, at the edge of the frame if the point is outside."""
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Report what is decided for a scene."""
+    """Return the report of the plan for a scene."""
     table = Table(
         words("part computed why"),
         [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],

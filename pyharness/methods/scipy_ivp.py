@@ -1,8 +1,9 @@
-"""`scipy.integrate.solve_ivp` as methods; SciPy is imported when one is used.
+"""The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is used.
 
-SciPy controls the error of a step, a tolerance here is on the error at the times asked for. A
-coarse run ahead tells what lies between the two: the largest omega, to which both are relative;
-how far the motion goes, over which errors of steps add up; and how it multiplies them.
+SciPy controls the local error of each step, whereas a tolerance here limits the error at the
+requested times. A preliminary integration with few digits supplies three quantities that connect
+the two: the largest omega, to which both are relative; the phase of the motion, over which local
+errors add up; and the error amplification.
 """
 
 import math
@@ -24,58 +25,63 @@ from pyharness.scenes.rescaled import omega_by_torque
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
-# What errors of steps add up to until the end, in those of one step, at the most: so much in a
-# motion of a few radians, and so much more for each radian times the factor by which a difference
-# grows. Measured on random scenes other than those that check it, with half as much again.
+# Largest error at the end over the local error: this much in a motion of a few radians, and, from
+# the next table, this much more for each radian times the error amplification. Both were measured
+# on random scenes other than those of the checks, and increased by half.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
-# Likewise for each radian that the body turns, where its attitude is wanted: an error of omega
-# turns it all the way.
+# Likewise for each radian by which the body rotates, if its attitude is requested: an error of
+# omega rotates the attitude until the end.
 _SUM_A_TURN = {"DOP853": 5.5, "RK45": 2.5, "Radau": 0.5, "LSODA": 55.0}
-# Growth beyond which a tolerance is left to be multiplied by it, as it is by every method's.
+# The local tolerance makes up for an error amplification up to this one. A larger one multiplies
+# the tolerance, as it does with every method.
 _SENSITIVE = 1e3
-# Rows on the way are read off a polynomial in each step, whose error is not controlled.
+# Intermediate output comes from a polynomial in each step, whose error is not controlled.
 _ROWS = 4.0
-# Radians of a wave that no step may pass over: a method that meets a fast wave always in the same
-# place takes it for a constant torque, however small the differences that it sees.
+# Longest step in radians of a wave. A method that samples a fast wave always at the same phase
+# takes it for a constant torque, however small its error estimates are.
 _WAVE_STEP = 2.0
-# solve_ivp takes none below 100 times the rounding of 1; what is claimed with it is for motions
-# of a few radians.
+# solve_ivp accepts no relative tolerance below 100 times the machine epsilon. The tolerances that
+# the methods claim to meet with it (FINEST) are for motions of a few radians.
 _FINEST_STEP = 2.222e-14
 _A_FEW = 1.05
 FINEST = {name: _A_FEW * _FINEST_STEP * total for name, total in _SUM.items()}
 
 _COARSE = 1e-3
-# A scale that is so many times too large is no scale for a coarse run.
+# The preliminary integration is repeated if its scale was larger than the solution by this factor.
 _FAR = 4.0
 _MOST_GUESSES = 200
 _NODES_PER_RADIAN = 4.0
 _FEWEST_NODES, _MOST_NODES = 30, 20_000
 
-# A phase of so many radians has hardly a digit left in binary64. What still grows there is on
-# its way to infinity in finite time, and LSODA would never come back from it.
+# A phase of so many radians has hardly a digit left in binary64. An omega that still grows there
+# becomes infinite in finite time, and LSODA would not return.
 _LARGEST_PHASE = 1e13
-# Five to ten seconds of Python; each wave of a torque adds an eighth to what a right-hand side
-# costs, and Radau solves linear systems besides.
+# Work limit, five to ten seconds of Python. Each wave of a torque adds an eighth to the cost of a
+# right-hand side; Radau also solves linear systems.
 _MOST_EVALUATIONS = 500_000
 _RADAU_SHARE = 2
-# LSODA squares the span for its first step: below 1e-150 s that is none at all, and it stands.
+# LSODA squares the time span for its first step. Below 1e-150 s the square is 0, and LSODA makes no
+# progress.
 _SHORTEST_SPAN = 2.0**-300
 
 
 class _Ahead(NamedTuple):
-    """What a scene makes of the errors of steps, as a coarse run sees it."""
+    """The results of a preliminary integration with few digits, which set the local tolerance."""
 
-    largest: float  # abs(omega) of any component from 0 to the end, rad/s
-    # The largest coefficient times omega, summed over the time; and the waves of the torque, as far
-    # as they move it.
+    largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
+    # Integral over time of the largest coefficient times omega, plus the radians of the torque's
+    # waves; a wave counts only as far as it can change omega.
     radians: float
-    growth: float  # the most by which a small difference on the way reaches the end, at least 1
-    turned: float = 0.0  # radians that the body turns, where its attitude is wanted
+    growth: float  # error amplification until the end, at least 1
+    turned: float = 0.0  # radians by which the body rotates, if its attitude is requested
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return what errors of steps of a method of SciPy add up to, in those of one step."""
+    """Return the bound of a SciPy method's error at the end, in units of its local error.
+
+    `radians`, `growth` and `turned` are those of `_Ahead`.
+    """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 
@@ -87,7 +93,7 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
 
 
 def scipy_method(name: str) -> Integrator:
-    """Return the solver by a method of `solve_ivp`, with the scene's own right-hand side."""
+    """Return a solver by a method of `solve_ivp`, which calls the scene's right-hand side."""
 
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
@@ -98,7 +104,7 @@ def scipy_method(name: str) -> Integrator:
         try:
             ahead = run.ahead()
             if ahead.largest == 0.0:
-                # At rest, and nothing that would move it.
+                # The body is at rest, and no torque acts.
                 rest = np.tile(state_of(scene), (len(times), 1))
                 return _rows_of(times, rest, run.evaluations, len(times), "complete")
             run.carry_attitude()
@@ -117,10 +123,12 @@ def scipy_method(name: str) -> Integrator:
             noise = torque_noise(scene, scene.omega, times[-1], scale=ahead.largest)
             is_blurred = noise > 0.0 and is_sensitive(ahead.growth, tolerance, noise)
             if is_blurred:
-                # No step errs less than the rounding of the torque, and the search for one is long.
+                # No step has an error below the rounding of the torque, and the step-size control
+                # would search long for one.
                 step = max(step, ROUNDING * noise)
             allowed = step * ahead.largest
-            # No step is longer than that of a wave which over the whole time would count.
+            # Limit the step by the fastest wave that can change omega noticeably over the whole
+            # time.
             waves_that_count = (f for push, f in _pushes(scene) if push * abs(times[-1]) > allowed)
             fastest = max(waves_that_count, default=0.0)
             longest = _WAVE_STEP / fastest if fastest > 0.0 else math.inf
@@ -128,7 +136,7 @@ def scipy_method(name: str) -> Integrator:
             result = run.solved(name, step, sizes, times, longest)
             low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
             if result.status == 1 and low <= 0.0 <= high:
-                # It is not on its way to infinity: it turns, and no one can tell how far.
+                # Omega is bounded, but its phase can't be computed any further.
                 raise TimedError(
                     f"{run.label} gave up at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
                     "the phase has hardly a digit left; take a shorter time",
@@ -143,20 +151,20 @@ def scipy_method(name: str) -> Integrator:
         ended = "complete" if count == len(times) else "overflow"
         if ended == "complete" and is_blurred:
             ended = "sensitive"
-        # The result does not carry the steps taken; right-hand sides are what is counted, those of
-        # the coarse run too.
+        # SciPy does not report the number of steps. The right-hand sides include those of the
+        # preliminary integration.
         return _rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
 
     return solve
 
 
 def state_of(scene: Scene) -> tuple[float, ...]:
-    """Return omega at time 0, and the attitude of a scene that has one."""
+    """Return omega at time 0, followed by the attitude if the scene has one."""
     return (*scene.omega, *(scene.attitude or ()))
 
 
 def turning(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side of omega, and with it q (0, omega)/2."""
+    """Return the right-hand side of omega and attitude q, from `slopes` and q' = q (0, omega)/2."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, a, b, c, d = state
@@ -174,7 +182,7 @@ def turning(slopes: RightHandSide) -> RightHandSide:
 def _rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory of rows of omega, or of omega and attitude."""
+    """Return a trajectory from rows of omega, or of omega and attitude."""
     found = rows_trajectory(times, rows[:, :3], evaluations, steps, ended)
     if rows.shape[1] == 3:
         return found
@@ -183,17 +191,17 @@ def _rows_of(
 
 
 class _NoNumberError(Exception):
-    """Linear algebra met what has left the range of numbers."""
+    """An exception that SciPy's linear algebra met a number that is not finite."""
 
 
 class _Run:
-    """Calls of `solve_ivp` for one scene and time; all their right-hand sides are counted."""
+    """The calls of `solve_ivp` for one scene and time, with a count of all right-hand sides."""
 
     def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
         self.scene, self.end, self.effort = scene, end, effort
         self.label = name.lower()
         self.evaluations = 0
-        # A power of 2 in which a span is no tiny number; 1 for most.
+        # Unit of time (s): a power of 2 near the span if that is tiny, else 1.
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
         self.rate = max(map(abs, scene.euler_coefficients))
         self.start: tuple[float, ...] = scene.omega
@@ -203,7 +211,7 @@ class _Run:
             self.most //= _RADAU_SHARE
 
     def carry_attitude(self) -> None:
-        """Go on with seven unknowns, where the scene has an attitude; a coarse run needs none."""
+        """Add the attitude to the unknowns, if the scene has one, for the main integration."""
         if self.scene.attitude is not None:
             self.start = state_of(self.scene)
             self.slopes = turning(self.slopes)
@@ -216,14 +224,14 @@ class _Run:
         times: Sequence[float] | None = None,
         longest: float = math.inf,
     ) -> Any:
-        """Return what `solve_ivp` finds at `times`; with its dense output where none are given."""
+        """Return the result of `solve_ivp` at `times`, or with dense output if there are none."""
         from scipy.integrate import solve_ivp
 
         def phase_left(time: float, omega: Sequence[float]) -> float:
             return _LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, omega[:3]))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
-        # LSODA warns of what the rows that are missing say already.
+        # A warning of LSODA only repeats what missing rows show.
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             try:
                 return solve_ivp(
@@ -241,7 +249,7 @@ class _Run:
             except InputError:
                 raise
             except (ValueError, ArithmeticError) as error:
-                # Radau's linear algebra refuses what has left the range of numbers.
+                # Radau's linear algebra refuses numbers that are not finite.
                 if "infs or NaNs" in str(error):
                     raise _NoNumberError from None
                 raise InputError(
@@ -250,7 +258,7 @@ class _Run:
                 ) from None
 
     def _scale_by_torque(self) -> float:
-        """Return the largest omega that torque alone can give, 1 where that is no number."""
+        """Return a bound of the omega that torque alone can give, rad/s; 1 if it is not finite."""
         bound = omega_by_torque(self.scene, self.end)
         return bound if math.isfinite(bound) else 1.0
 
@@ -272,10 +280,11 @@ class _Run:
 
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
-        """Look ahead in a coarse run, whose own scale is found on the way.
+        """Integrate with few digits, and return the quantities that set the local tolerance.
 
-        Where omega leaves every bound, what start or torque alone would give is the scale, and
-        nothing is known of the rest.
+        The integration is repeated until the scale of its own tolerance fits the solution. If omega
+        grows without bound, the scale is the larger of the initial omega and the omega that torque
+        alone would give. The other quantities are then unknown and get their least values.
         """
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
@@ -288,7 +297,8 @@ class _Run:
                 break
             scale = largest
         if coarse.status != 0:
-            # It leaves every bound, or loses its phase: no tolerance is met to the end.
+            # Omega grows without bound, or its phase has no digit left: no tolerance can be met
+            # until the end.
             return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
@@ -306,7 +316,7 @@ class _Run:
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return the largest torque over moment (1/s2) of each wave, and how fast it turns (rad/s)."""
+    """Return the largest torque over moment (1/s2) and the frequency (rad/s) of each wave."""
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
@@ -315,7 +325,7 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 
 
 def _turned(scene: Scene, span: float, largest: float) -> float:
-    """Return the radians by which waves turn, each as far as it moves so large an omega."""
+    """Return the radians of all waves, counted as far as each can change an omega of `largest`."""
     found = 0.0
     for push, frequency in _pushes(scene):
         found += min(frequency * span, push * span / largest if largest > 0.0 else 0.0)

@@ -1,4 +1,4 @@
-"""What a motion makes of rounding: growth of small differences, and the error that it implies."""
+"""Sensitivity of a motion to rounding: the error amplification, and the error that it implies."""
 
 import math
 from dataclasses import replace
@@ -12,21 +12,21 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING
 from pyharness.scenes.rescaled import rescaling_factor, scaled
 
-# Of the tolerance: rounding times growth beyond it is told of. One third either way is left to the
-# norm of the growth, and to how many differences were followed.
+# Rounding times growth beyond this fraction of the tolerance makes a result sensitive. The fraction
+# leaves a factor of three for the norm and for the number of perturbations that were propagated.
 _SHARE = 0.3
-# Beside the growth of one rounding, relative: the bound that `tests/methods/test_closed_form.py`
-# holds the closed form to.
+# Relative error of a closed form in addition to an amplified rounding error: the bound that
+# `tests/methods/test_closed_form.py` checks.
 _CLOSED_FORM_ERROR = 16.0 * ROUNDING
-# The series is asked for the growth alone: few digits, and a twentieth of a second at the most.
+# The series supplies only the growth: it needs few digits, and a twentieth of a second at most.
 _COARSE = 1e-3
 _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Whether rounding times a known growth exceeds the tolerance (relative).
+    """Return whether rounding times a known growth exceeds a fraction of the tolerance (relative).
 
-    `noise` is that of the torque, in roundings of omega.
+    `noise` is the rounding error of the torque, in roundings of omega.
     """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
@@ -38,11 +38,12 @@ def torque_noise(
     steps: float = math.inf,
     scale: float | None = None,
 ) -> float:
-    """Return the rounding of torques that nearly cancel, until `t_end` (s), in roundings of omega.
+    """Return the rounding error of torques that nearly cancel, in roundings of omega.
 
-    That is what the terms of the torque law give one by one over the largest omega, `scale`
-    (rad/s), and 0 where they do not cancel. They are rounded in each of so many steps. Without the
-    scale it is the larger of the start, `omega0` (rad/s), and of what the whole torque gives.
+    It is the omega that the terms of the torque law would give one by one until `t_end` (s), over
+    the largest omega, `scale` (rad/s). It is 0 if the terms do not cancel. The terms are rounded in
+    each of `steps` steps. Without `scale` the largest omega is taken to be the larger of the
+    initial one, `omega0` (rad/s), and the one that the whole torque gives.
     """
     if not (scene.torque.sines or scene.torque.cosines):
         return 0.0
@@ -56,30 +57,32 @@ def torque_noise(
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
-    """Return error and growth of a closed form, started with omega0 (rad/s), at `t_end` (s).
+    """Return the error and the growth of a closed form from `omega0` (rad/s) at `t_end` (s).
 
-    The error of omega is relative to the largest omega until then; with an attitude the error
-    includes that of the angle (rad). Both are None where there is no closed form. `noise` is that
-    of the torque, in roundings of omega.
+    The error of omega is relative to the largest omega until then. With an attitude the error
+    includes the error of the angle (rad). Both are None if there is no closed form. `noise` is the
+    rounding error of the torque, in roundings of omega.
     """
     growth: float | None = 1.0
-    # A sphere's perturbations stay as they are.
+    # A sphere does not amplify perturbations.
     if any(scene.euler_coefficients):
         growth = known(extension().torque_free_growth(scene.euler_coefficients, omega0, t_end))
     if growth is None:
         return None, None
     error = ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR
     if isinstance(scene, PrincipalScene) and scene.attitude is not None:
-        # The start was rounded about principal axes: a wrong speed, and so a growing angle.
+        # The initial omega was rounded about principal axes. The error of the speed makes the error
+        # of the angle grow with time.
         error += ROUNDING * max(map(abs, omega0)) * abs(t_end)
     return error, growth
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:
-    """Return the growth of a small difference until `t_end` (s), whatever method solves the scene.
+    """Return the error amplification of a motion until `t_end` (s), whatever method solves it.
 
-    That is the largest norm of the derivative of omega at the end by omega at any time before:
-    from a closed form where there is one, else from the Taylor series; None where neither tells.
+    It is the largest norm of the state-transition matrices, the derivatives of omega at the end
+    with respect to omega at any earlier time. It comes from a closed form if there is one, else
+    from the Taylor series. It is None if neither can determine it.
     """
     if closed_form(scene):
         _, growth = closed_form_estimate(scene, scene.omega, t_end)

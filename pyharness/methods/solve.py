@@ -1,4 +1,8 @@
-"""`solve`: the door to every method that gives rows; times, units and sides of 0 are its own."""
+"""The function `solve`, the common entry point of all methods that give rows.
+
+It orders the times and rescales the scene, so that a method integrates from 0 to one side, in units
+in which it can form its products.
+"""
 
 import itertools
 import math
@@ -40,41 +44,44 @@ def solve(
     effort: float = 1.0,
     attitude: bool = False,
 ) -> Trajectory:
-    """Solve a scene.
+    """Solve a scene at given times.
 
     Parameters
     ----------
     scene : Scene
-        Its step size plays a part only for the fixed-step methods.
+        The scene. Only methods with a fixed step use its step size.
     times : float or iterable of float, shape (n,)
-        Where the result is wanted (s): strictly monotonic. On both sides of 0 the scene is solved
-        twice, from 0 backward and from 0 forward.
+        Times of the results (s), strictly monotonic. If there are times on both sides of 0, the
+        scene is solved twice, from 0 backward and from 0 forward.
     method : str
         A name in `pyharness.methods.registry.METHODS`.
     tolerance : float
-        Largest error of any component at `times`, relative to the largest from 0 to the last of
-        them. By default it is the method's own (`Method.default` in the registry), 1e-12 for
-        `auto`; the trajectory's `tolerance` reports it. A fixed-step method takes none.
+        Largest error of any component at `times`, relative to the largest component from 0 to the
+        last time. By default it is the method's own (`Method.default` in the registry), 1e-12 for
+        `auto`; the trajectory's `tolerance` reports it. A method with a fixed step takes none.
     effort : float
-        Factor on the work after which the method gives up: 1 is some ten seconds.
+        Factor on the work limit; 1 is some ten seconds.
     attitude : bool
-        Whether the attitude is wanted too, from that of the scene, or from the axes of space where
-        it has none. The tolerance then holds for its angle (rad) as well. A torque about the axes
-        of space needs it.
+        Whether the attitude is computed too. It starts from the attitude of the scene, or from the
+        axes of space if the scene has none. The tolerance then also applies to its angle (rad). A
+        torque about the axes of space needs the attitude.
 
     Returns
     -------
     Trajectory
-        One row per time, in the order of `times`; fewer where the solution overflows: those between
-        0 and the overflow, on either side. Steps and evaluations are of both sides together. Under
-        a torque about the axes of space `error` is what two marches differ by, `growth` None.
+        One row per time, in the order of `times`. If the solution overflows, there are only the
+        rows between 0 and the overflow, on either side. `steps` and `evaluations` are totals of
+        both sides. Under a torque about the axes of space `error` comes from the difference of two
+        integrations, and `growth` is None.
 
     Raises
     ------
     InputError
-        For an unknown method, one that can't take the scene or carry its attitude, a torque about
-        the axes of space without attitude, times out of order, a tolerance that the method can't
-        meet, or one that takes more work than `effort` allows.
+        If the method is unknown, or can't take the scene or propagate its attitude; if a torque
+        about the axes of space comes without attitude; if the times are not in order; if the method
+        can't meet the tolerance, or needs more work for it than `effort` allows.
+    NotBuiltError
+        If the method needs the extension, and it is not built.
 
     Examples
     --------
@@ -100,18 +107,18 @@ def solve(
     check_torque(scene, method, attitude)
     if attitude:
         check_attitude(method)
-    # Who does not ask for it pays nothing.
+    # An attitude that was not requested is not computed.
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:
         scene = replace(scene, attitude=start)
     is_full = scene.inertia is not None
     scene, axes = principal(scene)
-    if method != "reference":  # which rounds no amplitude
+    if method != "reference":  # the reference rounds no amplitude
         scene = with_merged_waves(scene)
     effort = checked_effort(effort)
     values, turned = _ascending(times)
     below = [t for t in values if t < 0.0]
-    # On either side away from 0.
+    # On either side in order away from 0.
     sides = (below[::-1], values[len(below) :])
     marches = [_march(chosen, scene, each, tolerance, effort) for each in sides if each]
     if below:
@@ -125,11 +132,12 @@ def solve(
 
 
 def finest(method: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that a method of the registry can meet in a scene.
+    """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    The one that it claims; more for `solve_ivp`, whose steps can't be told to err less than by
-    some 2e-14, where many add up or the motion multiplies them. InputError where it would need too
-    many steps even to see that.
+    For most methods it is the tolerance that the method claims to meet. The methods of `solve_ivp`
+    accept no local tolerance below some 2e-14. Their smallest tolerance is larger than the claimed
+    one if many local errors add up or if the motion amplifies them. Raise InputError if too many
+    steps would be needed to determine it.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -142,11 +150,12 @@ def finest(method: str, scene: Scene, time: float) -> float:
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve as the plan for rows says."""
+    """Solve a scene by the method that the plan chooses for output at `times`."""
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
     try:
-        # A closed form is as good as rounding lets it be, and may be asked for more than it claims.
+        # A closed form has only rounding errors, so that it is used for tolerances finer than it
+        # claims to meet as well.
         return method.solve(scene, times, tolerance, effort)
     except InputError as refusal:
         if chosen.fallback is None:
@@ -160,9 +169,9 @@ def by_plan(
 def _march(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
-    """Solve at times away from 0, in units in which the method can form its products."""
+    """Solve at times on one side of 0, in units in which the method can form its products."""
     if not chosen.is_fixed_step and not is_ordinary(scene):
-        # The step plays no part; in other units it might be no number.
+        # The step is not used, but in other units it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
     factor = 1.0 if chosen.any_scale else rescaling_factor(scene, times[-1])
     if factor == 1.0:
@@ -184,7 +193,7 @@ def _rows(found: Trajectory) -> tuple[str, ...]:
 
 
 def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return the rows of two marches from 0; what overflows is missing at the ends."""
+    """Return the rows of two integrations from 0, backward and forward, as one trajectory."""
     both = before, after
     rows: dict[str, Any] = {
         name: np.concatenate([getattr(x, name) for x in both]) for name in _rows(after)
@@ -205,7 +214,7 @@ def _larger(first: float | None, second: float | None) -> float | None:
 
 
 def _ascending(times: object) -> tuple[list[float], bool]:
-    """Return the times in ascending order, and whether that turned them round."""
+    """Return the times in ascending order, and whether they had to be reversed."""
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
         times = (times,)
     if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":

@@ -1,4 +1,4 @@
-"""A solver: a scene prepared for one method, in C for calls in a loop."""
+"""Solvers of a scene, prepared for one method and called through C, for use in a loop."""
 
 import reprlib
 from dataclasses import replace
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 else:
     try:
         from pyharness._solver import BoundKernel
-    except ImportError:  # not built, as `extension` says when a solver is made
+    except ImportError:  # not built: `extension` raises NotBuiltError when a solver is made
         BoundKernel = object
 
 CODES = {
@@ -47,43 +47,58 @@ CODES = {
 }
 PREPARED = ("auto", *(name for name in CODES if name not in ("sphere", RK4_OR_TAYLOR)))
 
-_FEW_WAVES = 16  # that take less time than releasing the GIL does
+_FEW_WAVES = 16  # so few waves take less time than releasing the GIL
 
 
 class Solver(LastCall, BoundKernel):
-    """A scene prepared for one method.
+    """A solver of a scene, prepared for one method by `prepare`.
 
-    Call it as ``solver(omega0, t_end)``: `omega0` three real numbers (rad/s), `t_end` one, in
-    seconds on either side of 0. It returns the angular velocity at `t_end`, a new array of shape
-    (3,); or ``solver(omega0, t_end, out=array)`` writes it into an array of three floats that lie
-    side by side, which may be `omega0` itself, and returns that. What is none of these is refused
-    with an InputError, and `out` stays as it was. Fastest is an array of floats for `omega0`.
+    Call it as ``solver(omega0, t_end)``. `omega0` is three real numbers (rad/s), `t_end` a time in
+    seconds, positive, negative or 0. A call returns the angular velocity at `t_end` (rad/s) as a
+    new array of shape (3,). ``solver(omega0, t_end, out=array)`` writes it into a contiguous array
+    of three floats, which may be `omega0` itself, and returns that array. Any other argument is
+    refused with an InputError, and `out` is not changed. Calls are fastest if `omega0` is an array
+    of floats.
 
-    Where the kernel could not finish the result is NaN and `status` says why; so it is from a
-    start, or to a time, that is not finite. `error`, `growth` and `digits` say how good it is.
+    If the kernel could not finish, the result is NaN and `status` gives the reason. The same holds
+    if `omega0` or `t_end` is not finite. `error`, `growth` and `digits` report the accuracy.
 
-    Threads may share a solver and call it at once: the kernel releases the GIL, but where it takes
-    less time than that, as a closed form does. Solvers can be
-    copied and pickled; a copy has made no call yet.
+    Threads may share a solver and call it at the same time. The kernel releases the GIL, unless the
+    solution takes less time than releasing it, as a closed form does. Solvers can be copied and
+    pickled; a copy has made no call yet.
 
     Attributes
     ----------
     plan : Plan
-        What was decided, and why.
+        The method and the parts that are computed, with the reasons.
+    status, error, growth, digits, steps, method
+        The status, the accuracy, the number of steps and the method of this thread's last call.
+    many : callable
+        Solves many initial angular velocities in one call.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, prepare
+    >>> solver = prepare(case_scene(1))
+    >>> solver([1.0, 1.0, 1.0], 2.0)
+    array([6., 6., 6.])
+    >>> solver.status
+    'complete'
     """
 
     _packed: Array
     _packed_with_gil: Array | None
 
-    # A kernel bound to its data, in C: a call goes from the interpreter into the kernel with no
-    # Python between, which would cost as much as an easy solve.
+    # The base class binds a kernel to its data in C. A call goes from the interpreter into the
+    # kernel without Python code in between, which would take as long as an easy solution.
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
-        """Pack what does not change; `prepare` is the way to make one."""
+        """Pack the data that all calls share; users call `prepare` instead."""
         kernel = extension().solve_packed
         packed = packed_scene(chosen.scene, _code(chosen), tolerance, effort)
         packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
-            # Where there is a fallback, it is no part of that.
+            # The call that keeps the GIL has no fallback, which may take long. If it fails, the
+            # kernel is entered again without the GIL.
             packed_with_gil = packed.copy()
             packed_with_gil[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
         solver = super().__new__(cls, kernel, packed, _check, packed_with_gil)
@@ -94,13 +109,14 @@ class Solver(LastCall, BoundKernel):
 
     @cached_property
     def many(self) -> "ManyStarts":
-        """Solve many starts in one call: ``solver.many(omega0, t_end, threads=1, out=None)``.
+        """Return the function that solves many initial omegas in one call.
 
-        `omega0` has shape (n, 3), `t_end` is a number or has shape (n,); returned are omega, shape
-        (n, 3), which may be `out`, and the status of each, int8: see `Ensemble`. Each result
-        depends on its own start and time alone, whatever the number of starts, their order and the
-        threads. It keeps the same tolerance as a call of the solver, but with other roundings, for
-        a single start too. An InputError refuses any other argument.
+        Call it as ``solver.many(omega0, t_end, threads=1, out=None)``. `omega0` (rad/s) has shape
+        (n, 3), `t_end` (s) is a number or has shape (n,). A call returns omega, shape (n, 3), which
+        is `out` if that is given, and the statuses, int8, as in `Ensemble`. Each result depends
+        only on its own initial omega and time, not on the number of rows, their order or the
+        threads. It meets the same tolerance as a call of the solver, but its rounding errors
+        differ, even for a single row. Any other argument is refused with an InputError.
         """
         from pyharness._many import ManyStarts
 
@@ -111,7 +127,7 @@ class Solver(LastCall, BoundKernel):
 
     @property
     def method(self) -> str:
-        """The method of this thread's last call, where the kernel chose; else that of the plan."""
+        """Return the method of this thread's last call if the kernel chose it, else the plan's."""
         steps = self._counted()
         if not steps:
             return self.plan.method
@@ -120,9 +136,10 @@ class Solver(LastCall, BoundKernel):
         return self.plan.fallback or self.plan.method
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return rows from another start (rad/s) at `times` (s), strictly monotonic, on any side.
+        """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it.
 
-        InputError for a start that is not three finite numbers, or times out of order.
+        The times are strictly monotonic, on one or both sides of 0. Raise InputError if `omega0` is
+        not three finite numbers, or if the times are not in order.
         """
         return self._rows(replace(self.plan.scene, omega=three("omega0", omega0)), times)
 
@@ -132,13 +149,13 @@ class Solver(LastCall, BoundKernel):
 
         tolerance, asked, effort = self._given
         method = "taylor" if asked == "quick" else asked
-        # What was prepared in the scene's steps has no tolerance of its own.
+        # A method with a fixed step takes no tolerance: `solve` expects 1 for it.
         tolerance = max(tolerance, METHODS[method].finest)
         return solve(scene, times, method, tolerance, effort)
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Convert what a call was given and can't read at once; InputError for what is none."""
+    """Convert arguments that the C code can't read directly; raise InputError for invalid ones."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None and (found := no_buffer(out)):
         raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")
@@ -146,11 +163,11 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
 
 
 def no_buffer(out: object) -> str:
-    """Say what keeps `out` from being written to; nothing where nothing does."""
+    """Return the reason why `out` can't be written to, or an empty text if it can."""
     if not isinstance(out, np.ndarray):
         try:
             return reprlib.repr(out)
-        except ValueError:  # Python writes no whole number of many digits
+        except ValueError:  # Python refuses to print an integer of too many digits
             return "a number of too many digits to be shown"
     flags = out.flags
     if out.dtype.char != "d" or not out.dtype.isnative or out.shape != (3,):
@@ -161,10 +178,11 @@ def no_buffer(out: object) -> str:
 
 
 def _code(chosen: Plan) -> int:
-    """Return the number by which the kernel knows what was decided."""
+    """Return the kernel's code of the method that the plan chose."""
     if chosen.closed_form == "sphere":
         return CODES["sphere"]
     if chosen.method == "closed-form":
-        # A disturbance too faint to square: then the series, if that is not against the order.
+        # The closed form refuses a perturbation that is too small to be squared. The kernel then
+        # takes the series, unless the closed form was requested explicitly.
         return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else CODES["closed-form"]
     return CODES[chosen.method]

@@ -1,4 +1,4 @@
-"""Taylor series by recurrence, order and step size adapted."""
+"""Taylor series by recurrence, with adapted order and step size."""
 
 from collections.abc import Sequence
 
@@ -16,12 +16,13 @@ from pyharness.model.trajectory import Trajectory
 def taylor(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Solve a scene by Taylor series, each counted as one evaluation.
+    """Solve a scene by Taylor series, each of which counts as one evaluation.
 
-    With the attitude, where the scene has one. Steps are those of the last march, evaluations those
-    of all: a second one is made where the first erred too much. Under a torque about the axes of
-    space there are always two, the second to a finer local tolerance: what they differ by is the
-    error, that of the first, and the growth is not known.
+    The attitude is computed too if the scene has one. `steps` counts the steps of the last
+    integration, `evaluations` the steps of all integrations: another one follows if the error of
+    the first is too large. Under a torque about the axes of space there are at least two
+    integrations, the later ones with a finer local tolerance. Their difference then gives the
+    error, and the growth is unknown.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The attitude at time 0, and then a column for each time.

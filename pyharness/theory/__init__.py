@@ -1,1 +1,1 @@
-"""What may go wrong, derived beforehand."""
+"""Error bounds and stability limits, derived before any method is run."""

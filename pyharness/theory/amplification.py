@@ -1,10 +1,10 @@
-"""Linear stability: what a step of each program makes of a small disturbance.
+"""Linear stability: the amplification matrix of a step of each program.
 
-A disturbance of a steady rotation obeys x' = J x, and so does the velocity beside one. Along an
-eigenvector of J a step is a matrix whose elements are polynomials in z = h times the eigenvalue.
-They are worked out here by the algebra of each scheme, in fractions, and hold as they stand for
-hJ in place of z. The original Runge-Kutta program keeps a second vector, U(1), from step to
-step: its matrix has two rows, for U(1) and for the result.
+A perturbation of a steady rotation obeys a linear equation x' = J x, and so does the velocity of a
+body in steady rotation. Along an eigenvector of J a step is a matrix whose elements are polynomials
+in z = h times the eigenvalue. The algebra of each scheme gives them here in fractions. The same
+polynomials hold for the matrix hJ in place of z. The original Runge-Kutta program keeps a second
+vector, U(1), from step to step. Its matrix therefore has two rows, for U(1) and for the result.
 """
 
 from dataclasses import dataclass
@@ -21,22 +21,22 @@ from pyharness.theory.rational import Exact, Fractions, collocation_matrix, inve
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _HIGHEST = 5
-# A boundary nearer than that is the origin itself.
+# A stability boundary nearer to the origin than this is taken to be the origin.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """The matrix of one step."""
+    """The amplification matrix of one step."""
 
-    # of Fraction, shape (m, m, 5): element (i, j), the coefficients of 1, z ... z**4; the last row
-    # is the result's
+    # of Fraction, shape (m, m, 5): for element (i, j) the coefficients of 1, z ... z**4; the last
+    # row belongs to the result
     coefficients: Fractions
 
     @property
     def size(self) -> int:
-        """How many vectors are kept from step to step."""
+        """Return the number of vectors that are kept from step to step."""
         return len(self.coefficients)
 
     def at(self, z: Complex) -> Complex:
@@ -45,18 +45,25 @@ class Amplification:
         return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
 
     def radius(self, z: Complex) -> NDArray[np.float64]:
-        """Return the largest size of an eigenvalue at many z."""
+        """Return the spectral radius of the matrix at many z."""
         return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix without the result, where that only stays and gathers the rest."""
+        """Return the matrix without the result, if no other vector depends on the result.
+
+        The result then only accumulates the other vectors, with an eigenvalue that does not depend
+        on z.
+        """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
             return Amplification(self.coefficients[:-1, :-1])
         return self
 
     def of(self, matrix: Exact) -> Fractions:
-        """Return the matrix of a step for a system, from hJ of n rows: m n rows, exact."""
+        """Return the exact matrix of a step for a linear system, from hJ with n rows.
+
+        The matrix has m n rows.
+        """
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
         for k in range(1, _HIGHEST):
@@ -71,10 +78,10 @@ class Amplification:
 
 
 def amplification(listing: Listing, step: int = 1) -> Amplification:
-    """Return the matrix of a program's step number `step`, from 1.
+    """Return the amplification matrix of a program's step number `step`, counted from 1.
 
-    In collocation the first estimate takes the right-hand side z x constant, so that it is on a
-    straight line; one correction takes it along that.
+    In collocation the first estimate takes the right-hand side z x as constant, so that the
+    estimate is a straight line. The one correction evaluates the right-hand side along that line.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -85,9 +92,10 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return what a collocation program integrates s**2 over a step to, in steps cubed.
+    """Return a collocation program's integral of s**2 over a step, in units of the step cubed.
 
-    Along the first estimate the right-hand side is F + s J F + s**2 Q(F): the true weight is 1/3.
+    Along the first estimate the right-hand side is F + s J F + s**2 Q(F), where s is the time since
+    the beginning of the step. The exact integral is 1/3.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
@@ -95,14 +103,17 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return points, which `dt-accumulates` moves from step to step, and weights in their step."""
+    """Return the collocation points and the weights of a step, in units of the step.
+
+    With `dt-accumulates` the points move from step to step.
+    """
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
     return np.array(points, dtype=object), inverse(collocation_matrix(points)).sum(axis=0)
 
 
 def _runge_kutta(listing: Listing) -> Amplification:
-    """Follow U(1) and the base of the step through the four stages (cards 770-1200)."""
+    """Return the matrix of the four stages, from U(1) and the base of the step (cards 770-1200)."""
     first, base = _one(2, 0), _one(2, 1)
     half = Fraction(1, 2)
 
@@ -122,12 +133,12 @@ def _runge_kutta(listing: Listing) -> Amplification:
     matrix = np.array([kept, result], dtype=object)
     if listing.has("base-not-restored"):
         return Amplification(matrix)
-    # U(1) is the base: one vector, seen twice.
+    # U(1) and the base are the same vector, so that their columns are added.
     return Amplification(matrix[1:].sum(axis=1, keepdims=True))
 
 
 def _one(size: int, place: int) -> Fractions:
-    """Return the vector at `place` itself, shape (size, powers of z)."""
+    """Return the polynomials of vector number `place` itself, shape (size, powers of z)."""
     result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
     result[place, 0] = Fraction(1)
     return result
@@ -149,10 +160,10 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return how far along a direction disturbances do not grow, and the slope there.
+    """Return the distance along a direction up to which perturbations do not grow, and a slope.
 
-    Along -1 or 1j: distance 0 where they grow from the beginning; the slope is that of the
-    largest eigenvalue beyond the distance.
+    The direction is -1 or 1j. The distance is 0 if perturbations grow from the origin on. The slope
+    is that of the spectral radius just beyond the distance.
     """
 
     def grows(distance: float) -> bool:

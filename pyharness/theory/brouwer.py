@@ -1,8 +1,9 @@
-"""How rounding adds up over many steps of a torque-free motion: Brouwer's law, as bounds.
+"""Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
 
-Brouwer 1937, Astronomical Journal 46: where each step's rounding is a matter of chance, energy
-and momentum wander like the square root of the number of steps, and the phase, which sums up
-what the frequency has done, like its power 3/2. A rounding with a preference makes them 1 and 2.
+Brouwer 1937, Astronomical Journal 46: if the rounding error of each step is random, the errors of
+energy and momentum grow like the square root of the number of steps. The error of the phase, which
+is the integral of the frequency, grows like its power 3/2. If rounding is biased, the powers are 1
+and 2.
 """
 
 import math
@@ -18,53 +19,53 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 
 ROUNDING = 2.0**-53
-# Hoeffding 1963: a sum of n independent terms of mean 0 and at most c in size exceeds
-# 4 c sqrt(n) with a probability of 2 exp(-8), whatever their distribution.
+# Hoeffding 1963: a sum of n independent terms of mean 0 and at most c in magnitude exceeds
+# 4 c sqrt(n) with a probability of at most 2 exp(-8), whatever their distribution.
 DEVIATIONS = 4.0
-LAWS = {"energy": 0.5, "momentum": 0.5, "phase": 1.5}
+LAWS = {"energy": 0.5, "momentum": 0.5, "phase": 1.5}  # powers of the number of steps
 _SAMPLES = 256
 
 
 @dataclass(frozen=True)
 class Noise:
-    """What one step may add, over the largest abs(omega)."""
+    """Bounds of the errors that one step may add, relative to the largest abs(omega)."""
 
     step: float  # s
-    rounding: float  # bound of what rounding adds, as often up as down
-    truncation: float  # bound of what the method leaves out, which may have a preference
-    # whether truncation leaves energy and momentum alone, so that only the phase sees it
+    rounding: float  # bound of the rounding error, whose sign is random
+    truncation: float  # bound of the truncation error, which may have a bias
+    # whether truncation conserves energy and momentum, so that it affects the phase alone
     conserves: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One torque-free motion, as its bounds see it: largest values along it."""
+    """One torque-free motion, with the quantities along it that the bounds need."""
 
-    # shapes (n, 3), (n, 3), (n, 3, 3); along it: omega (rad/s), its derivative, and the derivative
-    # of that by omega
+    # along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its derivative (rad/s2),
+    # and the Jacobian of the derivative (1/s)
     states: Array
     slopes: Array
     jacobians: Array
     largest: float  # largest abs(omega), rad/s
     frequency: float  # of the motion about the polhode: 2 pi over the period (rad/s)
-    # by which an error of omega over `largest` enters energy, momentum (both relative) and the
-    # frequency (rad/s)
+    # largest factors from an error of omega, over `largest`, to the errors of energy and momentum
+    # (both relative) and of the frequency (rad/s)
     gains: dict[str, float]
-    turn: float  # the phase (rad) that an error of omega over `largest` amounts to
+    turn: float  # largest factor from an error of omega, over `largest`, to a phase error (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
-        """Return the bounds on energy, momentum and phase after a number of steps."""
+        """Return the bounds on the errors of energy, momentum and phase after `steps` steps."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
-        # A result is rounded once more. A, B, C have two roundings each, which moves what is
-        # conserved by no more than four of the energy, whatever the time.
+        # The result is rounded once more. A, B, C have two roundings each, which change the
+        # conserved quantities by at most four roundings of the energy, whatever the time.
         found = {
             name: (walk + (0.0 if noise.conserves else drift) + ROUNDING) * self.gains[name]
             + 4.0 * ROUNDING
             for name in ("energy", "momentum")
         }
-        # An error of step k shifts the frequency for the n - k steps that follow; the sum of
-        # the squares of n - k is n**3 / 3.
+        # An error of step k shifts the frequency for the n - k steps that follow. The sum of the
+        # squares of n - k is n**3 / 3.
         shear = self.gains["frequency"] * noise.step
         late = walk * steps / math.sqrt(3.0)
         if not noise.conserves:
@@ -74,7 +75,7 @@ class Orbit:
 
 
 def orbit(scene: Scene) -> Orbit:
-    """Follow a torque-free motion of a scene with moments through two periods."""
+    """Compute the `Orbit` of a torque-free scene with moments, over two periods."""
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
     times = np.linspace(0.0, 4.0 * math.pi / frequency, _SAMPLES).tolist()
@@ -88,7 +89,8 @@ def orbit(scene: Scene) -> Orbit:
         weight = moments**power
         total = (weight * states**2).sum(axis=1)
         part = (weight * np.abs(states)).sum(axis=1) * largest / total
-        # Energy is half of a square, momentum the root of one.
+        # A relative error of omega counts twice in the energy, which is a square, and once in the
+        # momentum, which is the root of one.
         gains[name] = float(part.max()) * (2.0 if name == "energy" else 1.0)
     gains["frequency"] = largest * max(_steepness(a, state) for state in states)
     along = jacobians(scene, states)
@@ -96,16 +98,17 @@ def orbit(scene: Scene) -> Orbit:
 
 
 def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
-    """Return rows in binary64."""
+    """Return decimal rows as an array in binary64."""
     return np.array([[float(x) for x in row] for row in rows])
 
 
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
-    """Bound the rounding of a step of the Taylor method by a running error analysis.
+    """Bound the rounding error of a step of the Taylor method by a running error analysis.
 
-    Term k is a sum of k products, each with k + 3 roundings at the most, and carries on the
-    errors of the terms below; omega enters without the part that compensated summation holds
-    back, half a unit in the last place. The sum of the terms rounds each three times.
+    Term k is a sum of k products, each with at most k + 3 roundings, and propagates the errors of
+    the terms below. Omega enters without the part that compensated summation retains, half a unit
+    in the last place. The sum of the terms rounds each of them three times. `left_out` is the bound
+    of the truncation error, relative to the largest omega.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -122,14 +125,15 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
 
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
-    """Bound rounding and truncation of a step of Gauss collocation.
+    """Bound the rounding and truncation errors of a step of Gauss collocation with s stages.
 
-    Each node's sum has s + 3 roundings of the rates and one of the state; the iteration carries
-    them on by the inverse of 1 - h A J. Quadratic invariants are conserved whatever the step.
+    The sum at each node has s + 3 roundings of the rates and one of the state. The iteration
+    propagates them by the inverse of 1 - h A J. Quadratic invariants are conserved for any step.
 
-    Truncation is the integral of the propagator times the defect, which vanishes at the nodes:
-    by their orthogonality only the power s of the rest counts, by Leibniz's rule a sum over the
-    derivatives j of the propagator, (h J)**j / j!, and the Taylor terms 2s + 1 - j.
+    The truncation error is the integral of the state-transition matrix times the defect, which
+    vanishes at the nodes. Because the nodes are those of an orthogonal polynomial, only the power s
+    of the remaining factor counts. By Leibniz's rule it is a sum over the derivatives j of the
+    state-transition matrix, (h J)**j / j!, and the Taylor terms 2s + 1 - j.
     """
     from pyharness.theory.tableau import tableau
 
@@ -155,7 +159,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms 0 ... order of a step along the motion (rad/s)."""
+    """Return the Taylor terms 0 ... order of a step from each point of the motion (rad/s)."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -169,9 +173,10 @@ def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
 def errors(
     scene: Scene, body: Orbit, time: float, omega: Array, rounded: bool = True
 ) -> dict[str, float]:
-    """Return relative errors of energy and momentum, and the error of phase (rad), with sign.
+    """Return the relative errors of energy and momentum and the phase error (rad), with signs.
 
-    `rounded`: the method has A, B, C in binary64, and not the moments.
+    If `rounded`, the exact solution takes A, B, C rounded to binary64, as a method does, instead of
+    the exact ones.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -193,21 +198,24 @@ def errors(
 
 
 def root_mean_square(found: Array) -> Array:
-    """Return the size of errors over the starts, rows of `found`; NaN, not so far, not counted."""
+    """Return the root mean square of errors over the initial conditions, the rows of `found`.
+
+    NaN, where an integration did not get so far, is not counted.
+    """
     return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return the power of the number of steps with which the mean square over the starts grows.
+    """Return the power of the number of steps with which the root mean square of errors grows.
 
-    `found` has a row for each start and a column for each number of steps.
+    `found` has a row for each initial condition and a column for each number of steps.
     """
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:
-    """Return 2 pi over the period about the polhode, by the arithmetic-geometric mean."""
+    """Return 2 pi over the period of the polhode (rad/s), by the arithmetic-geometric mean."""
     (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0.0 and a[i] * a[i - 2] < 0.0)
     squares = [abs(a[i - 1] * a[i - 2]) * omega[i] * omega[i] for i in range(3)]
     small, large = sorted((squares[odd - 1], squares[odd - 2]))
@@ -218,7 +226,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of the derivatives of the frequency by omega, without their signs."""
+    """Return the sum of the absolute derivatives of the frequency with respect to omega."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

@@ -1,6 +1,6 @@
-"""The matrices of collocation (eq. 36), and what LEQT1F makes of them.
+"""The matrices of collocation (eq. 36), and the accuracy of their solution by LEQT1F.
 
-The truth is rational: a matrix of floats is one of fractions, and is solved without rounding.
+The exact solution is rational, since every float is a fraction: it is computed without rounding.
 """
 
 import math
@@ -22,7 +22,7 @@ from pyharness.theory.rational import (
     norm,
 )
 
-# Where the residual is zero, in parts of the step.
+# The collocation points, where the residual is zero, in units of the step.
 PARTS = {
     "two-term": (Fraction(1, 3), Fraction(2, 3)),
     "four-term": (Fraction(1, 5), Fraction(2, 5), Fraction(3, 5), Fraction(4, 5)),
@@ -31,38 +31,38 @@ PARTS = {
 
 @dataclass(frozen=True)
 class Solved:
-    """One matrix with its right-hand sides, solved by LEQT1F and exactly."""
+    """The errors of one matrix with its right-hand sides, solved by LEQT1F and exactly."""
 
-    ier: int  # 0 or 129, of the compiled solver
-    differing: int  # numbers, of X and IER, that are not the same bits in Fortran and in the twin
-    # exact, in the row-sum norm: of the matrix, and after its columns are divided by their largest
-    # elements
+    ier: int  # error code of the compiled solver: 0, or 129 for a singular matrix
+    differing: int  # how many of the numbers X and IER differ in Fortran and in the Python twin
+    # exact condition numbers in the row-sum norm: of the matrix, and of the matrix with each column
+    # divided by its largest element
     condition: float
     scaled_condition: float
-    # largest row sum of abs(L) abs(U) over that of the matrix, columns scaled likewise
+    # norm of abs(L) abs(U) over the norm of the matrix, both with columns divided likewise
     growth: float = math.nan
     order: tuple[int, ...] = ()  # the rows in the order in which they became pivots
-    # how far the chosen pivots fall short of the largest candidates, and how far rounding may let
-    # them, both relative
+    # largest shortfall of a chosen pivot from the largest candidate, and the shortfall that
+    # rounding may cause, both relative
     pivoting: tuple[float, float] = (0.0, 0.0)
-    # errors over their bounds, the largest of all right-hand sides (Higham 2002, theorem 9.4): of A
-    # X = B, of each element of X, and of what X adds to an unknown over the step
+    # errors over their bounds, the largest of all right-hand sides (Higham 2002, theorem 9.4): of
+    # the residual of A X = B, of each element of X, and of the increment of an unknown over a step
     residual: float = math.nan
     forward: float = math.nan
     increment: float = math.nan
-    increment_error: float = math.nan  # that last error over step times the largest right-hand side
-    yardstick: float = math.nan  # as `forward`, of `numpy.linalg.solve`
+    increment_error: float = math.nan  # increment's error over step times largest right-hand side
+    yardstick: float = math.nan  # `forward` of `numpy.linalg.solve`, for comparison
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the points of collocation as a program computes them (s)."""
+    """Return the collocation points as a program computes them (s)."""
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
 def _right_hand_sides(count: int) -> Array:
-    """Return six right-hand sides: constant, linear, alternating, and three of no pattern."""
+    """Return six right-hand sides: constant, linear, alternating, and three random ones."""
     rough = np.random.default_rng(count).normal(size=(3, count))
     places = range(count)
     return np.array(
@@ -71,7 +71,7 @@ def _right_hand_sides(count: int) -> Array:
 
 
 def solved(program: str, step: float) -> Solved:
-    """Solve one matrix: `step` is what the points are parts of (s)."""
+    """Solve the matrix of a program for one `step` (s), and compare with the exact solution."""
     from pyharness.model.extension import extension
 
     matrix = collocation.collocation_matrix(points(program, step))
@@ -91,11 +91,11 @@ def solved(program: str, step: float) -> Solved:
         return Solved(ier, differing, condition, scaled_condition)
     lower = fractions(np.tril(factors, -1) + np.eye(len(factors)))
     upper = fractions(np.triu(factors))
-    # Which row of the matrix each row of L U is.
+    # Find the row of the matrix that each row of L U is.
     order = tuple(int(abs(exact[:, 1] - row[1]).argmin()) for row in lower @ upper)
     sizes = abs(lower) @ abs(upper)
     growth = float(norm(sizes / columns) / norm(scaled))
-    # The bounds are on the rows as they stand in the matrix.
+    # The bounds apply to the rows in their order in the matrix.
     sizes = sizes[np.argsort(order)]
 
     def errors(solutions: Array) -> list[float]:
@@ -113,18 +113,19 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a step at which 1 is the largest of each row, and the matrix there."""
+    """Return a step so small that 1 is the largest element of each row, and its matrix."""
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
 
 def solver_roundings(program: str) -> tuple[float, float]:
-    """Return how far solving moves the result of a step, in units of 2**-53 of step times rate.
+    """Return bounds on the rounding error that solving adds to the result of a step.
 
-    By 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4), which no step
-    changes as long as 1 is the largest of each row. The first number is for a rate that is the
-    same at all points, where only c1 is not zero, the second for each whole by which rates at the
-    points may differ from it.
+    The unit is 2**-53 of step times rate. The bound is 3n abs(powers) abs(inverse) abs(L) abs(U)
+    abs(X) (Higham 2002, theorem 9.4). It does not depend on the step as long as 1 is the largest
+    element of each row. The first number is for a rate that is the same at all points, so that only
+    c1 is not zero. The second number is to be multiplied by the relative difference between that
+    rate and the rates at the points.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -140,11 +141,11 @@ def solver_roundings(program: str) -> tuple[float, float]:
 
 
 def singular_below(program: str, bits: int = 53) -> float:
-    """Return the step at and below which LEQT1F must declare singular (s).
+    """Return the step (s) at and below which LEQT1F must declare the matrix singular.
 
-    N + pivot equals N up to half a unit in the last place of N, and a tie goes to N, which is
-    even. N is a power of 2, whose last place is 2**(1 - bits) of it, in an arithmetic of so many
-    bits that rounds to nearest. The last scaled pivot goes with step**(n-1).
+    N + pivot equals N if the pivot is at most half a unit in the last place of N: a tie goes to N,
+    which is even. N is a power of 2, and its last place is 2**(1 - bits) of it in an arithmetic of
+    `bits` bits that rounds to nearest. The last scaled pivot is proportional to step**(n-1).
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -155,7 +156,10 @@ def singular_below(program: str, bits: int = 53) -> float:
 
 
 def declared_singular_below(program: str) -> float:
-    """Return the largest step that the compiled LEQT1F declares singular, by bisection (s)."""
+    """Return the largest step (s) whose matrix the compiled LEQT1F declares singular.
+
+    The step is found by bisection.
+    """
     from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
@@ -182,7 +186,10 @@ def _errors(
     found: Array,
     side: Array,
 ) -> tuple[float, ...]:
-    """Return residual, forward and increment over their bounds, and the increment's error."""
+    """Return the errors of residual, X and increment over their bounds, and the increment's error.
+
+    The last is relative to the step times the largest right-hand side.
+    """
     count = len(matrix)
     x, b = fractions(found), fractions(side)
     truth = solver @ b
@@ -208,13 +215,13 @@ def _share(error: Fraction, bound: Fraction) -> float:
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
-    """Follow the order in exact arithmetic; return the largest shortfall and what may be."""
+    """Eliminate exactly in `order`; return the largest shortfall of a pivot, and its bound."""
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
         best = max(candidates.values())
         shortfall = max(shortfall, 1 - candidates[chosen] / best)
-        # Two candidates, each wrong by the rounding of its sum and of its scale.
+        # Two candidates are compared, each with the rounding errors of its sum and its scale.
         wrong = max(scale[i] * sizes[i, j] for i in candidates) * gamma(len(matrix) + 2)
         allowed = max(allowed, 2 * wrong / best)
     return float(shortfall), float(allowed)
@@ -223,9 +230,9 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
 def _columns(
     matrix: Fractions, order: Sequence[int] | None = None
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
-    """Eliminate exactly; yield pivot row, all scaled candidates and the rows, column by column.
+    """Eliminate exactly; yield for each column the pivot row, all scaled candidates and the rows.
 
-    Rows become pivots in the order given, or by the rule of LEQT1F.
+    Rows become pivots in `order` or, without it, by the rule of LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

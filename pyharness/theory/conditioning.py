@@ -1,8 +1,8 @@
-"""What the flow itself makes of small errors: the yardstick of every bound that is not a method's.
+"""Error amplification by the flow itself, from which the bounds for all methods follow.
 
-An error made at time s reaches time t multiplied by Phi(t, s), the propagator of the equations
-linearised along the solution. `conditioning` follows it, so that bounds on rounding and on
-tolerances can be written down before a method is tried.
+An error made at time s reaches time t multiplied by Phi(t, s), the state-transition matrix of the
+equations linearised along the solution. `conditioning` computes it, so that bounds on rounding
+errors and on tolerances are known before a method is run.
 """
 
 import math
@@ -18,9 +18,9 @@ from pyharness.model.trajectory import Array
 ROUNDING = 2.0**-53
 # Roundings in a right-hand side: two in each of A, B, C, two products, the sums.
 _ROUNDINGS = 8.0
-# Of a value of an attitude: some twenty roundings of each component; an angle has twice as many.
+# Rounding error of an attitude's angle (rad): twice that of each component, some twenty roundings.
 ATTITUDE = 40.0 * ROUNDING
-LIVELY = 1e3  # growth of small differences up to which a tolerance is kept as it stands
+LIVELY = 1e3  # error amplification up to which a method must meet its tolerance unmultiplied
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 50
 _MOST_NODES = 400_000
@@ -28,43 +28,44 @@ _MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class Conditioning:
-    """How errors made on the way reach the end."""
+    """The amplification until the end of errors made during the motion."""
 
-    # largest factor by which an error of any omega made on the way reaches the end, at least 1
+    # largest factor from an error of omega at any time to the error at the end, at least 1
     amplification: float
-    # error at the end over `largest` if every term of the right-hand side, the start and the result
-    # are wrong by a few roundings, each of its own size, in the worst direction
+    # error at the end over `largest` if every term of the right-hand side, the initial omega and
+    # the result are wrong by a few roundings of their own magnitude, in the worst direction
     rounding: float
-    storing: float  # the same if omega is rounded once a step, for each step
-    # sum over the way of what `rounding` counts, as it was made: what the invariants see
+    storing: float  # error at the end over `largest`, for each step that rounds omega
+    # sum of the errors in `rounding` without amplification, which bounds those of the invariants
     unamplified: float
-    largest: float  # largest abs(omega) of any component on the way (rad/s)
+    largest: float  # largest abs(omega) of any component until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the error that a method may have, over `largest`; 2 says nothing.
+        """Return the largest error that a method may have, over `largest`; 2 is no restriction.
 
-        `made` is the sum of the errors that it makes on the way, over `largest`, as its tolerance
-        or its order tells, `steps` after how many it rounds omega: 0 where it carries on what
-        rounding took off.
+        `made` is the sum of the errors of its steps, over `largest`, according to its tolerance or
+        its order. `steps` is the number of steps after which it rounds omega. It is 0 if the method
+        retains its rounding errors by compensated summation.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
-        # What is no number allows nothing.
+        # NaN allows no error.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return the error that an attitude at `time` (s) may have (rad).
+        """Return the largest error that an attitude at `time` (s) may have (rad).
 
-        `made` is what a method makes of its tolerance; omega may have an error of its rounding all
-        the way.
+        `made` is the error that the method's tolerance allows (rad). Omega may have its rounding
+        error at all times.
         """
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 
 
 def conditioning(scene: Scene, time: float) -> Conditioning:
-    """Follow the linearised flow along the solution from 0 to `time` (s).
+    """Compute the conditioning of a scene from the linearised flow between 0 and `time` (s).
 
-    InputError where it leaves every bound before, or so long a time would need too many nodes.
+    Raise InputError if the solution grows without bound before, or if the time would need too many
+    nodes.
     """
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
@@ -74,10 +75,10 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 
 
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    """Follow the linearised flow along a solution that is known.
+    """Compute the conditioning of a scene along a known solution.
 
-    It has omega, shape (n, 3), at `times` from 0 (s), and turns by a small angle from each to the
-    next; InputError where the flow amplifies beyond binary64.
+    The solution is `omega`, shape (n, 3), at `times` (s), which begin at 0. It must turn by a small
+    angle from each time to the next. Raise InputError if the amplification is beyond binary64.
     """
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
@@ -87,11 +88,11 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
-    """Return omega at each time, and whether it is there to the end."""
+    """Return omega at each time, and whether the solution reaches the last time."""
     from pyharness.methods.problem import closed_form
     from pyharness.methods.solve import solve
 
-    # Beside the separatrix an integrated path would be another one after a few turns.
+    # Near the separatrix a numerical integration would follow another path after a few turns.
     method = "closed-form" if closed_form(scene) else "taylor"
     path = solve(scene, times[1:].tolist(), method, 1e-13)
     return np.vstack([scene.omega, path.omega]), path.has_all_rows
@@ -108,7 +109,7 @@ def _nodes(scene: Scene, time: float) -> Array:
         with np.errstate(all="ignore"):
             largest = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
-        # NaN where numbers so large meet that their product has no meaning.
+        # `wanted` is NaN if numbers are so large that their product is undefined.
         if not wanted <= _MOST_NODES:
             raise InputError("conditioning: too long a time for so fast a motion")
         if count >= wanted:
@@ -127,14 +128,14 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
         arriving = (sizes @ made[:, :, None])[:, :, 0]
         return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
 
-    # The start and the result are rounded once, however short the time.
+    # The initial omega and the result are rounded once, however short the time.
     ends = sizes[0] @ np.abs(omega[0]) + np.abs(omega[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
     return Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
-        # Not over their product, which may be too small a number.
+        # Two divisions, because the product of the divisors may underflow.
         storing=ROUNDING * float(gathered(np.abs(omega)).max()) / span / largest,
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
@@ -142,10 +143,10 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the sum of the sizes of all terms of each right-hand side, shape (n, 3).
+    """Return the sum of the magnitudes of all terms of each right-hand side (1/s2), shape (n, 3).
 
-    A wave counts with its angle: a rounding of frequency times t is a rounding of that many
-    radians.
+    A wave counts with its angle, because the product of frequency and time is rounded in proportion
+    to the angle.
     """
     products = np.abs(scene.euler_coefficients) * np.abs(
         np.roll(omega, -1, 1) * np.roll(omega, -2, 1)

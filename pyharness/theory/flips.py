@@ -1,21 +1,21 @@
-"""How often a body without torque turns over: the period of omega, by a closed form, of many."""
+"""The time between flips of bodies without torque, half the period of omega, in closed form."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pyharness.model.trajectory import Array
 
-# Of the arithmetic-geometric mean: its digits double each time once the two are near each other,
-# and before that the ratio's logarithm halves. Ratios of 1e-300 take as many.
+# Iterations of the arithmetic-geometric mean, enough for ratios of 1e-300. Each iteration halves
+# the logarithm of the ratio, and doubles the number of digits once the two numbers are close.
 _LEVELS = 16
-_NEAR = 2.0**-27  # where the next mean is exact
+_NEAR = 2.0**-27  # relative difference of the two numbers at which their mean is exact
 
 
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     """Return the time between changes of sign of the component about the middle axis, s.
 
     It is half the period of omega without torque, pi over the arithmetic-geometric mean of two
-    rates. Infinite on the separatrix, and where omega stays as it is.
+    rates. It is infinite on the separatrix and for a steady rotation.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     i1, i2, i3 = np.take_along_axis(bodies, order, axis=1).T
     w1, w2, w3 = np.abs(np.take_along_axis(omega, order, axis=1)).T
     s1, s2, s3 = (i3 - i2) / i1, (i3 - i1) / i2, (i2 - i1) / i3
-    # The motion goes about the axis of the larger one; where they are equal it never comes back.
+    # Omega circles the axis of the larger value. If the values are equal, it never returns.
     about1, about3 = np.sqrt(s2 * s3) * w1, np.sqrt(s1 * s2) * w3
     upper = np.hypot(np.sqrt(s1 * s3) * w2, np.maximum(about1, about3))
     lower = np.sqrt(np.abs(about1 - about3)) * np.sqrt(about1 + about3)
@@ -43,7 +43,7 @@ def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
 
 
 def mean(upper: Array, lower: Array) -> Array:
-    """Return the arithmetic-geometric mean of numbers that are not negative."""
+    """Return the arithmetic-geometric mean of non-negative numbers."""
     for _ in range(_LEVELS):
         if (np.abs(upper - lower) <= _NEAR * upper).all():
             break

@@ -1,4 +1,4 @@
-"""Polhodes on the momentum sphere, and the growth of all bodies, as numbers to be drawn."""
+"""Polhodes on the momentum sphere, and the growth rates of all bodies, as data for plots."""
 
 import math
 from collections.abc import Iterator
@@ -8,17 +8,17 @@ import numpy as np
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 
-# Of a curve around an axis where it is farthest from that, as a part of the way to the separatrix.
+# Angles between a curve and its axis, where they are largest; on the separatrix it is 90 degrees.
 _ANGLES = tuple(math.radians(degrees) for degrees in (18.0, 36.0, 54.0, 72.0))
 _POINTS = 181
 
 
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
-    """Give curves of L / abs(L) without torque by name, shape (n, 3) each; a sphere has none.
+    """Yield named curves of L / abs(L) without torque, shape (n, 3) each; none for a sphere.
 
-    Along each both sum L**2 and sum L**2 / I stay as they are. Last come the two planes of the
-    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)) where j = 1 / I and axis 2 is the middle
-    one; where two moments are equal both are the plane across the third axis.
+    Along each curve sum L**2 and sum L**2 / I are constant. The last two curves are in the two
+    planes of the separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j is 1 / I, and axis 2
+    is the middle one. If two moments are equal, both are in the plane across the third axis.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -38,7 +38,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
                 curve = np.outer(to_middle, unit[middle]) + np.outer(to_far, unit[far])
                 name = f"around axis {'+' if sign > 0.0 else '-'}{axis + 1}"
                 yield name, curve + np.outer(sign * up, unit[axis])
-    # Beside the middle axis, from that of the largest 1 / I.
+    # Angle of the planes of the separatrix from the axis of the largest 1 / I.
     tilt = math.atan2(math.sqrt(j[high] - j[middle]), math.sqrt(j[middle] - j[low]))
     for sign in (1.0, -1.0):
         across = math.cos(tilt) * unit[high] + sign * math.sin(tilt) * unit[low]
@@ -48,10 +48,11 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 def growth_of_bodies(first: Array, third: Array) -> Array:
     """Return Re Q about the middle axis over the spin, for Smelt's numbers K1 and K3 of bodies.
 
-    K1 = A and K3 = -C; all bodies are in the square from -1 to 1.
+    K1 = A is `first`, K3 = -C is `third`. All bodies are in the square from -1 to 1.
     """
     a, c = first, -third
-    # Of moments A + B + C + ABC = 0; at two corners, bodies without extent, B is anything.
+    # Coefficients of moments satisfy A + B + C + ABC = 0. At two corners of the square, for bodies
+    # without extent, B is arbitrary.
     with np.errstate(invalid="ignore"):
         b = -(a + c) / (1.0 + a * c)
     b = np.where(np.isfinite(b), b, 0.0)

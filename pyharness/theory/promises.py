@@ -1,10 +1,10 @@
-"""What each method promises before it is run: the errors that its steps make.
+"""Bounds for the errors of the steps of each method, known before it is run.
 
-Nothing here is fitted. Of a method with a tolerance the errors of its steps add up to the
-tolerance. Of a method with a fixed step they follow from the order: the k-th derivative of a
-solution of w' = a products is at most k! (a W)**k W, W the largest omega (the solution of
-y' = a y**2 has these derivatives, and larger ones than any other), and the method's own series
-has no larger terms than it has for y' = a y**2.
+Nothing here is fitted. For a method with a tolerance, the errors of its steps add up to the
+tolerance. For a method with a fixed step, they follow from the order. If w' is at most `a` times a
+product of two omegas, the k-th derivative is at most k! (a W)**k W, where W is the largest omega.
+The solution of y' = a y**2 has these derivatives, and no other solution has larger ones. The
+method's own series has no larger terms than it has for y' = a y**2.
 """
 
 import math
@@ -16,16 +16,21 @@ from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
 
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
-    """Return the steps after which a method rounds omega and forgets what it took off."""
+    """Return the number of steps after which a method rounds omega and drops the rounding error.
+
+    It is 0 for a method that retains its rounding errors by compensated summation. For SciPy's
+    methods it is estimated from the number of right-hand sides.
+    """
     if name in SCIPY_METHODS:
         return evaluations / (1 if name == "lsoda" else 6)
     return float(run_steps) if name in FIXED_STEP or name == "quick" else 0.0
 
 
 def fixed_step_sum(name: str, angle: float, steps: int) -> float:
-    """Return the sum of the errors of the steps of a fixed-step method, relative.
+    """Return a bound of the sum of the relative errors of all steps of a fixed-step method.
 
-    `angle` is the largest coefficient times the largest omega times the step.
+    `angle` is the largest coefficient times the largest omega times the step. The bound is infinite
+    if the angle is 0.5 or more.
     """
     if angle >= 0.5:
         return math.inf
@@ -36,7 +41,7 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 
 @cache
 def _series(name: str) -> tuple[float, ...]:
-    """Return the method's own series in the angle for y' = y**2, y(0) = 1."""
+    """Return the coefficients of the method's own series in the angle for y' = y**2, y(0) = 1."""
     if name == "taylor-3":
         return 1.0, 1.0, 1.0
     y, h = Polynomial([1.0]), Polynomial([0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Linear algebra in fractions, as arrays of objects: what is exactly true where binary64 rounds."""
+"""Linear algebra in fractions, exact where binary64 rounds; matrices are arrays of objects."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -14,7 +14,7 @@ _UNIT = Fraction(1, 2**53)
 
 
 def inverse(matrix: Fractions) -> Fractions:
-    """Return the inverse of a regular matrix."""
+    """Return the exact inverse of a regular matrix."""
     count = len(matrix)
     rows = np.hstack([matrix, np.eye(count, dtype=object)])
     for j in range(count):
@@ -27,24 +27,24 @@ def inverse(matrix: Fractions) -> Fractions:
 
 
 def fractions(floats: ArrayLike) -> Fractions:
-    """Return an array of floats, exactly."""
+    """Return the exact fractions of an array of floats."""
     exact: Any = np.vectorize(Fraction, otypes=[object])
     found: Fractions = exact(floats)
     return found
 
 
 def gamma(count: int) -> Fraction:
-    """Return n u / (1 - n u), the bound of n roundings in a row (Higham 2002, lemma 3.1)."""
+    """Return n u / (1 - n u), the bound of n successive roundings (Higham 2002, lemma 3.1)."""
     return count * _UNIT / (1 - count * _UNIT)
 
 
 def norm(matrix: Fractions) -> Fraction:
-    """Return the largest row sum of sizes."""
+    """Return the row-sum norm of a matrix."""
     largest: Fraction = abs(matrix).sum(axis=1).max()
     return largest
 
 
 def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
-    """Return the matrix of equation 36."""
+    """Return the collocation matrix of equation 36 for some points."""
     rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
     return np.array(rows, dtype=object)

@@ -1,4 +1,4 @@
-"""Regions of linear stability, and growth along the imaginary axis, as numbers to be drawn."""
+"""Regions of linear stability, and growth along the imaginary axis, as data for plots."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from pyharness.model.listing import corrected, original, subset
 from pyharness.model.trajectory import Array
 from pyharness.theory.amplification import Amplification, amplification
 
-# The part of the plane in which the boundaries lie, and how fine it is sampled.
+# The part of the plane that contains the boundaries: its limits, and the numbers of samples.
 _REAL = (-4.6, 1.4, 301)
 _IMAGINARY = (-3.6, 3.6, 361)
 _DISTANCES = (1e-3, 4.0, 181)
@@ -17,20 +17,21 @@ _HIDDEN = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """One matrix over the plane and along the imaginary axis."""
+    """The spectral radius of one amplification matrix, over the plane and on the imaginary axis."""
 
-    name: str  # whose it is
-    # shape (imaginary, real); largest eigenvalue over the plane, of what does not merely stay
+    name: str  # of the programs and methods that have this matrix
+    # shape (imaginary, real); spectral radius over the plane, without a result that only
+    # accumulates other vectors
     radius: Array
-    # largest eigenvalue less 1 on the imaginary axis, at the distances; 0 where rounding hides it
+    # spectral radius less 1 on the imaginary axis, at the distances; 0 where it is only rounding
     growth: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """All regions on the same grids."""
+    """The stability regions of all programs on the same grids."""
 
-    # of z, over the plane
+    # coordinates of z in the plane
     real: Array
     imaginary: Array
     distances: Array  # of z from 0, along the imaginary axis
@@ -38,7 +39,7 @@ class Regions:
 
 
 def matrices() -> dict[str, Amplification]:
-    """Return the matrices that differ, by what they belong to."""
+    """Return the different amplification matrices, by the programs and methods that have them."""
     return {
         "two-term and four-term, original and corrected": amplification(corrected("two-term")),
         "runge-kutta corrected, rk4": amplification(corrected("runge-kutta")),
@@ -51,7 +52,10 @@ def matrices() -> dict[str, Amplification]:
 
 
 def regions() -> Regions:
-    """Return the regions of all programs; that of Gauss collocation is the left half-plane."""
+    """Return the stability regions of all programs.
+
+    Gauss collocation is not among them: its region is the left half-plane.
+    """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     low, high, count = _DISTANCES
     distances = np.geomspace(low, high, count)

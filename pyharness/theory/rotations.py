@@ -1,7 +1,7 @@
-"""Steady rotations under constant torque, and what becomes of a small disturbance of each.
+"""Steady rotations under constant torque, and their linear stability.
 
-Grammel's way, equation 32 of the thesis (III.4.a): omega = (a, b, c) + small amplitudes times
-exp(Q t). With M = N / I the constants are steady where
+The method is Grammel's, equation 32 of the thesis (III.4.a): omega = (a, b, c) + small amplitudes
+times exp(Q t). With M = N / I the rotation (a, b, c) is steady if
 
     A bc = -M1,    B ca = -M2,    C ab = -M3,
 
@@ -23,55 +23,58 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING, Array
 
 Rates = tuple[complex, complex, complex]
-Places = list[tuple[str, Triple]]  # steady rotations (rad/s), each with what it is
+Places = list[tuple[str, Triple]]  # steady rotations: a description, and omega (rad/s)
 
-# One component of the points that are shown of a hyperbola, over that of its vertex.
+# The points that are shown of a hyperbola: one component over the same component at the vertex.
 _ALONG = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SHOWN = "shown, of one branch, the vertex and points of 1/4, 1/2, 2 and 4 times its"
-# What the linear picture may be off by where it is said to end: of the disturbance, or radians.
+# Error at which the linear approximation is taken to end, relative to the perturbation or in rad.
 OFF = 0.1
 
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """A rotation that stays as it is, and what a small disturbance does."""
+    """A steady rotation, and the behaviour of a small perturbation."""
 
     place: str  # an axis, a point of a hyperbola, ...
     omega: Triple  # rad/s
     rates: Rates  # Q of equation 32 (1/s), the fastest growth first
-    # whether no small disturbance grows, neither with exp(Q t) nor, where Q is 0, with t
+    # whether no small perturbation grows, neither with exp(Q t) nor, where Q is 0, with t
     stable: bool
-    # s, shortest time between flips of a motion so much disturbed; None where nothing flips
+    # s, shortest time between flips of the perturbed motion; None if nothing flips
     flip_interval: float | None
-    # s, when the linear picture is off by a tenth at the soonest; None where it is not known
+    # s, earliest time at which the linear approximation is off by a tenth; None if it is unknown
     linear_until: float | None
 
     @property
     def doubling_time(self) -> float | None:
-        """In which the fastest disturbance doubles (s), None where none grows with exp(Q t)."""
+        """Return the time in which the fastest perturbation doubles (s).
+
+        It is None if no perturbation grows with exp(Q t).
+        """
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
 
     @property
     def period(self) -> float | None:
-        """Of the oscillation (s), None where nothing oscillates."""
+        """Return the period of the oscillation (s), or None if nothing oscillates."""
         rate = max(abs(each.imag) for each in self.rates)
         return 2.0 * math.pi / rate if rate > 0.0 else None
 
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """Those of a scene; of a family some members."""
+    """The steady rotations of a scene; of a continuous family only some members."""
 
-    told: str  # what there is, and what is shown of it
-    disturbance: float  # its size over that of the rotation
+    told: str  # text: which steady rotations exist, and which of them are shown
+    disturbance: float  # magnitude of the perturbation over the magnitude of the rotation
     rotations: tuple[SteadyRotation, ...]
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return the steady rotations of a scene, each disturbed by that share of its size.
+    """Return the steady rotations of a scene, each perturbed by `disturbance` times its magnitude.
 
-    InputError where the torque varies, or a rotation is beyond binary64.
+    Raise InputError if the torque varies, or if a rotation is beyond the range of binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -86,27 +89,27 @@ def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
 
 
 def rates(coefficients: Triple, omega: Triple) -> Rates:
-    """Return Q of a steady rotation (1/s), the largest real part first."""
+    """Return the rates Q of a steady rotation (1/s), the largest real part first."""
     size = max(map(abs, omega))
     if size == 0.0:
         return 0j, 0j, 0j
-    # Near 1 no product overflows.
+    # Products of components near 1 do not overflow.
     (a, b, c), (x, y, z) = coefficients, (w / size for w in omega)
     terms = (b * c * x * x, c * a * y * y, a * b * z * z)
     slope, half = sum(terms), a * b * c * x * y * z
     if abs(slope) <= 16.0 * ROUNDING * sum(map(abs, terms)):
-        slope = 0.0  # what rounding leaves where they cancel
+        slope = 0.0  # the terms cancel, and their sum is only rounding
     roots = sorted(_roots(slope, half), key=lambda q: (-q.real, -q.imag))
     first, second, third = (size * q + 0j for q in roots)  # no -0.0
     return first, second, third
 
 
 def _roots(slope: float, half: float) -> Rates:
-    """Return the roots of Q**3 - slope Q - 2 half, small ones to all their digits too."""
+    """Return the roots of Q**3 - slope Q - 2 half; small roots are accurate to all digits too."""
     if half == 0.0:
         root = cmath.sqrt(slope)
         return root, 0j, -root
-    # The one root of the sign of `half` is simple, and no difference.
+    # The root with the sign of `half` is simple, and its formula subtracts nothing.
     unit = math.sqrt(abs(slope) / 3.0)
     ratio = abs(half) / unit**3 if unit**3 > 0.0 else math.inf
     if math.isinf(ratio):
@@ -132,7 +135,7 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
     found = rates(scene.euler_coefficients, omega)
     if not np.isfinite([*matrix.flat, *found]).all():
         raise InputError("rotations: the rates of a steady rotation are beyond binary64")
-    # They add up to 0. Where all are 0 and the matrix is not, a disturbance grows with t.
+    # The rates add up to 0. If all are 0 and the matrix is not, a perturbation grows with t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
     until: float | None = None
@@ -152,11 +155,12 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
 def _growing(
     scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float
 ) -> float | None:
-    """Return when the products of a growing disturbance have come to a tenth of it (s).
+    """Return the time at which the second-order terms reach a tenth of a growing perturbation (s).
 
-    None where that is beyond binary64.
+    `share` is the initial perturbation over the rotation. The time is None if it is beyond the
+    range of binary64.
     """
-    # The vector that `rate` belongs to is what the matrix, less the rate, takes to 0.
+    # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
     second = 0.0
     for twice, other in ((2.0 * rate, grows), (2.0 * rate.real, grows.conj())):
@@ -173,11 +177,11 @@ def _growing(
 
 
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
-    """Return when the phase about a stable axis without torque is a tenth of a radian off (s).
+    """Return the time at which the phase about a stable axis is off by a tenth of a radian (s).
 
-    A tilt d from the axis, whose coefficient is the first, towards another one changes the rate by
-    d**2 / 4 times the first coefficient over that of the other. None where nothing turns about the
-    axis, and the spin alone drifts.
+    There is no torque. The first coefficient is the axis's own. A tilt d towards another axis
+    changes the rate by d**2 / 4 times the first coefficient over the coefficient of that axis. The
+    time is None if nothing oscillates about the axis, so that only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -191,8 +195,9 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
 def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> float | None:
     """Return the shortest time between flips about the middle axis (s), whose coefficient is first.
 
-    It is 2 K / lambda, near (2 / lambda) ln(4 / k') where the disturbance is small, and shortest
-    where that points along the axis of the smaller coefficient. None where signs are no body's.
+    It is 2 K / lambda, near (2 / lambda) ln(4 / k') if the perturbation is small. It is shortest if
+    the perturbation points along the axis of the smaller coefficient. It is None if the signs of
+    the coefficients belong to no body.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -207,7 +212,7 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
 
 def _places(scene: Scene) -> tuple[str, Places]:
-    """Return in words what steady rotations there are, and those that are shown."""
+    """Return a text on the steady rotations that exist, and the ones that are shown."""
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
     held = [axis for axis in range(3) if torque[axis] != 0.0]
     if not held:
@@ -216,7 +221,7 @@ def _places(scene: Scene) -> tuple[str, Places]:
         if coefficients[axis] == 0.0:
             told = f"none: {'ABC'[axis]} = 0, so that nothing holds the torque about axis"
             return f"{told} {axis + 1}", []
-    # w2 w3, w3 w1 and w1 w2, as far as they have to hold a torque.
+    # The products w2 w3, w3 w1 and w1 w2, where they have to balance a torque.
     products = [-m / k if k else 0.0 for m, k in zip(torque, coefficients, strict=True)]
     if len(held) == 3:
         return _points(products)
@@ -247,7 +252,7 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return points of one branch; the other has their opposites."""
+    """Return the text and points of one branch of the hyperbola; the other has their opposites."""
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
         f"torque about axis {held + 1}: the hyperbola w{one + 1} w{other + 1} = {product:.6g}, "
@@ -256,7 +261,7 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
     if coefficients[one] == coefficients[other] == 0.0:
         told += f"; to each any w{held + 1} may be added"
     along = dict.fromkeys(_ALONG, "hyperbola")
-    # Where C (B a**2 + A b**2), the square of Q, changes its sign.
+    # At the margin C (B a**2 + A b**2), the square of Q, changes its sign.
     if coefficients[one] * coefficients[other] < 0.0:
         along[(-coefficients[one] / coefficients[other]) ** 0.25] = "its margin"
         told += ", and the margin of stability"
@@ -271,9 +276,9 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
-    """Return points of the hyperbola of a body symmetric about `axis`, torque across that."""
+    """Return the text and points of the hyperbola for a torque across the axis of symmetry."""
     one, other = (axis + 1) % 3, (axis + 2) % 3
-    # w_one w_axis and w_other w_axis.
+    # The products w_one w_axis and w_other w_axis.
     across = products[other], products[one]
     told = (
         f"torque across the axis of symmetry: the hyperbola w{one + 1} w{axis + 1} = "

@@ -1,4 +1,4 @@
-"""The picture of `rotations`: polhodes on the momentum sphere, and the growth of all bodies."""
+"""The picture of `rotations`: polhodes on the momentum sphere, and growth rates of all bodies."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -15,11 +15,11 @@ from pyharness.theory.rotations import steady_rotations
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Where the sphere is seen from, by the axes of the smallest moment, which points up, the middle and
-# the largest.
+# Direction to the viewer, in components along the axes of the smallest moment, which points up, of
+# the middle and of the largest one.
 _VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
-_HIDDEN = 0.22  # opacity behind the sphere
+_HIDDEN = 0.22  # opacity of curves and points behind the sphere
 _SEPARATRIX: dict[str, Any] = {"color": "#c02020", "linewidth": 1.8}
 _POLHODE: dict[str, Any] = {"color": "#1040a0", "linewidth": 0.9}
 _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0.3, 0.7): 3,
@@ -27,7 +27,10 @@ _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0
 
 
 def rotations_picture(scene: Scene) -> Picture:
-    """Draw the polhodes of a scene's body beside the growth of all bodies; it has moments."""
+    """Draw the polhodes of a scene's body beside the growth rates of all bodies.
+
+    The scene must have moments.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 5.9), dpi=100, layout="constrained")
@@ -74,7 +77,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return how far right, up and near points of the sphere are, shape (n,) each."""
+    """Return the coordinates of points to the right, up and towards the viewer, shape (n,) each."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward
@@ -86,7 +89,7 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
     growth = growth_of_bodies(first, third)
     shades = axes.contourf(first, third, growth, levels=np.linspace(0.0, 1.0, 11), cmap="Blues")
     axes.figure.colorbar(shades, ax=axes, label="Re Q / spin", shrink=0.85)
-    # Here two moments are equal.
+    # On these lines two moments are equal.
     for ends in (([0, 0], [-1, 1]), ([-1, 1], [0, 0]), ([-1, 1], [-1, 1])):
         axes.plot(*ends, color="#505050", linewidth=0.8)
     for place, middle in _MIDDLES.items():

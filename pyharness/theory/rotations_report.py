@@ -25,7 +25,7 @@ _SECONDS = digits(".3g")
 
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
-    """Report the steady rotations of a scene, a row each."""
+    """Return the report of the steady rotations of a scene, with a row for each."""
     text: list[Section] = [[*heading(scene), f"disturbance: {found.disturbance:g} of the rotation"]]
     text.append([found.told])
     if found.rotations:
@@ -58,7 +58,7 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
 
 
 def _rates(rates: Rates) -> str:
-    """Say three rates in few letters; what differs in sign alone is said once."""
+    """Return a short text of three rates; rates that differ only in sign share one entry."""
     first, second, third = rates
     if not any(rates):
         return "0"
@@ -97,7 +97,7 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 
 
 def _picture(scene: Scene) -> Picture:
-    # Here, since a table needs none of its curves.
+    # Imported late, because a table needs no curves.
     from pyharness.theory.rotations_picture import rotations_picture
 
     return rotations_picture(scene)

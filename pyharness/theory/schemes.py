@@ -1,8 +1,8 @@
-"""The schemes behind the programs and the fixed-step methods, once more as mathematics.
+"""The schemes of the programs and of the fixed-step methods, independent of their code.
 
-A scheme is what a method computes, without rounding and without the code that it judges. It runs
-on numbers and on power series of the step alike: with series, what a step misses of the solution
-comes out term by term, before any method is tried. Torques are constant here.
+A scheme computes one step of a method, but shares no code with it. It runs on numbers and on power
+series of the step alike. With series, the truncation error of a step results term by term, before
+any method is run. Torques are constant here.
 """
 
 import math
@@ -18,22 +18,22 @@ from pyharness.model.trajectory import Array
 from pyharness.theory.collocation_matrices import PARTS
 from pyharness.theory.rational import collocation_matrix, inverse
 
-# Powers of the step that are kept of a series.
+# Number of powers of the step in a series.
 TERMS = 24
 
 
 class Numbers:
-    """Arithmetic of numbers: omega is an array of shape (..., 3)."""
+    """The arithmetic of numbers, where omega is an array of shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
-        """Take the scene's equations and a step (s); with `sizes` every term by its size."""
+        """Store the scene's equations and a step (s); with `sizes` every term's absolute value."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
         self._torque = size(np.array(scene.normalized_torque(0.0)))
 
     def rate(self, omega: Array) -> Array:
-        """Return equations 16-18."""
+        """Return the right-hand sides of equations 16-18."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
@@ -43,15 +43,15 @@ class Numbers:
 
 
 class Series:
-    """Arithmetic of power series of the step: omega has shape (TERMS, ..., 3)."""
+    """The arithmetic of power series of the step, where omega has shape (TERMS, ..., 3)."""
 
     def __init__(self, scene: Scene) -> None:
-        """Take the scene's equations."""
+        """Store the scene's equations."""
         self._coefficients = np.array(scene.euler_coefficients)
         self._torque = np.array(scene.normalized_torque(0.0))
 
     def rate(self, omega: Array) -> Array:
-        """Return equations 16-18, by Cauchy products."""
+        """Return the right-hand sides of equations 16-18, by Cauchy products."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         result = np.zeros(omega.shape)
         for k in range(TERMS):
@@ -81,20 +81,20 @@ class FixedStep:
     """A method with a fixed step."""
 
     name: str  # of the program or method
-    order: int  # the power of the step with which its error falls
+    order: int  # of its global error
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
-    roundings: float  # units of 2**-53 of omega by which a step may be wrong for its last additions
+    roundings: float  # bound of the error of a step's last additions, in units of 2**-53 of omega
 
 
 def constant(omega: Array) -> Array:
-    """Return the series that is omega."""
+    """Return omega as a constant series."""
     result = np.zeros((TERMS, *omega.shape))
     result[0] = omega
     return result
 
 
 def collocation(program: str) -> Scheme:
-    """Return that of a collocation program."""
+    """Return the scheme of a collocation program."""
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
@@ -109,9 +109,10 @@ def collocation(program: str) -> Scheme:
 
 
 def collocation_singular(program: str) -> Scheme:
-    """Return what a program computes where LEQT1F declares its matrix singular.
+    """Return the scheme of a collocation program if LEQT1F declares its matrix singular.
 
-    The right-hand sides come back as c1, c2, ..., and stand before t, t**2, ...
+    LEQT1F then returns the right-hand sides unchanged. The program takes them for c1, c2, ..., the
+    coefficients of t, t**2, ...
     """
     parts = PARTS[program]
 
@@ -135,7 +136,7 @@ def collocation_singular(program: str) -> Scheme:
 
 
 def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
-    """Return a step of equation 31."""
+    """Return omega after a step of equation 31."""
     first = on.times_step(on.rate(omega))
     second = on.times_step(on.rate(omega + 0.5 * first))
     third = on.times_step(on.rate(omega + 0.5 * second))
@@ -144,7 +145,7 @@ def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
 
 
 def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
-    """Return the first step of the original Runge-Kutta program."""
+    """Return omega after the first step of the original Runge-Kutta program."""
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
     second = on.times_step(on.rate(at))
@@ -155,15 +156,15 @@ def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
 
 
 def improved_euler(on: Arithmetic, omega: Array) -> Array:
-    """Return a step of equation 29."""
+    """Return omega after a step of equation 29."""
     first = on.times_step(on.rate(omega))
     return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
 
 
 def taylor_3(on: Arithmetic, omega: Array) -> Array:
-    """Return a step of equation 30.
+    """Return omega after a step of equation 30.
 
-    The derivative of F along F is half of F(omega + F) - F(omega - F): F is quadratic.
+    The derivative of F along F is half of F(omega + F) - F(omega - F), because F is quadratic.
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
@@ -171,7 +172,7 @@ def taylor_3(on: Arithmetic, omega: Array) -> Array:
 
 
 def gauss(stages: int) -> Scheme:
-    """Return that of Gauss collocation of order 2 stages, iterated until all terms stand."""
+    """Return the scheme of Gauss collocation of order 2 stages, iterated until it converges."""
     nodes, weights = legendre.leggauss(stages)
     nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
     powers = np.array([[node**k for k in range(stages)] for node in nodes])
@@ -205,13 +206,19 @@ SCHEMES = {each.name: each for each in _ALL}
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return what a step from omega (rad/s), shape (n, 3), misses: a series, (TERMS, n, 3)."""
+    """Return the truncation error of a step from omega (rad/s), shape (n, 3), as a series.
+
+    The series has the shape (TERMS, n, 3).
+    """
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
 
 
 def spacing(count: int) -> Sequence[Fraction]:
-    """Return weights of the first difference, exact to degree 2 count, with so many pairs."""
+    """Return the weights of a central first difference with `count` pairs, exact to degree 2 count.
+
+    The weight of pair i multiplies the difference of the values at i and -i spacings.
+    """
     middle = math.comb(2 * count, count)
     return [
         (-1) ** (i + 1) * Fraction(math.comb(2 * count, count + i), i * middle)

@@ -1,7 +1,7 @@
-"""What a step size costs, foretold: truncation and rounding of fixed steps at the end of a scene.
+"""Prediction of the truncation and rounding errors of fixed steps at the end of a scene.
 
-Truncation is what each step misses (`schemes`), carried to the end by the flow; rounding is that
-of each step, carried likewise. No method is run.
+The truncation error of each step comes from `schemes` and is propagated to the end by the flow. The
+rounding error of each step is propagated likewise. No method is run.
 """
 
 import math
@@ -19,16 +19,16 @@ from pyharness.theory.schemes import SCHEMES, TERMS, collocation_singular, local
 
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
-# Roundings of many steps in directions of their own add up as their root; a third of the worst
-# one is the mean.
+# Rounding errors of many steps with independent directions add up like the square root of their
+# number. Their mean is a third of the largest one.
 _MEAN_ROUNDING = 1.0 / 3.0
-# What the last term kept of a series may be of the whole.
+# Largest ratio of the last term of a series to the sum for which the sum is accepted.
 _CONVERGED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution, and what the flow makes until the end of an error made on the way."""
+    """The solution of a scene, and the state-transition matrices from each time to the end."""
 
     scene: Scene  # torque constant
     times: Array  # shape (n,), s: from 0 to the end
@@ -40,7 +40,7 @@ class Path:
 
     @property
     def norms(self) -> Array:
-        """Row-sum norms of the propagators."""
+        """Return the row-sum norms of the state-transition matrices."""
         return np.asarray(np.abs(self.propagators).sum(axis=2).max(axis=1))
 
     def over_time(self, values: Array) -> Array:
@@ -50,16 +50,19 @@ class Path:
 
 @dataclass(frozen=True)
 class Forecast:
-    """Errors at the end over the largest omega."""
+    """The predicted errors at the end, relative to the largest omega."""
 
-    truncation: float  # to be expected; the largest component
-    bound: float  # of truncation and rounding; infinite where steps are too large to say
-    rounding: float  # of rounding alone, at the worst
-    wandering: float  # rounding to be expected
+    truncation: float  # expected truncation error, the largest component
+    bound: float  # of truncation and rounding error; infinite if steps are too large for a bound
+    rounding: float  # bound of the rounding error alone
+    wandering: float  # expected rounding error
 
 
 def path(scene: Scene, time: float) -> Path:
-    """Follow the solution to `time` (s); InputError where it leaves every bound before."""
+    """Return the solution to `time` (s) with its state-transition matrices.
+
+    Raise InputError if the solution grows without bound before.
+    """
     from pyharness.methods.solve import solve
 
     flow = conditioning(scene, time)
@@ -79,17 +82,17 @@ def path(scene: Scene, time: float) -> Path:
 
 
 class Forecaster:
-    """Forecasts for one method on one path, at any step."""
+    """The error predictions for one method along one path, for any step."""
 
     def __init__(self, along: Path, method: str) -> None:
-        """Take the path and a name in `pyharness.theory.schemes.SCHEMES`."""
+        """Store the path and the method, a name in `pyharness.theory.schemes.SCHEMES`."""
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
         self._wandering = self._of_one_step()
 
     def at(self, steps: int) -> Forecast:
-        """Return the forecast for a number of equal steps."""
+        """Return the predicted errors for a number of equal steps."""
         here = self._path
         h = float(here.times[-1]) / steps
         largest = here.flow.largest
@@ -102,8 +105,8 @@ class Forecaster:
         worst = float(here.over_time(here.norms * np.abs(local).max(axis=1))) / h / largest
         last = float(np.abs(terms[-1]).max())
         known = last <= _CONVERGED * float(np.abs(local).max())
-        # Off the solution by so much, steps miss more and the flow carries further: by no more
-        # than twice, or nothing is said.
+        # With this error the steps are taken off the solution, where local errors and their
+        # amplification are larger. A bound is returned only if they are at most twice as large.
         off = 2.0 * worst * (here.turned + 2.0 * (order + 2))
         if not (known and off <= math.log(2.0)):
             worst = math.inf
@@ -112,7 +115,10 @@ class Forecaster:
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
     def crossing(self, smallest: float) -> float:
-        """Return the step (s) from `smallest` at which truncation falls below expected rounding."""
+        """Return the step (s) at which truncation falls below the expected rounding error.
+
+        The step is found by bisection between `smallest` and the whole time.
+        """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
         low = 1
@@ -124,9 +130,10 @@ class Forecaster:
         return time / high
 
     def _of_one_step(self) -> float:
-        """Return the mean rounding of a step at the end, over the largest omega.
+        """Return the mean rounding error of one step at the end, over the largest omega.
 
-        Each omega is rounded in proportion to itself, and not at all where it never changes.
+        The rounding error of a component is proportional to the component. It is 0 if the component
+        never changes.
         """
         here = self._path
         changes = (self._rates() != 0.0).any(axis=0)
@@ -148,7 +155,7 @@ class Forecaster:
             rates = self._rates()
             constant, varying = solver_roundings(self.method.name)
             travelled = float(here.over_time(norms * np.abs(rates).max(axis=1))) / largest
-            # Along a step the rates differ from the first one by so much of themselves.
+            # Largest relative change of the rates along a step.
             differing = min(1.0, h * here.fastest)
             total += ROUNDING * travelled * (constant + varying * differing)
         return total
@@ -158,6 +165,6 @@ class Forecaster:
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
         missed = local_error(scheme, self._path.scene, self._path.omega)
-        # Zero by the order of the scheme; what stands there is rounding.
+        # These terms are zero by the order of the scheme; their computed values are rounding.
         missed[: order + 1] = 0.0
         return missed

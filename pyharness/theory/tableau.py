@@ -1,9 +1,9 @@
-"""What a correction of the weighted residual family does, in numbers that no step changes.
+"""The corrections of the weighted residual family as Runge-Kutta tableaux, for any step size.
 
-With f known along the step, the conditions for the c's are linear, and the derivative that they
-give is a projection of f on the polynomials of degree n - 1. It is worked out once on the unit
-interval s = t / h, with Legendre polynomials as basis, so that it is well conditioned. The c's
-themselves are never formed.
+With f known along the step, the conditions for the c's are linear. The derivative that they
+determine is a projection of f on the polynomials of degree n - 1. The projection is computed once
+on the unit interval s = t / h, with Legendre polynomials as basis, so that it is well conditioned.
+The c's themselves are never formed.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """What a correction does on the unit interval; in form it is a Runge-Kutta scheme."""
+    """A correction on the unit interval, in the form of a Runge-Kutta scheme."""
 
-    # shape (m,); where f is wanted, in parts of the step: the points of collocation, or those of
-    # the quadrature of the weighted integrals
+    # shape (m,); the points at which f is evaluated, in units of the step: the collocation points,
+    # or the nodes of the quadrature of the weighted integrals
     nodes: Array
     matrix: Array  # shape (m, m); the next estimate at the nodes is omega(0) + h matrix f
     weights: Array  # shape (m,); the result of the step is omega(0) + h weights f
@@ -30,12 +30,12 @@ class Tableau:
 
 @cache
 def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None = None) -> Tableau:
-    """Solve the weighted residual conditions of a `Member` on the unit interval.
+    """Return the tableau of a `Member` from its weighted residual conditions on the unit interval.
 
-    The quadrature is exact where torques are constant: along a trial function the products of
-    equations 13-15 have degree 2n, the weights have n (Galerkin), n - 1 (least squares) or, in each
-    subdomain, 0; m points of Gauss and Legendre integrate degree 2m - 1. With torques that vary it
-    is in error by the power 2n + 1 of the step or a higher one, above every order of the family.
+    The quadrature is exact for constant torques. Along a trial function the products of equations
+    13-15 have degree 2n. The weights have degree n (Galerkin), n - 1 (least squares) or, in each
+    subdomain, 0. Gauss-Legendre quadrature with m points is exact to degree 2m - 1. For torques
+    that vary its error is of order 2n + 1 or higher in the step, above every order of the family.
     """
     n = terms
     if weighting == "collocation":
@@ -55,7 +55,7 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
             if weighting == "galerkin":
                 tests = tests * nodes[:, None]
     weighted = _exact((tests * quadrature[:, None]).T)
-    # In fractions, or the numbers of the family would hang on the LAPACK in use.
+    # In fractions, because in floats the numbers of the family would depend on the LAPACK in use.
     projection = _solved(_product(weighted, _exact(basis(nodes, n))), weighted)
     matrix = _product(_exact(_integrals(nodes, n)), projection)
     return Tableau(nodes, np.array(matrix, dtype=float), np.array(projection[0], dtype=float))
@@ -71,7 +71,7 @@ def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Frac
 
 
 def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Return x of a x = b, by elimination."""
+    """Return the solution x of a x = b, by elimination."""
     rows = [[*left, *right] for left, right in zip(a, b, strict=True)]
     for k in range(len(rows)):
         pivot = next(i for i in range(k, len(rows)) if rows[i][k])
@@ -84,7 +84,7 @@ def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fract
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
-    """Return the points of collocation, in parts of the step."""
+    """Return the collocation points, in units of the step."""
     if points == "gauss":
         return _gauss(n)[0]
     if points is None or points == "thesis":
@@ -93,10 +93,10 @@ def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
 
 
 def _gauss(m: int) -> tuple[Array, Array]:
-    """Return nodes and weights of Gauss and Legendre on the unit interval."""
+    """Return the nodes and weights of Gauss-Legendre quadrature on the unit interval."""
     nodes, weights = [], []
     for near in legendre.leggauss(m)[0].tolist():
-        # One step of Newton's takes off what the eigenvalues err by.
+        # One Newton step removes the error of the eigenvalues.
         value, slope = _legendre(m, Fraction(near))
         x = (Fraction(near) - value / slope).limit_denominator(10**36)
         _, slope = _legendre(m, x)
@@ -106,7 +106,7 @@ def _gauss(m: int) -> tuple[Array, Array]:
 
 
 def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
-    """Return the Legendre polynomial of degree m and its derivative, inside (-1, 1)."""
+    """Return the Legendre polynomial of degree m and its derivative at x inside (-1, 1)."""
     before, value = Fraction(1), x
     for k in range(2, m + 1):
         before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
@@ -119,6 +119,6 @@ def basis(s: Array, n: int) -> Array:
 
 
 def _integrals(s: Array, n: int) -> Array:
-    """Return their integrals from 0 to `s`, shape (m, n); to 1 they are 1, 0, 0 ..."""
+    """Return the integrals of the basis from 0 to `s`, shape (m, n); to 1 they are 1, 0, 0 ..."""
     antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
     return np.asarray(legendre.legval(2.0 * s - 1.0, antiderivatives).T, dtype=float)

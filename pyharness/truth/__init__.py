@@ -1,1 +1,1 @@
-"""The solution of a scene, with its error."""
+"""Reference solutions of a scene in arithmetic of many digits, with bounds of their errors."""

@@ -1,7 +1,7 @@
-"""A symmetric body whose torque acts along its own axis: known at any time, in decimal arithmetic.
+"""Exact solution of a symmetric body with a torque along its axis, in decimal arithmetic.
 
-The spin is the integral of the torque; the other two components turn by the integral of the spin.
-Tested against the reference.
+The spin is the integral of the torque. The vector of the other two components rotates by an angle
+proportional to the integral of the spin. The solution is tested against the reference.
 """
 
 import decimal
@@ -17,7 +17,10 @@ DIGITS = 50
 
 
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
-    """Return omega of a body with I1 = I2, its torque along axis 3; InputError for any other."""
+    """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
+
+    Raise InputError for any other scene.
+    """
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
     if moments is None or moments[0] != moments[1] or any(v[0] or v[1] for v in vectors):
@@ -50,7 +53,7 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
 
 
 def _arithmetic(*sizes: Sequence[float]) -> "decimal._ContextManager":
-    """Return a context with digits enough for angles of the product of these sizes."""
+    """Return a decimal context with enough digits for angles as large as the product of `sizes`."""
     context = decimal.Context(Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
     largest = [max(map(abs, each), default=1.0) for each in sizes]
     context.prec = DIGITS + sum(max(0, Decimal(x).adjusted() + 1) for x in largest)

@@ -6,7 +6,7 @@ from functools import cache
 
 
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
-    """Return sin and cos of any angle, by halving it and the addition theorem."""
+    """Return the sine and cosine of any angle (rad), by halving it and the addition theorem."""
     with decimal.localcontext() as context:
         context.prec += 12 + max(0, angle.adjusted())
         angle = angle.remainder_near(2 * pi(context.prec))
@@ -23,7 +23,7 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
 
 
 def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
-    """Return the sum of x**n / n! from a term on, every second one, of alternating signs."""
+    """Return the alternating sum of x**n / n! over every second n, beginning with `term`."""
     total = term
     while abs(term) > Decimal(1).scaleb(-decimal.getcontext().prec):
         n += 2
@@ -34,7 +34,7 @@ def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
 
 @cache
 def pi(digits: int) -> Decimal:
-    """Return pi by Machin's formula."""
+    """Return pi to a number of digits, by Machin's formula."""
     with decimal.localcontext(prec=digits + 5):
         return 16 * _arctan_inverse(5) - 4 * _arctan_inverse(239)
 

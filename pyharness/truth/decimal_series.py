@@ -1,4 +1,4 @@
-"""The Taylor series of equations 13-15, and of what hangs on them, in decimal arithmetic."""
+"""The Taylor series of equations 13-15, of velocity and of attitude, in decimal arithmetic."""
 
 from collections.abc import Sequence
 from decimal import Decimal
@@ -11,13 +11,13 @@ from pyharness.model.scene import Scene
 from pyharness.truth.decimal_functions import sine_cosine
 
 _MOST_STEPS = 100_000  # some 30 seconds, more with waves
-# Of a series where an effort is given: some ten seconds. A wave costs a fifth of a step.
+# Work limit in steps if an effort is given, some ten seconds. A wave costs a fifth of a step.
 _ORDINARY_STEPS = 20_000
-# After so many, a small part of a second, their pace tells whether the rest is out of reach; the
-# motion may become slower by so much.
+# After so many steps, a small part of a second, their pace shows whether the end is out of reach.
+# The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
-# A power of time with which steps grow, above what they only happen to.
+# If the number of steps grows with time to a higher power than this, the power is no accident.
 _GROWING = Decimal("1.3")
 
 Row = list[Decimal]
@@ -32,10 +32,11 @@ def taylor_series(
     tolerance: Decimal,
     effort: float | None,
 ) -> list[Row]:
-    """Return omega (and velocity, and attitude) at `times`; fewer rows where it blows up.
+    """Return omega (and velocity, and attitude) at `times`; fewer rows if the solution blows up.
 
-    The attitude is that of a scene which has one, of the length that it has there. `coefficients`
-    are A, B, C of the scene; `tolerance` is of each step, relative to omega, and to the attitude.
+    The attitude is included if the scene has one, with the norm of the scene's quaternion.
+    `coefficients` are A, B, C of the scene. `tolerance` is the local tolerance, relative to omega
+    and to the attitude.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
@@ -64,7 +65,7 @@ def taylor_series(
 
 
 class _Limit:
-    """How many steps a series may take, and the forecast of how many it needs."""
+    """The limit of the number of steps of a series, with a forecast of the steps needed."""
 
     def __init__(self, scene: Scene, effort: float | None) -> None:
         self._effort = None if effort is None else checked_effort(effort)
@@ -74,9 +75,9 @@ class _Limit:
         self._before: tuple[int, Decimal] = (0, Decimal(0))
 
     def check(self, step: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
-        """Raise InputError before a step, where it or the rest of them would be too many."""
+        """Raise InputError before a step if the steps so far or the forecast exceed the limit."""
         if step == 0:
-            # From the first step alone, but for what is hopeless, no one can tell.
+            # The first step alone shows only that the end is far out of reach.
             if rest > 10 * Decimal(self._most) * abs(length):
                 self._refuse(rest / abs(length))
         elif step >= self._most:
@@ -84,7 +85,7 @@ class _Limit:
         elif self._effort is not None and 2 * step >= self._next:
             if step >= self._next:
                 needed = self._forecast(step, abs(begin), rest)
-                # Steps that shrink end at an omega without bound; their mean says nothing.
+                # Steps shrink where omega grows without bound: their mean is then no forecast.
                 shrinks = 10 * abs(length) * step < abs(begin)
                 if needed > Decimal(_PACE_SLACK * self._most) and not shrinks:
                     self._refuse(needed)
@@ -93,7 +94,11 @@ class _Limit:
                 self._before = step, abs(begin)
 
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
-        """Return the steps to the end: as many a second as so far, or more as the motion grows."""
+        """Return a forecast of the number of steps until the end.
+
+        It assumes as many steps per second as so far. If the number of steps so far grew like a
+        higher power of time, it assumes that power.
+        """
         step_before, begin_before = self._before
         power = Decimal(1)
         if 0 < step_before < step:
@@ -114,9 +119,9 @@ class _Limit:
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
-    """Return the step for which the last two terms are small beside the leading unknowns.
+    """Return the step for which the last two terms are small relative to the leading unknowns.
 
-    Of a body at rest, beside what the first terms make of it until then.
+    For a body at rest they are small relative to its first terms that are not zero.
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
@@ -125,7 +130,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
         size = _size(coefficients, k)
         if size and begun is not None:
             lengths = [
-                # The root needs few digits; the exponent range is Decimal's.
+                # The root needs few digits, but the exponent range of Decimal.
                 ((tolerance * before / size).ln() / (k - j)).exp()
                 for j in range(begun, 1 if begun == 0 else begun + 4)
                 if (before := _size(coefficients, j, leading))
@@ -135,7 +140,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
 
 
 def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
-    """Return the largest coefficient k of the first so many unknowns, of all by default."""
+    """Return the largest absolute coefficient k of the first `unknowns` unknowns, or of all."""
     return max(abs(series[k]) for series in coefficients[:unknowns])
 
 
@@ -147,14 +152,14 @@ def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
 
 
 def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
-    """Return what torques are divided by, without rounding: the moments, or 1 for coefficients."""
+    """Return the exact divisors of torques: the moments, or 1 for a body given by coefficients."""
     return scene.exact_moments or (Fraction(1), Fraction(1), Fraction(1))
 
 
 class _Equations:
     """Equations 13-15 as recurrences of Taylor coefficients.
 
-    Beside them dV/dt = F/m - omega x V and dq/dt = q (0, omega)/2, where they are asked for.
+    The equations dV/dt = F/m - omega x V and dq/dt = q (0, omega)/2 are added if they are needed.
     """
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
@@ -198,7 +203,7 @@ class _Equations:
         for (amplitude, frequency), quarter in waves:
             rate = Decimal(frequency)
             sine, cosine = sine_cosine(rate * time)
-            # Derivatives of sin run sin, cos, -sin, -cos; those of cos start one later.
+            # The derivatives of sin are sin, cos, -sin, -cos; those of cos begin one later.
             cycle = [sine, cosine, -sine, -cosine]
             factor = Decimal(1)
             for k in range(order):
@@ -213,7 +218,7 @@ class _Equations:
 
 
 def _turning(q: list[Row], omega: list[Row]) -> Row:
-    """Return half of Hamilton's product with (0, omega), each a Cauchy product."""
+    """Return half of Hamilton's product q (0, omega), in which each product is a Cauchy product."""
     (a, b, c, d), (x, y, z) = q, omega
     return [
         (-_product(b, x) - _product(c, y) - _product(d, z)) / 2,

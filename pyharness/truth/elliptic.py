@@ -1,8 +1,8 @@
-"""Torque-free motion in decimal arithmetic, by Jacobi's elliptic functions: the trials' truth.
+"""Torque-free motion in decimal arithmetic by Jacobi's elliptic functions, to check other methods.
 
-Unlike a series it loses no digit on the way, so that many flips beside the separatrix cost no
-more than a short time. It shares no code with the method that it judges: other arithmetic,
-Landen's transformation.
+Unlike a series it loses no digits with time, so that many flips near the separatrix cost no more
+than a short time. It shares no code with the method that it checks. Its arithmetic is different,
+and it uses Landen's transformation.
 """
 
 import decimal
@@ -15,15 +15,15 @@ from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row
 from pyharness.truth.reference import exact_coefficients
 
-# Beside those that small components take by their squares.
+# Digits, in addition to those that the squares of small components need.
 _DIGITS = 90
 
 
 def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
     """Return omega of a scene without torque at `time` (s), in rad/s.
 
-    Its motion has to be bounded, as it is where A, B and C belong to moments; `rounded` takes
-    those that binary64 holds, and not the exact ones.
+    The motion must be bounded, as it is if A, B and C belong to moments. If `rounded`, A, B and C
+    are taken as rounded to binary64, instead of the exact ones.
     """
     with decimal.localcontext() as context:
         context.prec = _DIGITS
@@ -38,7 +38,7 @@ def torque_free(scene: Scene, time: float, rounded: bool = False) -> Row:
 
 
 def _decades(values: Row) -> int:
-    """Return how many powers of ten lie between the largest and the smallest, zeros aside."""
+    """Return the difference of the decimal exponents of the largest and smallest nonzero value."""
     powers = [value.adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
 
@@ -46,8 +46,8 @@ def _decades(values: Row) -> int:
 def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: Decimal) -> Row:
     if not any(coefficients):
         return list(start)
-    # The axis of the odd sign becomes the second, its sign minus: turning all omega turns the
-    # signs of all coefficients.
+    # Permute the axes so that the coefficient with the odd sign is the second, and negative. To
+    # change the signs of all coefficients, the signs of all omegas are changed.
     for first, sign in itertools.product(range(3), (1, -1)):
         axes = [first, (first + 1) % 3, (first + 2) % 3]
         a = [sign * coefficients[axis] for axis in axes]
@@ -70,10 +70,10 @@ def _solution(coefficients: Sequence[Decimal], start: Sequence[Decimal], time: D
 
 
 def _turned(a: Sequence[Decimal], omega: Row, time: Decimal) -> Row:
-    """Solve where one coefficient is zero: the other two omegas turn in an ellipse."""
+    """Solve a motion with one coefficient zero, where the other two omegas move on an ellipse."""
     axis = 0 if not a[0] else 2
     other = 2 - axis
-    # other' = a[other] w2 w, w2' = a[1] other w, and w of `axis` stays.
+    # other' = a[other] w2 w, w2' = a[1] other w, and w of `axis` is constant.
     w = omega[axis]
     upper, lower = a[other] * w, a[1] * w
     rate = (-upper * lower).sqrt()
@@ -126,7 +126,7 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
         levels.append(k1)
         u = u / (1 + k1)
         complement = 2 * complement.sqrt() / (1 + complement)
-    # What is left of the modulus, some 1e-65, counts by its square.
+    # The remaining modulus, some 1e-65, has an effect only by its square.
     sn, cn = sine_cosine(u / (1 + k1))
     dn = Decimal(1)
     levels.append(k1)

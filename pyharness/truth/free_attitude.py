@@ -1,8 +1,9 @@
-"""Attitude of a torque-free body in decimal arithmetic, however far: the trials' truth.
+"""Attitude of a torque-free body at any time in decimal arithmetic, to check other methods.
 
-A period of omega turns the body about the angular momentum, by the same angle each time. So one
-period of the series of omega and attitude tells all the others. It shares no code with the method
-that it judges: no elliptic function but for the length of the period, and no theta function.
+In each period of omega the body rotates about the angular momentum by the same angle. Therefore one
+period of the series of omega and attitude determines all the others. This module shares no code
+with the method that it checks. It uses no elliptic function except for the length of the period,
+and no theta function.
 """
 
 import decimal
@@ -20,10 +21,11 @@ _ORDER, _TOLERANCE = 44, Decimal("1e-44")
 
 
 def free_attitude(scene: Scene, time: float) -> Row:
-    """Return the unit quaternion of a scene without torque at `time` (s), of the same sign as q(0).
+    """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    The scene has moments and an attitude. Beside the separatrix a period is long, and on it the
-    whole way is followed; InputError where that takes too many steps.
+    Its sign is continuous from time 0 on. The scene must have moments and an attitude. Near the
+    separatrix a period is long. On the separatrix the motion is integrated all the time. Raise
+    InputError if the integration takes too many steps.
     """
     assert scene.attitude is not None
     with decimal.localcontext() as context:
@@ -43,7 +45,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
         whole, rest = divmod(abs(end), period)
         period, rest = period.copy_sign(end), rest.copy_sign(end)
         after_rest, after_period = _followed(scene, [rest, period])
-        # In space: what a period does to the attitude at any time.
+        # The rotation in space by which each period changes the attitude, at any time.
         turn = product(after_period, conjugate(begin))
         return _unit(product(_power(turn, int(whole)), after_rest))
 
@@ -57,7 +59,8 @@ def period_of(scene: Scene) -> Decimal | None:
     gap = energies[low] * lower - energies[high] * upper
     if not gap:
         return None
-    # Whose direction stays, and the squares of the largest terms about either side.
+    # With T the kinetic energy and L the angular momentum these are 2 T I_high - L**2 and
+    # L**2 - 2 T I_low; `gap` is 2 T I_middle - L**2.
     stays = energies[low] * both + energies[middle] * upper
     turns = energies[high] * both + energies[middle] * lower
     larger = lower * stays if gap > 0 else upper * turns
@@ -69,13 +72,13 @@ def period_of(scene: Scene) -> Decimal | None:
 
 
 def is_steady(scene: Scene) -> bool:
-    """Whether omega of a scene without torque does not change."""
+    """Return whether omega of a scene without torque is constant."""
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     return all((i[a - 1] - i[a - 2]) * w[a - 1] * w[a - 2] == 0 for a in range(3))
 
 
 def product(p: Row, q: Row) -> Row:
-    """Return Hamilton's product."""
+    """Return Hamilton's product of two quaternions."""
     (a, b, c, d), (e, f, g, h) = p, q
     return [
         a * e - b * f - c * g - d * h,
@@ -86,7 +89,7 @@ def product(p: Row, q: Row) -> Row:
 
 
 def conjugate(q: Row) -> Row:
-    """Return the turn back."""
+    """Return the conjugate of a quaternion, which is the inverse rotation of a unit quaternion."""
     return [q[0], -q[1], -q[2], -q[3]]
 
 

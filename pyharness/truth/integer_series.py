@@ -1,8 +1,8 @@
-"""A second reference, which shares no code with the first: Taylor series in whole numbers.
+"""A second reference, the Taylor series in integer arithmetic.
 
-A number is an integer over 2**BITS, in units in which the time asked for is 1 and the largest omega
-about 1. Sines and cosines of the torque are unknowns of the series as omega is, so that nothing
-comes from a library of functions.
+It shares no code with the first reference. A number is an integer over 2**BITS, in units in which
+the last requested time is 1 and the largest omega is about 1. Sines and cosines of the torque are
+unknowns of the series, as omega is, so that no library function is needed.
 """
 
 from collections.abc import Sequence
@@ -19,29 +19,30 @@ from pyharness.model.trajectory import Array
 BITS = 160
 _ORDER = 36
 _LAST = 60  # bits of the last terms of a step: 2**-100 of the unit
-_CLOCK = 64  # steps are multiples of 2**-64 of the time asked for
+_CLOCK = 64  # steps are multiples of 2**-64 of the last requested time
 _MOST_STEPS = 20_000  # each takes a third of a millisecond
-# The unit of omega is guessed; so many powers of two beside the largest omega it will do.
+# The unit of omega is guessed. It is accepted if the largest omega is at most 2**_ABOVE and at
+# least 2**-_BELOW units.
 _ABOVE, _BELOW = 8, 24
 _MOST_GUESSES = 16
 _LEAST_POWER = -1200  # below it everything is 0 in binary64
-_INSIDE = 24  # places in a step at which the path is seen
+_INSIDE = 24  # nodes in each step at which the path is evaluated
 
 Series = list[int]
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The true solution, at the times asked for and on the way to them."""
+    """The true solution at the requested times and at nodes between them."""
 
-    time: Array  # shape (n,); as asked for, s
+    time: Array  # shape (n,); as requested, s
     omega: Array  # shape (n, 3); rounded to binary64, rad/s
-    nodes: Array  # shape (m,); times from 0 to the last one, close to each other, s
+    nodes: Array  # shape (m,); closely spaced times from 0 to the last requested one, s
     way: Array  # shape (m, 3); omega at the nodes, in binary64 arithmetic, rad/s
 
 
 class _OtherUnitError(Exception):
-    """Omega is far from 1: it needs a unit that is 2**power times as large."""
+    """An exception that omega is far from 1 and needs a unit 2**power times as large."""
 
     def __init__(self, power: int) -> None:
         super().__init__()
@@ -49,11 +50,12 @@ class _OtherUnitError(Exception):
 
 
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
-    """Return the true solution of a scene at `times`; its step size plays no part.
+    """Return the true solution of a scene at `times` (s); the scene's step size is not used.
 
-    They are strictly monotonic, away from 0 on one side, none of them 0 (s). Before rounding it is
-    good to some 1e-29 of the largest omega, times the growth of a small difference. InputError
-    where omega leaves every bound before, or too many steps would be needed.
+    The times are strictly monotonic in order away from 0, on one side, and none of them is 0.
+    Before rounding, the solution has an error of some 1e-29 of the largest omega, times the error
+    amplification. Raise InputError if omega grows without bound before, or if too many steps would
+    be needed.
     """
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):
@@ -65,7 +67,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return the largest omega that the start or the torque alone would give."""
+    """Return the larger of the initial omega and the omega that torque alone would give (rad/s)."""
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
@@ -80,7 +82,7 @@ def _power_of(size: Fraction) -> int:
 
 
 def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
-    """Step from 0 to the last time with omega in units of 2**power rad/s."""
+    """Integrate from 0 to the last time with omega in units of 2**power rad/s."""
     span = Fraction(times[-1])
     wanted = [Fraction(t) / span for t in times]
     equations = _Equations(scene, span, Fraction(2) ** power)
@@ -130,7 +132,7 @@ def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
 
 
 def _at(terms: Series, part: Fraction) -> Fraction:
-    """Return a series at a part of its step."""
+    """Return the value of a series at the fraction `part` of its step."""
     fixed = _fixed(part)
     total = 0
     for term in reversed(terms):
@@ -144,19 +146,20 @@ def _fixed(value: Fraction) -> int:
 
 @dataclass(frozen=True)
 class _Wave:
-    """Waves of one frequency: unknowns sine over `unit` and cosine.
+    """The waves of one frequency, by two unknowns of the series: a sine and a cosine.
 
-    A slow sine is kept over its angle, so that a large amplitude finds all its digits.
+    For a slow wave the first unknown is the sine divided by the angle of the wave at the end, so
+    that a large amplitude keeps all its digits.
     """
 
-    to_sine: int  # derivative of the unknown `sine` is `to_sine` times the cosine
-    to_cosine: int  # and that of the cosine this times the unknown
+    to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine
+    to_cosine: int  # the derivative of the cosine is `to_cosine` times the unknown sine
     on_sine: Series
     on_cosine: Series
 
 
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
-    """Return what torques are divided by (kg m2, or 1 where it is done), and A, B, C, unrounded."""
+    """Return the exact divisors of torques (kg m2, or 1 for coefficients), and exact A, B, C."""
     moments = list(scene.exact_moments or (Fraction(1),) * 3)
     if scene.coefficients is not None:
         return moments, [Fraction(x) for x in scene.coefficients]
@@ -164,7 +167,7 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 
 
 class _Equations:
-    """Equations 13-15 in units of the time asked for and of omega, as recurrences of terms."""
+    """Equations 13-15 in units of the requested time and of omega, as recurrences of terms."""
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
         law = scene.body_torque
@@ -197,7 +200,7 @@ class _Equations:
         self.start += [0, 1 << BITS] * len(self._waves)
 
     def expand(self, state: Series, begin: int, length: int) -> list[Series]:
-        """Return the terms 0 ... order of all unknowns, the powers of the step in them."""
+        """Return the terms 0 ... order of all unknowns, multiplied by the powers of the step."""
 
         def stepped(x: int) -> int:
             return x * length >> _CLOCK

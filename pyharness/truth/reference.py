@@ -1,8 +1,8 @@
-"""The reference: the true solution of a scene, with the error that it may have.
+"""The reference: the true solution of a scene, with a bound of its error.
 
-Known solutions where there are any (sphere; symmetric body without torque), otherwise the
-Taylor series of equations 13-15 in decimal arithmetic. It shares no code with the methods it
-judges: exact coefficients, other arithmetic, other steps.
+A sphere and a symmetric body without torque have known solutions. Any other scene is solved by the
+Taylor series of equations 13-15 in decimal arithmetic. The reference shares no code with the
+methods that it checks. Its coefficients are exact, and its arithmetic and its steps are different.
 """
 
 import decimal
@@ -31,25 +31,25 @@ _HALF_ULP = 2.0**-53
 class Reference:
     """The true solution in binary64."""
 
-    time: Array  # shape (n,), s; where the solution leaves every bound, the rows end before
+    time: Array  # shape (n,), s; if the solution grows without bound, the rows end before
     omega: Array  # shape (n, 3), rad/s
     velocity: Array | None  # shape (n, 3), m/s; from the deck's forces and its first mass
-    source: str  # what it is
+    source: str  # text: how the solution was computed
     estimate: float  # estimated error of any omega before rounding (rad/s)
-    # shape (n, 3); what rounding took from omega (rad/s): `omega` and it together have twice the
-    # digits.
+    # shape (n, 3); the part of omega that rounding removed (rad/s): `omega` plus `remainder` has
+    # twice as many digits
     remainder: Array | None = None
-    attitude: Array | None = None  # shape (n, 4), of length 1; where the scene has one
+    attitude: Array | None = None  # shape (n, 4), unit quaternions; None if the scene has none
     angle_estimate: float = 0.0  # estimated error of any attitude before rounding (rad)
 
     @property
     def angle_error(self) -> float:
-        """Bound of the error of any attitude (rad): the estimate, and what rounding turns."""
+        """Return a bound of the error of any attitude (rad): the estimate plus rounding."""
         return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
-        """Bound of the error of any omega: the estimate, and half a unit in the last place."""
+        """Return a bound of the error of any omega (rad/s): the estimate plus rounding."""
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
 
@@ -61,15 +61,17 @@ def reference(
     precise: bool = False,
     effort: float | None = None,
 ) -> Reference:
-    """Return the true solution of `scene` at `times`.
+    """Return the true solution of `scene` at `times` (s).
 
-    They run strictly from 0 (s), forward or backward; the first may be 0. A series is good to more
-    digits than binary64 has, or, to be `precise`, to 1e-25 before rounding where the motion itself
-    allows it. Its error is estimated by the largest difference of two series of different order
-    and step. `effort` is a factor on some ten seconds of work, beyond which the pace of the
-    first steps ends the rest; without it 100 000 steps are taken. A scene with an attitude gives
-    attitudes, always by the series. InputError where the times do not lead away from 0, or the
-    series needs too many steps.
+    The times are strictly monotonic in order away from 0, forward or backward; the first may be 0.
+    A series is accurate to more digits than binary64 has. If `precise`, it is accurate to 1e-25
+    before rounding, unless the motion amplifies errors too much. Its error is estimated by the
+    largest difference of two series of different order and step. `effort` is a factor on a work
+    limit of some ten seconds; the pace of the first steps decides whether the rest would exceed it.
+    Without `effort` the limit is 100 000 steps. If the scene has an attitude, the result has
+    attitudes, always by the series. `velocity` requests the velocity.
+
+    Raise InputError if the times are not in order, or if the series needs too many steps.
     """
     away = [abs(t) for t in times]
     one_side = min(times) >= 0.0 or max(times) <= 0.0
@@ -106,9 +108,10 @@ def reference(
 
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
-    """Return the closed form of a sphere, or of a symmetric body without torque; else None.
+    """Return the closed form of a sphere, or of a symmetric body without torque, else None.
 
-    To as many decimals as the arithmetic has digits: a phase of 1e41 radians needs 41 more.
+    The solution has as many decimals as the arithmetic has digits. A phase of 1e41 radians
+    therefore needs 41 additional digits.
     """
     with decimal.localcontext() as context:
         context.prec += _digits_before_the_point(scene, max(map(abs, times)))
@@ -116,7 +119,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return those of the largest number on the way to a known solution, or some more."""
+    """Return a bound of the digits before the point of any number in a known solution."""
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega
@@ -139,7 +142,7 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
         return None
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3
-        # The coefficients of the other two axes are opposite: they turn in a circle.
+        # The coefficients of the other two axes are opposite: their omegas move on a circle.
         if coefficients[axis] == 0 and coefficients[j] == -coefficients[k]:
             omega = [Decimal(w) for w in scene.omega]
             rate = coefficients[j] * omega[axis]
@@ -155,7 +158,7 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _sphere(scene: Scene, t: Decimal) -> Row:
-    """Return omega(0) and the integral of the normalized torque."""
+    """Return omega of a sphere, omega(0) plus the integral of the normalized torque."""
     torque = scene.body_torque
     row = []
     for axis in range(3):
@@ -164,7 +167,7 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
         total = Decimal(torque.constant[axis]) * t + Decimal(torque.rate[axis]) * t * t / 2
         for amplitude, frequency in torque.sines:
             if frequency:
-                # 1 - cosine would have few digits where the angle is small.
+                # 1 - cosine would have few digits for a small angle.
                 sine, _ = sine_cosine(Decimal(frequency) * t / 2)
                 total += Decimal(amplitude[axis]) * 2 * sine * sine / Decimal(frequency)
         for amplitude, frequency in torque.cosines:
@@ -176,7 +179,7 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
 
 
 def exact_coefficients(scene: Scene) -> Row:
-    """Return A, B, C, exact to the digits of the arithmetic."""
+    """Return A, B, C to all digits of the arithmetic."""
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]
     i1, i2, i3 = divisors(scene)
@@ -185,7 +188,7 @@ def exact_coefficients(scene: Scene) -> Row:
 
 
 def _is_number(x: Decimal) -> bool:
-    """Whether binary64 holds it."""
+    """Return whether a number is finite in binary64."""
     return math.isfinite(float(x))
 
 

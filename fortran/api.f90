@@ -1,43 +1,44 @@
-! What f2py reads, with api_many.f90 and api_words.f90: explicit shapes, known kinds, a status code,
-! no logic.
+! The interface that f2py reads, together with api_many.f90 and api_words.f90. Its procedures have
+! explicit shapes, known kinds and a status code, and contain no logic.
 
 subroutine run_program(program, flags, by_moments, body, omega, masses, forces, torque_constant, &
                        torque_rate, torque_first, torque_varies, n_sines, sines, n_cosines, &
                        cosines, step_size, n_steps, lipschitz, may_stop, with_velocity, rows, &
                        ier_rows, n_rows, status, evaluations, stop_variable, stop_quotient)
-  ! One of the three programs of the appendix on one scene.
+  ! Run one of the three programs of the appendix on one scene; units as in deck_t of deck.fypp.
   !f2py threadsafe
   use deck_binary64, only: deck_t, stop_t
   use listing_flags, only: listing_from_bits
   use programs_binary64, only: run
   implicit none
   integer(4), intent(in) :: program        ! 1 two-term, 2 four-term, 3 runge-kutta
-  integer(4), intent(in) :: flags          ! active defects and readings, bits of listing_flags
+  integer(4), intent(in) :: flags          ! bit mask: active defects, readings, conjectures
   integer(4), intent(in) :: by_moments     ! 1: body is I1, I2, I3; 0: A, B, C
   real(8), intent(in) :: body(3)
   real(8), intent(in) :: omega(3)          ! rad/s at time 0
   real(8), intent(in) :: masses(3), forces(3)
   real(8), intent(in) :: torque_constant(3), torque_rate(3)
-  real(8), intent(in) :: torque_first(3)   ! over moment, 1/s2: of the first step, where assumed
-  integer(4), intent(in) :: torque_varies  ! 0: only the constant acts
+  real(8), intent(in) :: torque_first(3)   ! torque over moment in the first step, if assumed, 1/s2
+  integer(4), intent(in) :: torque_varies  ! 0: only torque_constant acts
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), frequency in rad/s
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
   real(8), intent(in) :: step_size
   integer(4), intent(in) :: n_steps
   real(8), intent(in) :: lipschitz
   integer(4), intent(in) :: may_stop
   integer(4), intent(in) :: with_velocity  ! 0: V1-V3 of the rows are not set
-  ! Not filled with zeros first: of many steps that alone would take seconds.
+  ! With intent(cache) f2py does not fill these arrays with zeros, which takes seconds for many
+  ! steps.
   !f2py intent(cache) rows, ier_rows
-  real(8), intent(out) :: rows(8, n_steps)  ! n h, TIME, U1-U3, V1-V3 for n_rows results
+  real(8), intent(out) :: rows(8, n_steps)  ! n h, TIME, U1-U3, V1-V3; n_rows columns are set
   integer(4), intent(out) :: ier_rows(n_steps)    ! IER as printed, 0 for runge-kutta
   integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status               ! 0 complete, 1 stopped, 2 overflow
-  integer(4), intent(out) :: evaluations          ! right-hand sides
+  integer(4), intent(out) :: status               ! 0 complete, 1 stopped, 2 overflow, 5 interrupted
+  integer(4), intent(out) :: evaluations          ! right-hand sides evaluated
   integer(4), intent(out) :: stop_variable        ! 0 none, 1-3 U, 4-6 V, 7 norm of U, 8 of U and V
-  real(8), intent(out) :: stop_quotient           ! change of K over change of U
+  real(8), intent(out) :: stop_quotient           ! change of K over change of U, 1/s
   type(deck_t) :: scene
   type(stop_t) :: stop_at
 
@@ -51,7 +52,7 @@ subroutine run_program(program, flags, by_moments, body, omega, masses, forces, 
 end subroutine run_program
 
 subroutine solve_linear(n, m, a, b, factors, x, ier)
-  ! The stand-in for LEQT1F by itself: A X = B, so that it can be tested alone.
+  ! Solve A X = B with the stand-in for LEQT1F alone, so that tests can check it separately.
   !f2py threadsafe
   use linear_solver_binary64, only: leqt1f
   implicit none
@@ -70,8 +71,8 @@ end subroutine solve_linear
 subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
                        omega0, n_times, times, tolerance, n_attitudes, attitudes, effort, rows, &
                        n_rows, status, steps)
-  ! Taylor series: omega, and the attitude where it is asked for, at times that lead away from 0 on
-  ! one side.
+  ! Integrate by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which have
+  ! one sign and are ordered away from 0.
   !f2py threadsafe
   use levels, only: taylor_solve
   use problem, only: problem_t
@@ -82,21 +83,23 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)         ! s
-  real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|
+  real(8), intent(in) :: tolerance              ! allowed error over the largest |omega|
   !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
-  real(8), intent(inout) :: effort(5) ! factor on the limits; out: due; error, growth, all steps
+  real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
+  ! (3) estimated error, (4) error amplification, (5) steps of all integrations
   !f2py integer(4), optional, intent(in) :: n_attitudes = 0
-  integer(4), intent(in) :: n_attitudes         ! n_times, or 0
+  integer(4), intent(in) :: n_attitudes         ! n_times, or 0 without attitude
   !f2py real(8), optional, intent(inout) :: attitudes = 0.0
-  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! the first is that at time 0
-  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
+  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
+  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows columns are set
   integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up, 6 sensitive
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
   integer(8), intent(out) :: steps
+  ! steps: number of steps of the last integration
 
   call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                               cosines), &
@@ -107,32 +110,33 @@ end subroutine taylor_rows
 subroutine space_torque_rows(coefficients, ratios, m_constant, m_rate, n_sines, sines, n_cosines, &
                              cosines, omega0, n_times, times, tolerance, n_attitudes, attitudes, &
                              effort, rows, n_rows, status, steps)
-  ! Taylor series under a torque about the axes of space: omega and attitude at times that lead away
-  ! from 0 on one side.
+  ! Integrate by Taylor series under a torque about the axes of space: omega and attitude at
+  ! `times`, which have one sign and are ordered away from 0.
   !f2py threadsafe
   use problem, only: problem_t
   use space_torque, only: space_torque_solve
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
-  real(8), intent(in) :: ratios(3)              ! the largest moment over each
+  real(8), intent(in) :: ratios(3)              ! largest moment over each moment
   real(8), intent(in) :: m_constant(3)          ! torque over the largest moment, 1/s2
   real(8), intent(in) :: m_rate(3)              ! 1/s3
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
   integer(4), intent(in) :: n_cosines
-  real(8), intent(in), target :: cosines(4, n_cosines)  ! the same
+  real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
   real(8), intent(in) :: omega0(3)              ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)         ! s
-  real(8), intent(in) :: tolerance              ! of the errors over the largest |omega|, and in rad
+  real(8), intent(in) :: tolerance              ! allowed error: relative, and of the angle in rad
   !f2py integer(4), intent(in), check(n_attitudes == n_times) :: n_attitudes
   integer(4), intent(in) :: n_attitudes         ! n_times
-  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! the first is that at time 0
+  real(8), intent(inout) :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
   !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
-  real(8), intent(inout) :: effort(5) ! factor on the limits; out: due; error, growth, all steps
-  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows of them
+  real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
+  ! (3) estimated error, (4) error amplification, (5) steps of all integrations
+  real(8), intent(out) :: rows(3, n_times)      ! rad/s; n_rows columns are set
   integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 gave up, 6 sensitive
+  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
   integer(8), intent(out) :: steps
 
   call space_torque_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
@@ -142,7 +146,8 @@ subroutine space_torque_rows(coefficients, ratios, m_constant, m_rate, n_sines, 
 end subroutine space_torque_rows
 
 subroutine choose_instructions(highest, taken)
-  ! For tests: the kernels of one instruction set. 0 plain, 1 AVX2, 2 AVX-512, or the best below.
+  ! Select the kernels of one instruction set, for tests: 0 plain, 1 AVX2, 2 AVX-512. If the
+  ! processor lacks it, the best set below it is taken. `taken` is the set that is used.
   use levels, only: choose_level
   implicit none
   integer(4), intent(in) :: highest
@@ -153,19 +158,19 @@ end subroutine choose_instructions
 
 subroutine torque_free_solution(coefficients, coefficients_low, omega0, n_times, times, rows, &
                                 n_rows, status)
-  ! Closed form of a body without torque.
+  ! Evaluate the closed form of a torque-free body at `times`.
   !f2py threadsafe
   use torque_free, only: torque_free_rows
   implicit none
   real(8), intent(in) :: coefficients(3)  ! A, B, C
   !f2py real(8), optional, intent(in) :: coefficients_low(3) = 0.0
-  real(8), intent(in) :: coefficients_low(3) ! what rounding took off them
+  real(8), intent(in) :: coefficients_low(3) ! low-order parts of A, B, C (double-double)
   real(8), intent(in) :: omega0(3)        ! rad/s at time 0
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)   ! s
   real(8), intent(out) :: rows(3, n_times)
-  integer(4), intent(out) :: n_rows       ! rows that hold a result
-  integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 gave up
+  integer(4), intent(out) :: n_rows       ! number of rows that hold a result
+  integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 phase has no digit
 
   call torque_free_rows(coefficients, coefficients_low, omega0, n_times, times, rows, n_rows, &
                         status)
@@ -173,47 +178,49 @@ end subroutine torque_free_solution
 
 subroutine torque_free_attitude_solution(moments, moments_low, omega0, attitude0, n_times, times, &
                                          rows, attitudes, n_rows, status)
-  ! Closed form of a body without torque, and of its attitude: a quaternion, body to space.
+  ! Evaluate the closed form of a torque-free body and its attitude, a quaternion from body to
+  ! space.
   !f2py threadsafe
   use torque_free_attitude, only: torque_free_attitude_rows
   implicit none
   real(8), intent(in) :: moments(3)       ! kg m2
   !f2py real(8), optional, intent(in) :: moments_low(3) = 0.0
-  real(8), intent(in) :: moments_low(3)   ! what rounding took off them
+  real(8), intent(in) :: moments_low(3)   ! low-order parts of the moments (double-double)
   real(8), intent(in) :: omega0(3)        ! rad/s at time 0
-  real(8), intent(in) :: attitude0(4)     ! at time 0, scalar first, of any length
+  real(8), intent(in) :: attitude0(4)     ! quaternion at time 0, scalar first, any norm
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)   ! s, in any order
   real(8), intent(out) :: rows(3, n_times)
   real(8), intent(out) :: attitudes(4, n_times)
-  integer(4), intent(out) :: n_rows       ! rows that hold a result
-  integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 gave up
+  integer(4), intent(out) :: n_rows       ! number of rows that hold a result
+  integer(4), intent(out) :: status       ! 0 complete, 2 overflow, 3 refused, 4 phase has no digit
 
   call torque_free_attitude_rows(moments, moments_low, omega0, attitude0, n_times, times, rows, &
                                  attitudes, n_rows, status)
 end subroutine torque_free_attitude_solution
 
 subroutine torque_free_growth(coefficients, omega0, t_end, growth)
-  ! How much the closed form of a body without torque makes of a small difference.
+  ! Compute the error amplification of a torque-free motion: the largest norm of the
+  ! state-transition matrix of omega to t_end, from the closed form.
   !f2py threadsafe
   use torque_free_differences, only: torque_free_growth_of
   implicit none
   real(8), intent(in) :: coefficients(3)  ! A, B, C
   real(8), intent(in) :: omega0(3)        ! rad/s at time 0
   real(8), intent(in) :: t_end            ! s
-  real(8), intent(out) :: growth          ! at least 1; below 0 where there is no closed form
+  real(8), intent(out) :: growth          ! at least 1; negative if there is no closed form
 
   growth = torque_free_growth_of(coefficients, omega0, t_end)
 end subroutine torque_free_growth
 
 subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosines, omega0, &
                            n_times, times, effort, rows, n_rows, status)
-  ! Closed form of a sphere under the torque law of a scene.
+  ! Evaluate the closed form of a sphere under the torque law of a scene.
   !f2py threadsafe
   use problem, only: problem_t
   use sphere, only: sphere_rows
   implicit none
-  real(8), intent(in) :: m_constant(3)        ! all torque over moment
+  real(8), intent(in) :: m_constant(3)        ! torque over moment, 1/s2; its rate below, 1/s3
   real(8), intent(in) :: m_rate(3)
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)  ! amplitude (3), frequency in rad/s
@@ -224,6 +231,7 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   real(8), intent(in) :: times(n_times)
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
+  ! effort: (1) factor on the work limit; out: (2) factor required
   real(8), intent(out) :: rows(3, n_times)
   integer(4), intent(out) :: n_rows, status
 
@@ -234,19 +242,20 @@ end subroutine sphere_solution
 
 subroutine torque_noise_ratio(m_constant, m_rate, n_sines, sines, n_cosines, cosines, t_end, &
                               steps, scale, noise)
-  ! What the terms of a torque that nearly cancel give alone, over the largest omega.
+  ! Compute the ratio between the omega that the torque's terms add one by one and the largest
+  ! omega. It is 0 unless these terms nearly cancel.
   !f2py threadsafe
   use problem, only: problem_t
   use torque_noise, only: torque_noise_of
   implicit none
-  real(8), intent(in) :: m_constant(3), m_rate(3) ! torque over moment, 1/s2, and its rate
+  real(8), intent(in) :: m_constant(3), m_rate(3) ! torque over moment, 1/s2, and its rate, 1/s3
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines
   real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: t_end      ! s
-  real(8), intent(in) :: steps      ! in each of which the terms are rounded
-  real(8), intent(in) :: scale      ! largest |omega|, rad/s; the opposite of the first if unknown
+  real(8), intent(in) :: steps      ! number of steps; the terms are rounded in each
+  real(8), intent(in) :: scale      ! largest |omega|, rad/s; if unknown, minus the initial |omega|
   real(8), intent(out) :: noise
 
   noise = torque_noise_of(problem_t([0.0d0, 0.0d0, 0.0d0], m_constant, m_rate, n_sines, n_cosines, &
@@ -257,7 +266,7 @@ end subroutine torque_noise_ratio
 subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
                           omega0, n_times, times, stages, step, effort, rows, reached, n_rows, &
                           status, evaluations)
-  ! Gauss collocation in equal steps between the times.
+  ! Integrate by Gauss collocation, with equal steps from each output time to the next.
   !f2py threadsafe
   use gauss_collocation, only: gauss_rows
   use problem, only: problem_t
@@ -269,13 +278,13 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   real(8), intent(in), target :: cosines(4, n_cosines)
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times)     ! leading away from 0
+  real(8), intent(in) :: times(n_times)     ! s, ordered away from 0
   integer(4), intent(in) :: stages          ! 1 to 8
-  real(8), intent(in) :: step               ! at the most, above 0
+  real(8), intent(in) :: step               ! largest step, s, above 0
   !f2py real(8), optional, intent(in) :: effort = 1.0
   real(8), intent(in) :: effort
   real(8), intent(out) :: rows(3, n_times)
-  real(8), intent(out) :: reached(4)        ! time and omega after the last good step
+  real(8), intent(out) :: reached(4)        ! time and omega after the last successful step
   integer(4), intent(out) :: n_rows, status
   integer(8), intent(out) :: evaluations
 
@@ -288,7 +297,8 @@ end subroutine gauss_solution
 subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
                                cosines, omega0, n_times, times, method, step, effort, rows, &
                                n_rows, status, steps, evaluations)
-  ! Improved Euler, three-term Taylor, Runge-Kutta: whole steps, the last before a time shorter.
+  ! Integrate by improved Euler, three-term Taylor or Runge-Kutta with a fixed step; only the last
+  ! step before an output time is shorter.
   !f2py threadsafe
   use fixed_step, only: fixed_step_rows
   use problem, only: problem_t
@@ -301,8 +311,8 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
   real(8), intent(in) :: omega0(3)
   integer(4), intent(in) :: n_times
   real(8), intent(in) :: times(n_times)
-  integer(4), intent(in) :: method          ! of the module methods
-  real(8), intent(in) :: step               ! above 0
+  integer(4), intent(in) :: method          ! code of the module methods
+  real(8), intent(in) :: step               ! s, above 0
   !f2py real(8), optional, intent(inout) :: effort(2) = 1.0
   real(8), intent(inout) :: effort(2)
   real(8), intent(out) :: rows(3, n_times)
@@ -316,8 +326,8 @@ subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines,
 end subroutine fixed_step_solution
 
 subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, found)
-  ! A prepared solver's call: see fortran/modern/prepared.f90 for what is packed. solver.c calls it
-  ! by its address, and has its arguments written down once more.
+  ! Solve with a prepared solver; fortran/modern/prepared.f90 documents the packed array. solver.c
+  ! calls this procedure by its address and repeats the list of its arguments.
   !f2py threadsafe
   use prepared, only: solve_prepared
   implicit none
@@ -327,15 +337,15 @@ subroutine solve_packed(packed, n_packed, omega0, t_end, omega, status, steps, f
   real(8), intent(in) :: t_end       ! s
   real(8), intent(out) :: omega(3)   ! rad/s; NaN unless the status is 0 or 6
   integer(4), intent(out) :: status
-  integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation; below 0 of quick,
-  ! where the kernel chose it
-  real(8), intent(out) :: found(2)   ! estimated error, relative, and growth; below 0 where unknown
+  integer(8), intent(out) :: steps   ! or right-hand sides, of Gauss collocation;
+  ! negative: the steps of quick, where the kernel chose between it and the series
+  real(8), intent(out) :: found(2)   ! estimated relative error, amplification; negative: unknown
 
   call solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)
 end subroutine solve_packed
 
 subroutine solve_packed_attitude(packed, n_packed, start, t_end, state, status, steps, found)
-  ! The same with attitude.
+  ! Solve with a prepared solver for omega and attitude.
   !f2py threadsafe
   use prepared, only: solve_prepared_attitude
   implicit none
@@ -345,8 +355,8 @@ subroutine solve_packed_attitude(packed, n_packed, start, t_end, state, status, 
   real(8), intent(in) :: t_end       ! s
   real(8), intent(out) :: state(7)   ! NaN unless the status is 0 or 6
   integer(4), intent(out) :: status
-  integer(8), intent(out) :: steps   ! 0 of a closed form
-  real(8), intent(out) :: found(2)   ! estimated error and growth; below 0 where unknown
+  integer(8), intent(out) :: steps   ! 0 with a closed form
+  real(8), intent(out) :: found(2)   ! as in solve_packed
 
   call solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
 end subroutine solve_packed_attitude

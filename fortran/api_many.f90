@@ -1,5 +1,5 @@
-! What f2py reads of many bodies, as api.f90. Another thread may end such a call: it sets given_up,
-! which kernels look at as they look at the user.
+! The interface that f2py reads for many bodies; see api.f90. Another thread may end such a call: it
+! sets given_up, which the kernels check whenever they poll for a user interrupt.
 
 subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forces, &
                         torque_constant, torque_rate, torque_first, torque_varies, n_sines, sines, &
@@ -7,7 +7,7 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
                         with_velocity, given_up, n_at, at, omega_rows, n_velocities, &
                         velocity_rows, n_times, times, n_iers, ier_rows, n_rows, status, &
                         stop_variable, stop_quotient)
-  ! One of the three programs on n bodies. What is not reached of the results stays as it was.
+  ! Run one of the three programs on n bodies. Results that are not reached keep their old values.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
   use deck_binary64, only: deck_t
@@ -16,7 +16,7 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
   use levels, only: run_lanes
   use listing_flags, only: listing_from_bits
   implicit none
-  integer(4), intent(in) :: program, flags, by_moments ! as in run_program, and so below
+  integer(4), intent(in) :: program, flags, by_moments ! these and those below as in run_program
   integer(4), intent(in) :: n
   real(8), intent(in), target :: body(3, n)
   real(8), intent(in), target :: omega(3, n)
@@ -33,14 +33,14 @@ subroutine run_programs(program, flags, by_moments, n, body, omega, masses, forc
   integer(4), intent(in) :: n_steps
   real(8), intent(in), target :: lipschitz(n)
   integer(4), intent(in) :: may_stop, with_velocity
-  integer(4), intent(inout), target :: given_up(1) ! not 0: by another thread, while this one runs
+  integer(4), intent(inout), target :: given_up(1) ! not 0: another thread ends this call
   integer(4), intent(in) :: n_at
-  integer(4), intent(in), target :: at(n_at)               ! steps whose rows are wanted, rising
+  integer(4), intent(in), target :: at(n_at)               ! requested steps, ascending
   real(8), intent(inout), target :: omega_rows(3, n_at, n)
   integer(4), intent(in) :: n_velocities                   ! n, or 0
   real(8), intent(inout), target :: velocity_rows(3, n_at, n_velocities)
-  integer(4), intent(in) :: n_times                        ! n, or 1 where all step alike
-  real(8), intent(inout), target :: times(n_at, n_times)   ! TIME
+  integer(4), intent(in) :: n_times                        ! n, or 1 if all step sizes are equal
+  real(8), intent(inout), target :: times(n_at, n_times)   ! TIME, s
   integer(4), intent(in) :: n_iers                         ! n, or 0
   integer(4), intent(inout), target :: ier_rows(n_at, n_iers)
   integer(4), intent(inout), target :: n_rows(n), status(n), stop_variable(n)
@@ -64,18 +64,18 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
                           constant, n_rate, rate, n_sines, n_sine_sets, sines, n_cosines, &
                           n_cosine_sets, cosines, n, omega0, n_times, times, n_attitudes, &
                           attitude0, given_up, omega, n_results, attitude, status, raised)
-  ! Many bodies in one call: omega, and the attitude where it is given, of each at its time. Arrays
-  ! of one column are shared by all.
+  ! Solve many bodies in one call: omega of each body at its time, and its attitude if attitude0 is
+  ! specified. An array with one column applies to all bodies.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
   use bodies, only: bodies_t
   use interruption, only: watch
   use many_bodies, only: solve_bodies
   implicit none
-  integer(4), intent(in) :: code                ! of the module methods
-  real(8), intent(in) :: tolerance              ! relative, of the series
+  integer(4), intent(in) :: code                ! code of the module methods
+  real(8), intent(in) :: tolerance              ! relative, of the methods that take one
   real(8), intent(in) :: step                   ! s, of the methods with a fixed step
-  real(8), intent(in) :: effort                 ! factor on the limits, for each body
+  real(8), intent(in) :: effort                 ! factor on the work limit of each body
   integer(4), intent(in) :: by_moments          ! 1: body is I1, I2, I3; 0: A, B, C
   integer(4), intent(in) :: n_body
   real(8), intent(in), target :: body(3, n_body)
@@ -84,16 +84,17 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   integer(4), intent(in) :: n_rate
   real(8), intent(in), target :: rate(3, n_rate)         ! N m/s, or 1/s3
   integer(4), intent(in) :: n_sines, n_sine_sets
-  real(8), intent(in), target :: sines(4, n_sines, n_sine_sets)       ! amplitude (3), rad/s
+  real(8), intent(in), target :: sines(4, n_sines, n_sine_sets)       ! amplitude (3) as constant,
+  ! frequency in rad/s
   integer(4), intent(in) :: n_cosines, n_cosine_sets
-  real(8), intent(in), target :: cosines(4, n_cosines, n_cosine_sets) ! the same
+  real(8), intent(in), target :: cosines(4, n_cosines, n_cosine_sets) ! as sines
   integer(4), intent(in) :: n
   real(8), intent(in), target :: omega0(3, n)   ! rad/s
   integer(4), intent(in) :: n_times
   real(8), intent(in), target :: times(n_times) ! s
   integer(4), intent(in) :: n_attitudes
   real(8), intent(in) :: attitude0(4, n_attitudes)
-  integer(4), intent(inout), target :: given_up(1) ! not 0: by another thread, while this one runs
+  integer(4), intent(inout), target :: given_up(1) ! not 0: another thread ends this call
   real(8), intent(inout) :: omega(3, n)         ! rad/s; NaN unless the status is 0 or 6
   integer(4), intent(in) :: n_results           ! n with attitude, else 0
   real(8), intent(inout) :: attitude(4, n_results)
@@ -120,7 +121,8 @@ end subroutine solve_ensemble
 
 subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_up, omega, &
                              status, raised)
-  ! Many starts of a prepared solver: as solve_packed, and called as that is.
+  ! Solve many initial omegas with a prepared solver. As for solve_packed, C code calls this
+  ! procedure by its address.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr
   use interruption, only: watch
@@ -131,8 +133,8 @@ subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_
   integer(4), intent(in) :: n
   real(8), intent(in) :: omega0(3, n)  ! rad/s
   integer(4), intent(in) :: n_times
-  real(8), intent(in) :: times(n_times) ! 1 or n, s
-  integer(4), intent(inout), target :: given_up(1) ! as above
+  real(8), intent(in) :: times(n_times) ! s; n_times is 1 or n
+  integer(4), intent(inout), target :: given_up(1) ! as in solve_ensemble
   real(8), intent(inout) :: omega(3, n)
   integer(1), intent(inout) :: status(n)
   integer(4), intent(out) :: raised

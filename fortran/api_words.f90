@@ -1,18 +1,19 @@
-! What f2py reads of words, as api.f90: numbers that it does not know cross as their bytes.
+! The interface that f2py reads for the other floating-point formats (words); see api.f90. f2py does
+! not know these formats, so their numbers cross the interface as bytes.
 
 subroutine run_program_in_word(program, flags, by_moments, n_bytes, triples, limits, &
                                torque_varies, n_sines, sines, n_cosines, cosines, n_steps, &
                                may_stop, with_velocity, rows, ier_rows, n_rows, status, &
                                evaluations, stop_variable, stop_quotient)
-  ! One of the three programs in the word whose numbers have so many bytes.
+  ! Run one of the three programs in the format whose numbers have n_bytes bytes.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc
   use listing_flags, only: listing_from_bits
   use words, only: packed_t, run_in_word
   implicit none
-  integer(4), intent(in) :: program, flags, by_moments ! as in run_program of api.f90, and so below
-  integer(4), intent(in) :: n_bytes  ! 4, 8 or, where the compiler has it, 16
-  integer(1), intent(in), target :: triples(n_bytes, 3, 7) ! body to torque_first
+  integer(4), intent(in) :: program, flags, by_moments ! these and those below as in run_program
+  integer(4), intent(in) :: n_bytes  ! 4, 8 or, if the compiler has binary128, 16
+  integer(1), intent(in), target :: triples(n_bytes, 3, 7) ! columns: members body to torque_first
   integer(1), intent(in), target :: limits(n_bytes, 2)     ! step_size, lipschitz
   integer(4), intent(in) :: torque_varies
   integer(4), intent(in) :: n_sines
@@ -24,7 +25,7 @@ subroutine run_program_in_word(program, flags, by_moments, n_bytes, triples, lim
   integer(1), intent(out), target :: rows(n_bytes, 8, n_steps)
   integer(4), intent(out) :: ier_rows(n_steps)
   integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status                        ! or 3: no such word
+  integer(4), intent(out) :: status                        ! or 3: no format of n_bytes bytes
   integer(4), intent(out) :: evaluations, stop_variable
   integer(1), intent(out), target :: stop_quotient(n_bytes)
 
@@ -37,7 +38,7 @@ subroutine run_program_in_word(program, flags, by_moments, n_bytes, triples, lim
 end subroutine run_program_in_word
 
 subroutine functions_of_word(n_bytes, n, given, values, status)
-  ! Square root, sine and cosine by themselves, so that they can be tested alone.
+  ! Compute square root, sine and cosine alone, so that tests can check them separately.
   !f2py threadsafe
   use, intrinsic :: iso_c_binding, only: c_loc
   use words, only: functions_in_word
@@ -45,7 +46,7 @@ subroutine functions_of_word(n_bytes, n, given, values, status)
   integer(4), intent(in) :: n_bytes, n
   integer(1), intent(in), target :: given(n_bytes, n)
   integer(1), intent(out), target :: values(n_bytes, 3, n)
-  integer(4), intent(out) :: status  ! 0, or 3: no such word
+  integer(4), intent(out) :: status  ! 0, or 3: no format of n_bytes bytes
 
   call functions_in_word(n_bytes, n, c_loc(given), c_loc(values), status)
 end subroutine functions_of_word

@@ -1,6 +1,6 @@
-/* Whether the user has interrupted (Ctrl-C): asked by the kernels from time to time, by the work
-   done. Handlers of signals run here; what they raise stays set, and f2py's wrapper, as any door
-   must, looks for it when the kernel has returned. */
+/* The poll for user interrupts (Ctrl-C). Kernels call it after a fixed amount of work. It runs
+   Python's pending signal handlers. An exception that a handler raises stays set. f2py's wrapper,
+   like every other entry point, must check for it when the kernel has returned. */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
@@ -11,7 +11,7 @@
 #include <pthread.h>
 #endif
 
-/* Python gives signals to its main thread alone: others need not wait for its lock. */
+/* Python runs signal handlers in its main thread only; other threads need not wait for the GIL. */
 static int may_be_main_thread(void)
 {
 #if defined(__linux__)
@@ -23,11 +23,12 @@ static int may_be_main_thread(void)
 #endif
 }
 
-/* What a thread that is not Python's main one looks at instead: the one that waits for it sets it. */
+/* A number that this thread also checks, or NULL. It is for threads other than Python's main
+   thread; the thread that waits for this one sets it. */
 static _Thread_local const volatile int *given_up;
 
-/* Let this thread look at a number, which is not 0 when its work is not wanted any more; or, given
-   nothing, at none. */
+/* Make this thread check a number, which is not 0 when the result is no longer wanted; NULL ends
+   the checks. */
 void watch(const int *number) { given_up = number; }
 
 int interrupt_raised(void)

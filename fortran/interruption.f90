@@ -1,6 +1,6 @@
 module interruption
-  !! Ctrl-C: a kernel that may run long asks now and then, by the work that it has done, and
-  !! returns INTERRUPTED where the answer is yes.
+  !! User interrupts (Ctrl-C). A kernel that may run long polls interrupt_raised after a fixed
+  !! amount of work. If the result is not 0, the kernel returns with the status INTERRUPTED.
   use, intrinsic :: iso_c_binding, only: c_int, c_ptr
   implicit none(type, external)
   private
@@ -9,13 +9,14 @@ module interruption
 
   interface
     integer(c_int) function interrupt_raised() bind(c, name="interrupt_raised")
-      !! Not 0 where a signal's handler has raised an exception; see interruption.c.
+      !! Return a value other than 0 if a signal handler has raised an exception, or if the number
+      !! that this thread watches is not 0; see interruption.c.
       import :: c_int
       implicit none(type, external)
     end function interrupt_raised
 
     subroutine watch(number) bind(c, name="watch")
-      !! Let interrupt_raised look at a number too, which another thread sets; or at none.
+      !! Make interrupt_raised also check a number that another thread sets; c_null_ptr: check none.
       import :: c_ptr
       implicit none(type, external)
       type(c_ptr), intent(in), value :: number

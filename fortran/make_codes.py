@@ -1,4 +1,4 @@
-"""Write the numbers that Python and the kernels share as Fortran modules, one for each class."""
+"""Write the constants that Python and the kernels share as Fortran modules, one for each class."""
 
 import runpy
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def modules(source: str) -> str:
-    """Return the text of the modules for the classes of pyharness/model/codes.py."""
+    """Return the text of the Fortran modules for the classes in pyharness/model/codes.py."""
     classes = [each for each in runpy.run_path(source).values() if isinstance(each, type)]
     return "".join(f"{line}\n" for each in classes for line in _module(each))
 

@@ -1,8 +1,8 @@
 """Write the coefficients of Gauss collocation, 1 to 8 stages, as a Fortran module.
 
-Nodes are roots of Legendre polynomials, weights and matrices integrals of Lagrange's
-polynomials, all in 60 digits; weights and matrices have two words each, so that their rounding
-does not add up.
+The nodes are roots of Legendre polynomials; the weights and matrices are integrals of Lagrange's
+polynomials. All are computed with 60 digits. Weights and matrices are written in double-double, so
+that their rounding errors do not accumulate.
 """
 
 import itertools
@@ -26,8 +26,8 @@ HEADER = """module gauss_tables
 
 
 def nodes(stages: int) -> list[Decimal]:
-    """Return the roots of the Legendre polynomial on [0, 1], in order."""
-    # Coefficients of P(x) and its derivative; the roots are separated by those of degree - 1.
+    """Return the roots of the Legendre polynomial of degree `stages` on [0, 1], ascending."""
+    # Coefficients of P(n-1) and P(n). The roots of P(n) are separated by those of P(n-1).
     before, now = [Decimal(1)], [Decimal(-1), Decimal(2)]
     borders = [Decimal(0), Decimal(1)]
     roots: list[Decimal] = []
@@ -35,7 +35,7 @@ def nodes(stages: int) -> list[Decimal]:
         value = _polynomial(now)
         roots = [_bisect(value, *pair) for pair in itertools.pairwise(borders)]
         borders = [Decimal(0), *roots, Decimal(1)]
-        # (n + 1) P(n+1) = (2 n + 1) (2 x - 1) P(n) - n P(n-1)
+        # Legendre polynomials: (n + 1) P(n+1) = (2 n + 1) (2 x - 1) P(n) - n P(n-1)
         after = [Decimal(0)] * (degree + 2)
         for power, coefficient in enumerate(now):
             after[power] -= (2 * degree + 1) * coefficient / (degree + 1)
@@ -95,7 +95,7 @@ def _table(name: str, shape: str, values: Sequence[Decimal]) -> str:
 
 
 def module() -> str:
-    """Return the text of the module."""
+    """Return the text of the Fortran module."""
     zero = Decimal(0)
     all_nodes: list[Decimal] = []
     high: list[Decimal] = []
@@ -110,7 +110,7 @@ def module() -> str:
             all_nodes += c + rest
             high += b + rest
             low += [x - Decimal(float(x)) for x in b] + rest
-            # Column j: what the rate at node j adds to each stage, of this step and of the next.
+            # Column j: the part of the rate at node j in each stage, of this step and of the next.
             rows = [integrals(c, zero, x) for x in c]
             next_rows = [integrals(c, Decimal(1), 1 + x) for x in c]
             for table, source in ((matrix, rows), (onward, next_rows)):

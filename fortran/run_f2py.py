@@ -1,11 +1,11 @@
-"""Run f2py, and fail where it guesses a kind: what it does not know becomes C float."""
+"""Run f2py, and fail if it guesses a kind: it maps every kind that it does not know to C float."""
 
 import subprocess
 import sys
 
 
 def main(module: str, folder: str, *sources: str) -> int:
-    """Write the wrapper of `sources` for extension `module` into `folder`."""
+    """Write the wrapper of `sources` for extension `module` to `folder`; return an exit status."""
     command = [sys.executable, "-m", "numpy.f2py", *sources, "-m", module, "--lower"]
     command += ["--build-dir", folder]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -1,8 +1,9 @@
-// The programs as a port: a scene with its listing a line in, a run a line out (docs/ports.md).
+// The programs as a port: each input line is a scene with its listing, each output line a run
+// (docs/ports.md).
 import { createInterface } from "node:readline";
 import { PROGRAMS } from "./programs/programs.js";
 
-// JSON has no -0, no infinity and no NaN: those go as text.
+// JSON has no -0, no infinity and no NaN, so they are written as text.
 function exact(key, value) {
   if (typeof value !== "number") return value;
   if (Object.is(value, -0)) return "-0.0";

@@ -1,6 +1,7 @@
 module lanes
-  !! Bodies side by side, each in a lane of its own: what the three programs have in common.
-  !! Every lane has the operations of deck.fypp in their order, and so the same bits.
+  !! Bodies side by side, each in a lane of its own: code that the three programs have in common.
+  !! Every lane does the operations of deck.fypp in their order, so its results are bit-for-bit
+  !! identical to those of a single run.
   use, intrinsic :: iso_fortran_env, only: int64
   use blocks, only: LANE_COUNT
   use kinds, only: dp
@@ -9,30 +10,30 @@ module lanes
   implicit none(type, external)
   private
 
-  integer, parameter, public :: POINTS = 5 !! at which a step reads the torque, at the most
+  integer, parameter, public :: POINTS = 5 !! largest number of points in a step
 
-  ! What a step says of a lane: bits.
+  ! Verdict of a step on a lane: a bit mask.
   integer(int64), parameter, public :: GOES_ON = 0_int64
   integer(int64), parameter, public :: OVERFLOWS = 1_int64
-  integer(int64), parameter, public :: EXCEEDS = 2_int64  !! the Lipschitz constant
+  integer(int64), parameter, public :: EXCEEDS = 2_int64  !! beyond its Lipschitz constant
   integer(int64), parameter, public :: EVERY_BIT = -1_int64
 
   type, public :: block_t
-    ! What is read lane by lane comes first: whole lines of the cache.
+    ! Members that are read lane by lane come first and fill whole cache lines.
     real(dp), dimension(LANE_COUNT, 3) :: U        !! when a step begins, then its result, rad/s
-    real(dp), dimension(LANE_COUNT, 3) :: V        !! the same, m/s
-    real(dp), dimension(LANE_COUNT) :: A, B, C     !! of equations 13-15
+    real(dp), dimension(LANE_COUNT, 3) :: V        !! likewise, m/s
+    real(dp), dimension(LANE_COUNT) :: A, B, C     !! coefficients of equations 13-15
     real(dp), dimension(LANE_COUNT) :: step, DT, TIME
     real(dp), dimension(LANE_COUNT) :: lipschitz
     real(dp), dimension(LANE_COUNT, 3) :: body, torque_constant, torque_first
     real(dp) :: M(LANE_COUNT, 3, POINTS)  !! torque over moment, 1/s2
-    integer(int64) :: alive(LANE_COUNT)   !! EVERY_BIT until the run ends, then none
+    integer(int64) :: alive(LANE_COUNT)   !! EVERY_BIT until the run ends, then 0
     integer :: ier(LANE_COUNT)
     real(dp) :: ACL1, ACL2, ACL3          !! force over mass, m/s2
-    integer :: first                      !! body of the first lane
-    integer :: used                       !! lanes with a body; the others repeat the first
-    logical :: one_step_size              !! of all lanes
-    integer :: rest(7)                    !! to the end of a line
+    integer :: first                      !! body in the first lane
+    integer :: used                       !! lanes with a body; the others repeat the first body
+    logical :: one_step_size              !! whether all lanes have one step size
+    integer :: rest(7)                    !! padding to the end of a cache line
   end type block_t
 
   public :: begin_block, look, torque_within
@@ -40,7 +41,7 @@ module lanes
 contains
 
   subroutine begin_block(e, first, b)
-    !! The cards before the loop over steps.
+    !! Execute the cards before the loop over steps.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: first
     type(block_t), intent(out) :: b
@@ -76,11 +77,12 @@ contains
   end subroutine begin_block
 
   subroutine torque_within(e, step, b, after, points)
-    !! Where the torque varies: as assumed where no card exists.
+    !! Compute a varying torque for one step. There is no card for this; the listing's conjectures
+    !! say at which times.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: step
     type(block_t), intent(inout) :: b
-    real(dp), intent(in) :: after(:, :)  !! its beginning, of each lane and point, s
+    real(dp), intent(in) :: after(:, :)  !! time since the step's beginning, by lane and point, s
     integer, intent(in) :: points(:)
     real(dp) :: time(LANE_COUNT)
     integer :: k
@@ -100,7 +102,7 @@ contains
   end subroutine torque_within
 
   subroutine spread_torque(b)
-    !! That of the first point at all points.
+    !! Copy the torque of the first point to all points.
     type(block_t), intent(inout) :: b
     integer :: point
 
@@ -110,7 +112,7 @@ contains
   end subroutine spread_torque
 
   subroutine set_torque(scene, b, time, point)
-    !! N(time) over the moments at one point: normalized_torque of deck.fypp.
+    !! Compute N(time) over the moments at one point, as normalized_torque of deck.fypp does.
     type(deck_t), intent(in) :: scene
     type(block_t), intent(inout) :: b
     real(dp), intent(in) :: time(LANE_COUNT)
@@ -118,7 +120,7 @@ contains
     real(dp) :: wave(LANE_COUNT)
     integer :: axis
     integer :: i
-    integer :: last  ! lane that has a time of its own
+    integer :: last  ! last lane with a time of its own
     integer :: term
 
     associate (N => b%M(:, :, point))
@@ -170,10 +172,10 @@ contains
   end subroutine add
 
   pure subroutine look(b, verdict, found)
-    !! Whether any lane overflows: is_finite of deck.fypp.
+    !! Find the lanes that overflow, by the criterion of is_finite of deck.fypp.
     type(block_t), intent(in) :: b
-    integer(int64), intent(out) :: verdict(LANE_COUNT) !! of lanes that are alive
-    integer(int64), intent(out) :: found               !! of any of them
+    integer(int64), intent(out) :: verdict(LANE_COUNT) !! for lanes that are alive
+    integer(int64), intent(out) :: found               !! union of all verdicts
     integer(int64) :: here
     integer :: i
 

@@ -1,6 +1,6 @@
 module lanes_four_term
-  !! A step of four_term.fypp in every lane; the margin names its cards.
-  !! The matrix knows DT alone: it is factored where DT is another, and not for every body.
+  !! A step of four_term.fypp in every lane; the margin names its cards. The matrix depends on DT
+  !! alone: it is factored only when DT changes, and only once if all lanes have one step size.
   use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
@@ -10,14 +10,14 @@ module lanes_four_term
   private
 
   type, public :: grid_t
-    real(dp), dimension(LANE_COUNT, 5) :: T, TL2, TL3, TL4 !! T1 to T5 and their powers
-    real(dp) :: A(LANE_COUNT, 4, 4)       !! its factors
-    real(dp) :: U(LANE_COUNT, 3, 0:4)     !! omega at the beginning and at T1 to T4
+    real(dp), dimension(LANE_COUNT, 5) :: T, TL2, TL3, TL4 !! T1 to T5 and their powers 2 to 4, s
+    real(dp) :: A(LANE_COUNT, 4, 4)       !! factors of the matrix
+    real(dp) :: U(LANE_COUNT, 3, 0:4)     !! omega at the beginning and at T1 to T4, rad/s
     real(dp) :: sides(LANE_COUNT, 4, 3)   !! right-hand sides at T1 to T4
     real(dp) :: terms(LANE_COUNT, 4, 3)   !! coefficients of the trial functions
-    integer :: row(LANE_COUNT, 4)         !! of B, that stands at each row of the factors
+    integer :: row(LANE_COUNT, 4)         !! row of B for each row of the factors
     logical :: singular(LANE_COUNT)
-    logical :: one_order                  !! of rows, in all lanes
+    logical :: one_order                  !! whether all lanes have the same order of rows
     logical :: any_singular
   end type grid_t
 
@@ -26,7 +26,7 @@ module lanes_four_term
 contains
 
   subroutine set_grid(b, s)
-    !! What follows from DT.
+    !! Compute everything that depends on DT alone.
     type(block_t), intent(inout) :: b
     type(grid_t), intent(inout) :: s
     real(dp), parameter :: shares(4) = [0.2_dp, 0.4_dp, 0.6_dp, 0.8_dp]
@@ -94,7 +94,7 @@ contains
   end subroutine set_factors
 
   subroutine torque_four_term(e, I, b, s)
-    !! At the beginning and at T1 to T4.
+    !! Compute the torque at the beginning and at T1 to T4.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: I
     type(block_t), intent(inout) :: b
@@ -116,7 +116,7 @@ contains
   end subroutine step_four_term
 
   pure subroutine turn(b, s)
-    !! The angular velocity, which does not see the velocity.
+    !! Advance the angular velocity, which does not depend on the velocity.
     type(block_t), intent(inout) :: b
     type(grid_t), intent(inout) :: s
     real(dp) :: u1, u2, u3
@@ -124,7 +124,7 @@ contains
     integer :: i
     integer :: k
 
-    ! first estimate: constant right-hand sides
+    ! first estimate: the right-hand sides are constant
     do i = 1, LANE_COUNT
       u1 = b%U(i, 1)
       u2 = b%U(i, 2)
@@ -156,7 +156,7 @@ contains
   end subroutine turn
 
   pure subroutine move(b, s)
-    !! The velocity, along the angular velocities at the beginning and at the points.
+    !! Advance the velocity, with the angular velocities at the beginning and at the points.
     type(block_t), intent(inout) :: b
     type(grid_t), intent(inout) :: s
     real(dp) :: v(LANE_COUNT, 3)
@@ -174,7 +174,7 @@ contains
   end subroutine move
 
   pure subroutine push(b, s, k, v)
-    !! Right-hand sides at point k, or at the beginning.
+    !! Compute the right-hand sides at point k, or at the beginning if k = 0.
     type(block_t), intent(in) :: b
     type(grid_t), intent(inout) :: s
     integer, intent(in) :: k
@@ -191,7 +191,7 @@ contains
   end subroutine push
 
   pure subroutine evaluate(s, k, base, x)
-    !! The trial functions at time k, from the values at the beginning.
+    !! Evaluate the trial functions at time k, from the values at the beginning.
     type(grid_t), intent(in) :: s
     integer, intent(in) :: k
     real(dp), intent(in) :: base(LANE_COUNT, 3)
@@ -209,7 +209,7 @@ contains
   end subroutine evaluate
 
   pure subroutine solve_alike(s)
-    !! The same right-hand side, the first, in all four equations.
+    !! Solve with the first right-hand side in all four equations.
     type(grid_t), intent(inout) :: s
     integer :: variable
 
@@ -222,7 +222,8 @@ contains
   end subroutine solve_alike
 
   pure subroutine solve(s)
-    !! LEQT1F's substitution. A(1, 1) is 1, as all of its column is: no division by it.
+    !! Substitute as LEQT1F does. A(1, 1) and all of its column are 1, so no division by it is
+    !! needed.
     type(grid_t), intent(inout) :: s
     integer :: row(4)
     integer :: i

@@ -1,6 +1,6 @@
 module lanes_runge_kutta
-  !! A step of runge_kutta.fypp in every lane; the margin names its cards.
-  !! What a listing changes is which array a stage reads: no question is asked lane by lane.
+  !! A step of runge_kutta.fypp in every lane; the margin names its cards. A listing only changes
+  !! which array a stage reads, so that no decision is made lane by lane.
   use, intrinsic :: iso_fortran_env, only: int64
   use blocks, only: LANE_COUNT
   use kinds, only: dp
@@ -10,9 +10,9 @@ module lanes_runge_kutta
   private
 
   type, public :: stages_t
-    real(dp), dimension(LANE_COUNT, 3) :: U, V         !! U(1): base and first stage at once
+    real(dp), dimension(LANE_COUNT, 3) :: U, V         !! U(1), V(1): base and first stage
     real(dp), dimension(LANE_COUNT, 6) :: change_k, change_u
-    ! Of one step: after the stages.
+    ! Values of one step: U and V after the stages, slopes.
     real(dp), dimension(LANE_COUNT, 3) :: first, second, third, first_v, second_v, third_v
     real(dp), dimension(LANE_COUNT, 3, 4) :: K, K_v
     real(dp) :: half(LANE_COUNT)
@@ -33,7 +33,7 @@ contains
   end subroutine begin_stages
 
   subroutine torque_runge_kutta(e, L, b)
-    !! Of the four stages: points 1, 2 and 4.
+    !! Compute the torque of the four stages, at points 1, 2 and 4.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: L
     type(block_t), intent(inout) :: b
@@ -63,7 +63,7 @@ contains
     if (e%listing%do_variable) call drop_third_stage(s%K(:, :, 3), s%third)
     call turn_last(b, s%third, s%K(:, :, 4))                                      ! 1120-1140
     if (e%scene%with_velocity) then
-      ! along the angular velocities of the stages
+      ! velocity, with the angular velocities of the stages
       if (e%listing%stage_base) then
         call move(b, s%U, s%V, s%V, s%half, s%K_v(:, :, 1), s%first_v)            ! 830-910
         call move(b, s%first, s%first_v, s%first_v, s%half, s%K_v(:, :, 2), s%second_v) ! 830-910
@@ -83,7 +83,7 @@ contains
   end subroutine step_runge_kutta
 
   pure subroutine drop_third_stage(K, third)
-    !! FORTRAN 77: this stage goes to the place of the fourth, and the third stays zero.
+    !! Clear the third stage: in FORTRAN 77 its results are stored in the place of the fourth.
     real(dp), dimension(LANE_COUNT, 3), intent(out) :: K, third
 
     third = 0.0_dp
@@ -91,7 +91,7 @@ contains
   end subroutine drop_third_stage
 
   pure subroutine turn(b, point, u, base, step, K, after)
-    !! KF, KG, KH at u, and a step from the base.
+    !! Compute the slopes KF, KG, KH at u, and a step from the base with them.
     type(block_t), intent(in) :: b
     integer, intent(in) :: point
     real(dp), dimension(LANE_COUNT, 3), intent(in) :: u, base
@@ -117,7 +117,7 @@ contains
   end subroutine turn
 
   pure subroutine move(b, u, v, base, step, K, after)
-    !! KX, KY, KZ at u and v, and a step from the base.
+    !! Compute the slopes KX, KY, KZ at u and v, and a step from the base with them.
     type(block_t), intent(in) :: b
     real(dp), dimension(LANE_COUNT, 3), intent(in) :: u, v, base
     real(dp), intent(in) :: step(LANE_COUNT)
@@ -142,7 +142,7 @@ contains
   end subroutine move
 
   pure subroutine turn_last(b, u, K)
-    !! KF, KG, KH at the fourth stage, from which no step goes on.
+    !! Compute KF, KG, KH at the fourth stage, from which no further step starts.
     type(block_t), intent(in) :: b
     real(dp), intent(in) :: u(LANE_COUNT, 3)
     real(dp), intent(out) :: K(LANE_COUNT, 3)
@@ -156,12 +156,13 @@ contains
   end subroutine turn_last
 
   pure subroutine close_step(e, DT, K, first, third, U, next, change_u, change_k)
-    !! The result; what the next step begins with; what the Lipschitz test compares.
+    !! Compute the result (eq. 31), the start of the next step, and the changes that the Lipschitz
+    !! test (eq. 19) compares.
     type(ensemble_t), intent(in) :: e
     real(dp), intent(in) :: DT(LANE_COUNT), K(LANE_COUNT, 3, 4)
     real(dp), dimension(LANE_COUNT, 3), intent(in) :: first, third
-    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: U     !! UU, then U(4)
-    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: next  !! U(1) as it was, then of the next
+    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: U     !! UU of the cards, then U(4)
+    real(dp), dimension(LANE_COUNT, 3), intent(inout) :: next  !! U(1) of this step, then the next
     real(dp), dimension(LANE_COUNT, 3), intent(out) :: change_u, change_k
     real(dp) :: new
     integer :: axis
@@ -199,7 +200,7 @@ contains
   end subroutine close_step
 
   pure subroutine test(e, b, s, verdict, found)
-    !! Whether any lane exceeds: lipschitz_test says in what.
+    !! Find the lanes that exceed the Lipschitz constant; lipschitz_test finds the variable.
     type(ensemble_t), intent(in) :: e
     type(block_t), intent(in) :: b
     type(stages_t), intent(in) :: s

@@ -1,6 +1,6 @@
 module lanes_two_term
-  !! A step of two_term.fypp in every lane; the margin names its cards.
-  !! The matrix knows DT alone: it is factored where DT is another, and not for every body.
+  !! A step of two_term.fypp in every lane; the margin names its cards. The matrix depends on DT
+  !! alone: it is factored only when DT changes, and only once if all lanes have one step size.
   use blocks, only: LANE_COUNT
   use kinds, only: dp
   use ensemble, only: ensemble_t
@@ -11,12 +11,12 @@ module lanes_two_term
 
   type, public :: points_t
     real(dp), dimension(LANE_COUNT) :: T1, T2, T3, T12, T22, T32
-    ! A's factors: under the diagonal, above it and on it. A(1, 1) is 1 and stays the first pivot:
-    ! T1 is no later than T2, so its row has no smaller a scale.
+    ! Factors of A below, above and on the diagonal. A(1, 1) is 1 and always the first pivot: T1 is
+    ! no later than T2, so the scale of row 1 is no smaller.
     real(dp), dimension(LANE_COUNT) :: low, high, diagonal
-    real(dp) :: singular(LANE_COUNT)              !! 1: B stays as it was
-    real(dp), dimension(LANE_COUNT, 3) :: before  !! U(1), at the interval's beginning
-    real(dp), dimension(LANE_COUNT, 3) :: Ua, Ub  !! U(2) and U(3), at the two points
+    real(dp) :: singular(LANE_COUNT)              !! 1: the matrix is singular, B is unchanged
+    real(dp), dimension(LANE_COUNT, 3) :: before  !! U(1), at the interval's beginning, rad/s
+    real(dp), dimension(LANE_COUNT, 3) :: Ua, Ub  !! U(2) and U(3), at T1 and T2, rad/s
   end type points_t
 
   public :: set_points, step_two_term, torque_two_term
@@ -24,7 +24,7 @@ module lanes_two_term
 contains
 
   subroutine set_points(b, s)
-    !! What follows from DT.
+    !! Compute everything that depends on DT alone.
     type(block_t), intent(inout) :: b
     type(points_t), intent(inout) :: s
     real(dp) :: A(2, 2)
@@ -61,7 +61,7 @@ contains
   end subroutine set_points
 
   subroutine torque_two_term(e, I, b, s)
-    !! At the beginning and at the two points.
+    !! Compute the torque at the beginning and at T1 and T2.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: I
     type(block_t), intent(inout) :: b
@@ -89,7 +89,8 @@ contains
   end subroutine step_two_term
 
   pure subroutine solve(p, q, low, high, diagonal, singular, x, y)
-    !! LEQT1F's substitution in the two equations of one variable. A(1, 1) is 1: no division by it.
+    !! Substitute as LEQT1F does in the two equations of one variable. A(1, 1) is 1, so no division
+    !! by it is needed.
     real(dp), intent(in) :: p, q
     real(dp), intent(in) :: low, high, diagonal, singular
     real(dp), intent(out) :: x, y
@@ -101,9 +102,9 @@ contains
   end subroutine solve
 
   pure subroutine turn(b, C1, s)
-    !! The angular velocity, which does not see the velocity.
+    !! Advance the angular velocity, which does not depend on the velocity.
     type(block_t), intent(inout) :: b
-    real(dp), intent(in) :: C1(LANE_COUNT)  !! of the first estimate: b%C, or the zero of no card
+    real(dp), intent(in) :: C1(LANE_COUNT)  !! C in the first estimate: b%C, or 0 as no card sets C1
     type(points_t), intent(inout) :: s
     real(dp) :: u1, u2, u3, a1, a2, a3, b1, b2, b3, F, G, H, F3, G3, H3
     real(dp) :: x1, x2, x3, y1, y2, y3
@@ -113,7 +114,7 @@ contains
       u1 = b%U(i, 1)
       u2 = b%U(i, 2)
       u3 = b%U(i, 3)
-      ! first estimate: constant right-hand sides
+      ! first estimate: the right-hand sides are constant
       F = b%M(i, 1, 1) + b%A(i)*u2*u3                                             ! 750
       G = b%M(i, 2, 1) + b%B(i)*u1*u3                                             ! 760
       H = b%M(i, 3, 1) + C1(i)*u1*u2                                                  ! 770
@@ -132,7 +133,7 @@ contains
       s%Ub(i, 1) = b1
       s%Ub(i, 2) = b2
       s%Ub(i, 3) = b3
-      ! correction: right-hand sides at the collocation points
+      ! correction: the right-hand sides are those at the collocation points
       F = b%M(i, 1, 2) + b%A(i)*a2*a3                                             ! 1190
       F3 = b%M(i, 1, 3) + b%A(i)*b2*b3                                            ! 1200
       G = b%M(i, 2, 2) + b%B(i)*a1*a3                                             ! 1210
@@ -152,7 +153,7 @@ contains
   end subroutine turn
 
   pure subroutine move(x3_reads_acl2, b, s)
-    !! The velocity, along the angular velocities at the beginning and at the points.
+    !! Advance the velocity, with the angular velocities at the beginning and at the points.
     logical, intent(in) :: x3_reads_acl2
     type(block_t), intent(inout) :: b
     type(points_t), intent(in) :: s

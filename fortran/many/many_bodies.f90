@@ -1,6 +1,7 @@
 module many_bodies
-  !! Many bodies in one call: side by side where those kernels are accurate enough, the others one
-  !! by one. Which kernel solves a body depends on that body alone.
+  !! Many bodies in one call. Multi-lane kernels solve them side by side where they are accurate
+  !! enough; the single-body kernel solves the others one by one. Which kernel solves a body depends
+  !! on that body alone.
   use, intrinsic :: iso_c_binding, only: c_loc
   use bodies, only: bodies_t, FREE, i1, NEEDS_FALLBACK, RAMPED, STEPPED, WAVED
   use kinds, only: dp
@@ -19,7 +20,7 @@ contains
 
   subroutine solve_packed_bodies(packed, n_packed, n, omega0, n_times, times, omega, status, &
                                  raised)
-    !! Many starts of one prepared scene.
+    !! Solve many initial omegas of one prepared scene.
     integer, intent(in) :: n_packed, n, n_times
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in), target :: omega0(3, n)
@@ -33,7 +34,8 @@ contains
     integer :: code, middle
 
     code = int(packed(METHOD))
-    ! Lanes have the series alone, and what they leave has its guards too.
+    ! The multi-lane kernels have the series but not quick. The bodies that they leave are solved by
+    ! the series as well, whose checks are the same.
     if (code == QUICK_OR_TAYLOR) code = TAYLOR
     own = packed
     own(METHOD) = real(code, dp)
@@ -54,16 +56,16 @@ contains
   end subroutine solve_packed_bodies
 
   subroutine solve_bodies(bodies, code, effort_, packed, attitude0, omega, attitude, status, raised)
-    !! Angular velocity of each body at its time, and its attitude where that is given.
+    !! Compute omega of each body at its time, and its attitude if attitude0 is specified.
     type(bodies_t), intent(in), target :: bodies
-    integer, intent(in) :: code                !! of the module methods
-    real(dp), intent(in) :: effort_            !! factor on the limits, for each body
-    real(dp), intent(in) :: packed(0:)         !! the scene of all, as in prepared.f90; or none
+    integer, intent(in) :: code                !! code of the module methods
+    real(dp), intent(in) :: effort_            !! factor on the work limit of each body
+    real(dp), intent(in) :: packed(0:)         !! scene of all bodies, as in prepared.f90; or none
     real(dp), intent(in) :: attitude0(:, :)    !! (4, 0, 1 or n)
     real(dp), intent(inout) :: omega(3, bodies%n) !! rad/s; NaN unless the status is 0 or 6
-    real(dp), intent(inout) :: attitude(:, :)  !! (4, n), or nothing
+    real(dp), intent(inout) :: attitude(:, :)  !! (4, n), or size 0
     integer(i1), intent(inout) :: status(bodies%n) !! of the module statuses
-    integer, intent(out) :: raised             !! 1: interrupted by the user, all is void
+    integer, intent(out) :: raised             !! 1: interrupted by the user, no result is valid
     integer :: n_waves
 
     raised = 0
@@ -89,7 +91,8 @@ contains
   end subroutine solve_bodies
 
   subroutine solve_marked(bodies, mark, n_waves, code, omega, status, raised)
-    !! The bodies of one mark, side by side; some are then left to the single kernel.
+    !! Solve the bodies with one mark side by side. Some of them may be left to the single-body
+    !! kernel.
     type(bodies_t), intent(in) :: bodies
     integer(i1), intent(in) :: mark
     integer, intent(in) :: n_waves, code

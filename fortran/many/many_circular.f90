@@ -6,12 +6,13 @@ module many_circular
   implicit none(type, external)
   private
 
-  real(dp), parameter :: ROUNDS = 1.5_dp*2.0_dp**52     ! added and taken off: a whole number
-  real(dp), parameter :: QUARTERS = 0.63661977236758134308_dp ! 2 over pi
-  ! Half of pi in two words, the first of 33 bits: times less than 2**20 it is exact.
+  real(dp), parameter :: ROUNDS = 1.5_dp*2.0_dp**52     ! added and subtracted: rounds to an integer
+  real(dp), parameter :: QUARTERS = 0.63661977236758134308_dp ! 2/pi
+  ! pi/2 in double-double. The first number has 33 bits: its product with a number below 2**20 is
+  ! exact.
   real(dp), parameter :: HALF_PI = 1.5707963267341256142_dp
   real(dp), parameter :: HALF_PI_LOW = 6.0771005065061922e-11_dp
-  ! Least maximum of the error on an eighth of a turn (fdlibm's, S. Sun Microsystems 1993).
+  ! Minimax polynomials on angles up to pi/4 (fdlibm, Sun Microsystems 1993).
   real(dp), parameter :: S(6) = [-1.66666666666666324348e-01_dp, 8.33333333332248946124e-03_dp, &
                                  -1.98412698298579493134e-04_dp, 2.75573137070700676789e-06_dp, &
                                  -2.50507602534068634195e-08_dp, 1.58969099521155010221e-10_dp]
@@ -24,7 +25,8 @@ module many_circular
 contains
 
   pure subroutine sine_cosine_lanes(m, angle, sine, cosine)
-    !! To 2e-16, of angles up to 1e6 radians; of larger ones some number.
+    !! Compute sine and cosine to 2e-16 for angles up to 1e6 rad; for larger ones they are
+    !! meaningless.
     integer, intent(in) :: m
     real(dp), intent(in) :: angle(LANES)
     real(dp), intent(inout) :: sine(LANES), cosine(LANES)
@@ -38,6 +40,7 @@ contains
       turns = turns - ROUNDS
       x = (angle(i) - turns*HALF_PI) - turns*HALF_PI_LOW
       x2 = x*x
+      ! The polynomials of fdlibm.
       s_ = x + x*x2*(S(1) + x2*(S(2) + x2*(S(3) + x2*(S(4) + x2*(S(5) + x2*S(6))))))
       c_ = (1.0_dp - 0.5_dp*x2) &
            + x2*x2*(C(1) + x2*(C(2) + x2*(C(3) + x2*(C(4) + x2*(C(5) + x2*C(6))))))

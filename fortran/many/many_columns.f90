@@ -1,16 +1,17 @@
 module many_columns
-  !! Bodies as the kernels of ensembles read them: a number of each in a lane, three in columns.
+  !! Bodies as the kernels for ensembles read them: each body in a lane, its three components in
+  !! columns.
   use bodies, only: bodies_t, i1, LANES
   use kinds, only: dp
   implicit none(type, external)
   private
 
   type, public :: block_t
-    !! The bodies in the lanes.
-    integer :: there            !! how many
-    integer :: last             !! all bodies up to this one have been in a block, or were passed
-    integer :: at(LANES)        !! the bodies, ascending; the last again where there are no more
-    logical :: in_row           !! at(i) is at(1) + i - 1
+    !! The bodies that are in the lanes.
+    integer :: there            !! number of bodies
+    integer :: last             !! last body that was examined: put into a block or skipped
+    integer :: at(LANES)        !! the bodies, ascending; unused lanes repeat the last
+    logical :: in_row           !! whether the bodies are consecutive
   end type block_t
 
   public :: columns_of, equations_of, next_block, odd_axes, put_back, times_of, turn_axes, turn_back
@@ -18,10 +19,10 @@ module many_columns
 contains
 
   pure subroutine next_block(n, status, mark, block)
-    !! The next bodies of that status, as many as there are lanes.
+    !! Find the next bodies with this status, as many as there are lanes.
     integer, intent(in) :: n
     integer(i1), intent(in) :: status(n), mark
-    type(block_t), intent(inout) :: block  !! last is where to go on from
+    type(block_t), intent(inout) :: block  !! block%last is the body to continue after
     integer(i1) :: others
     integer :: first, i, there
 
@@ -52,11 +53,11 @@ contains
   end subroutine next_block
 
   pure subroutine columns_of(source, block, m, columns)
-    !! Three numbers of each body of a block, each in a row of lanes; the last body again where
-    !! there are no more.
+    !! Copy three numbers of each body of a block into its lane. Lanes without a body repeat the
+    !! last body.
     real(dp), intent(in), contiguous :: source(:, :)
     type(block_t), intent(in) :: block
-    integer, intent(in) :: m         !! lanes to fill
+    integer, intent(in) :: m         !! number of lanes to fill
     real(dp), intent(inout) :: columns(LANES, 3)
     integer :: first, i, j, there
 
@@ -90,10 +91,10 @@ contains
   end subroutine columns_of
 
   pure subroutine times_of(times, block, m, t)
-    !! The time of each body of a block, in a row of lanes.
+    !! Copy the time of each body of a block into its lane.
     real(dp), intent(in), contiguous :: times(:) !! s
     type(block_t), intent(in) :: block
-    integer, intent(in) :: m                     !! lanes to fill
+    integer, intent(in) :: m                     !! number of lanes to fill
     real(dp), intent(inout) :: t(LANES)
 
     if (size(times) == 1) then
@@ -107,7 +108,7 @@ contains
   end subroutine times_of
 
   pure subroutine put_back(block, columns, results)
-    !! Three numbers of each body from its lane to its column.
+    !! Copy three numbers of each body from its lane to its column of the results.
     type(block_t), intent(in) :: block
     real(dp), intent(in) :: columns(LANES, 3)
     real(dp), intent(inout), contiguous :: results(:, :)
@@ -130,7 +131,8 @@ contains
   end subroutine put_back
 
   pure subroutine equations_of(bodies, block, m, a, moments)
-    !! A, B, C of equations 13-15, and by what a torque is divided.
+    !! Compute A, B, C of equations 13-15, and the divisors of a torque: the moments, or 1 if the
+    !! bodies are specified by A, B, C.
     type(bodies_t), intent(in) :: bodies
     type(block_t), intent(in) :: block
     integer, intent(in) :: m
@@ -145,7 +147,7 @@ contains
     end if
     call columns_of(bodies%body, block, m, moments)
     do i = 1, m
-      ! No body: NaN, which every look at a body finds.
+      ! Moments that are not all above 0 give NaN, which every later check of a body finds.
       least = min(moments(i, 1), moments(i, 2), moments(i, 3))
       if (.not. least > 0.0_dp) least = 0.0_dp
       least = least/least
@@ -156,11 +158,11 @@ contains
   end subroutine equations_of
 
   pure subroutine odd_axes(m, a, odd)
-    !! The axis whose coefficient has not the sign of the other two; 0: all three have one sign.
+    !! Find the axis whose coefficient has another sign than the other two; 0 if all have one sign.
     integer, intent(in) :: m
     real(dp), intent(in) :: a(LANES, 3)
     real(dp), intent(inout) :: odd(LANES) !! 0, 1, 2 or 3
-    real(dp) :: with1, with2, with3 ! above 0 where that axis is like another
+    real(dp) :: with1, with2, with3 ! above 0 if that axis has the sign of another one
     integer :: i
 
     do i = 1, m
@@ -175,7 +177,7 @@ contains
   end subroutine odd_axes
 
   pure subroutine turn_axes(m, odd, v)
-    !! The odd axis into the second column, the next into the third.
+    !! Permute the axes cyclically, so that the odd axis becomes the second column.
     integer, intent(in) :: m
     real(dp), intent(in) :: odd(LANES)
     real(dp), intent(inout) :: v(LANES, 3)
@@ -205,7 +207,8 @@ contains
   end subroutine turn_axes
 
   pure subroutine turn_back(m, odd, v)
-    !! Columns in the order of the body's axes again: what took 3 to the middle takes 1 back there.
+    !! Undo turn_axes. The permutation that moves axis 3 to the middle is undone by the one that
+    !! moves axis 1 there.
     integer, intent(in) :: m
     real(dp), intent(in) :: odd(LANES)
     real(dp), intent(inout) :: v(LANES, 3)

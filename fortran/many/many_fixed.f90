@@ -1,8 +1,8 @@
 module many_fixed
-  !! Many bodies under constant torque in steps of one size, side by side: the methods of III.2 in
-  !! unknowns so scaled that a right-hand side is one product and one sum. Each body takes as many
-  !! steps as its own time asks for. Bodies with a coefficient of 0, or with three of one sign, are
-  !! left to the single kernel.
+  !! Many bodies under constant torque with a fixed step, side by side: the methods of III.2. The
+  !! unknowns are scaled so that a right-hand side is one product and one sum. Each body takes as
+  !! many steps as its own time requires. Bodies with a coefficient of 0, or with three coefficients
+  !! of one sign, are left to the single-body kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK
@@ -16,33 +16,33 @@ module many_fixed
   private
 
   integer, parameter :: PAIR = 2*A_GROUP
-  real(dp), parameter :: EXCESS = 1e-6_dp   ! of a step, rather than one step more
+  real(dp), parameter :: EXCESS = 1e-6_dp   ! the last step may be longer by this part of a step
   real(dp), parameter :: MOST_STEPS = 1e8_dp
-  integer(int64), parameter :: BETWEEN_LOOKS = 100000_int64 ! at the user, steps of a block
-  real(dp), parameter :: FAR = 1e60_dp      ! from 1: products of such scales are numbers
+  integer(int64), parameter :: BETWEEN_LOOKS = 100000_int64 ! block steps between interrupt polls
+  real(dp), parameter :: FAR = 1e60_dp      ! products of scales from 1/FAR to FAR are finite
   real(dp), parameter :: THIRD = 1.0_dp/3.0_dp
 
   public :: many_fixed_solve
 
   type :: scaled_t
-    real(dp), dimension(LANES) :: x, y, z          !! omega, scaled; x' = y z, y' = -x z, z' = x y
-    real(dp), dimension(LANES) :: mx, my, mz       !! torque of half a step
+    real(dp), dimension(LANES) :: x, y, z          !! scaled omega; x' = y z, y' = -x z, z' = x y
+    real(dp), dimension(LANES) :: mx, my, mz       !! torque times half a step
     real(dp), dimension(LANES) :: scale1, scale2, scale3
-    real(dp), dimension(LANES) :: odd              !! the body's axis that is y; 0: none for here
+    real(dp), dimension(LANES) :: odd              !! body's axis that is y; 0: the body is left
   end type scaled_t
 
 contains
 
   subroutine many_fixed_solve(bodies_at, method, n, omega, status, interrupted) &
     bind(c, name="solve_many_fixed_level")
-    !! Angular velocity at its time of each body that is marked; status is then COMPLETE, or
-    !! NEEDS_FALLBACK for the single kernel.
-    type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
+    !! Compute omega of each marked body at its time. Its status becomes COMPLETE, or NEEDS_FALLBACK
+    !! if it is left to the single-body kernel.
+    type(c_ptr), intent(in), value :: bodies_at           !! address of a bodies_t, passed through C
     integer(c_int), intent(in), value :: method           !! IMPROVED_EULER, TAYLOR_3 or RK4
-    integer(c_int), intent(in), value :: n                !! bodies
+    integer(c_int), intent(in), value :: n                !! number of bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
     integer(i1), intent(inout) :: status(n)
-    integer(c_int), intent(out) :: interrupted            !! 1: by the user
+    integer(c_int), intent(out) :: interrupted            !! 1: interrupted by the user
     type(bodies_t), pointer :: bodies
     type(scaled_t) :: s
     type(block_t) :: block
@@ -83,14 +83,14 @@ contains
   end subroutine many_fixed_solve
 
   pure subroutine count_steps(m, step, t, n_steps, h, last, odd)
-    !! The steps of each body, all but the last of one size.
+    !! Count the steps of each body; all but the last have one size.
     integer, intent(in) :: m
     real(dp), intent(in) :: step                  !! s
     real(dp), intent(in) :: t(LANES)              !! s
     integer(int64), intent(inout) :: n_steps(LANES)
     real(dp), intent(inout) :: h(LANES)           !! s
-    real(dp), intent(inout) :: last(LANES)        !! step over the others
-    real(dp), intent(inout) :: odd(LANES)         !! 0 where the single kernel counts
+    real(dp), intent(inout) :: last(LANES)        !! last step over the others
+    real(dp), intent(inout) :: odd(LANES)         !! 0 if left to the single-body kernel
     real(dp) :: count
     integer :: i
 
@@ -108,8 +108,8 @@ contains
   end subroutine count_steps
 
   subroutine advance_each(method, m, n_steps, s, interrupted)
-    !! All steps of each body but the last one. A lane that has arrived goes on, as the others need
-    !! it, and is put back to where it arrived.
+    !! Take all steps of each body but the last one. A lane that has finished continues as long as
+    !! the others need it, and is then reset to its result.
     integer, intent(in) :: method, m
     integer(int64), intent(in) :: n_steps(LANES)
     type(scaled_t), intent(inout) :: s
@@ -151,7 +151,7 @@ contains
   end subroutine advance_each
 
   pure subroutine scale_to(m, h, a, constant, w, s)
-    !! Half a step is the unit of time.
+    !! Scale the unknowns; the unit of time is half a step.
     integer, intent(in) :: m
     real(dp), intent(in) :: h(LANES)           !! s
     real(dp), intent(in) :: a(LANES, 3), constant(LANES, 3), w(LANES, 3)
@@ -169,12 +169,12 @@ contains
       w2 = w(i, 2)
       w3 = w(i, 3)
       odd = s%odd(i)
-      ! All three turned round, products change their sign.
+      ! The reversal of all three axes changes the sign of all products.
       direction = sign(half, a1*half)
       scale1 = direction*(sqrt(abs(a2))*sqrt(abs(a3)))
       scale2 = direction*(sqrt(abs(a1))*sqrt(abs(a3)))
       scale3 = direction*(sqrt(abs(a1))*sqrt(abs(a2)))
-      ! Products that are 0 tell no signs.
+      ! Products that underflow to 0 do not show the signs of the coefficients.
       if (.not. min(abs(a1*a2), abs(a2*a3), abs(a3*a1)) > 0.0_dp) odd = 0.0_dp
       if (.not. min(abs(scale1), abs(scale2), abs(scale3)) >= 1.0_dp/FAR) odd = 0.0_dp
       if (.not. max(abs(scale1), abs(scale2), abs(scale3)) <= FAR) odd = 0.0_dp
@@ -193,7 +193,7 @@ contains
   end subroutine scale_to
 
   pure subroutine lengthen(m, factor, s)
-    !! Another step, `factor` times as long.
+    !! Rescale the unknowns to a step that is `factor` times as long.
     integer, intent(in) :: m
     real(dp), intent(in) :: factor(LANES)
     type(scaled_t), intent(inout) :: s
@@ -210,9 +210,9 @@ contains
   end subroutine lengthen
 
   pure subroutine scale_back(m, factor, s, w)
-    !! Omega about the body's axes; NaN of a body that is none for here.
+    !! Compute omega about the body's axes; NaN for a body that is left to the single-body kernel.
     integer, intent(in) :: m
-    real(dp), intent(in) :: factor(LANES) !! of the step
+    real(dp), intent(in) :: factor(LANES) !! length of the last step over the others
     type(scaled_t), intent(in) :: s
     real(dp), intent(inout) :: w(LANES, 3)
     integer :: i
@@ -243,9 +243,9 @@ contains
 
   ! unroll: paired
   pure subroutine runge_kutta_steps(m, n_steps, s)
-    !! Eq. 31: as many sums as products, so that neither kind waits for the other; two halves of the
-    !! lanes in turn. What a step adds is not read off the stages, in whose roundings, alike from
-    !! step to step, many steps drown.
+    !! Eq. 31, with as many sums as products, so that neither kind waits for the other; two halves
+    !! of the lanes alternate. The increment of a step is not computed from the stages: their
+    !! rounding errors are the same from step to step and would dominate after many steps.
     integer, intent(in) :: m
     integer(int64), intent(in) :: n_steps
     type(scaled_t), intent(inout) :: s
@@ -291,7 +291,7 @@ contains
   ! end unroll
 
   pure subroutine improved_euler_steps(m, n_steps, s)
-    !! Eq. 29.
+    !! Eq. 29: improved Euler.
     integer, intent(in) :: m
     integer(int64), intent(in) :: n_steps
     type(scaled_t), intent(inout) :: s
@@ -318,7 +318,7 @@ contains
   end subroutine improved_euler_steps
 
   pure subroutine taylor_steps(m, n_steps, s)
-    !! Eq. 30.
+    !! Eq. 30: three terms of the Taylor series.
     integer, intent(in) :: m
     integer(int64), intent(in) :: n_steps
     type(scaled_t), intent(inout) :: s

@@ -1,7 +1,7 @@
 module many_free
-  !! Many bodies without torque, side by side: the closed form of torque_free.f90 in numbers of one
-  !! word and without a branch. Bodies for which that is not exact enough, or that stand near the
-  !! end of a range, are left to the single kernel.
+  !! Many torque-free bodies side by side: the closed form of torque_free.f90 in double precision
+  !! and without branches. Bodies for which this is not accurate enough, or whose numbers are near
+  !! the limits of the range, are left to the single-body kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK
@@ -13,50 +13,52 @@ module many_free
   implicit none(type, external)
   private
 
-  integer, parameter :: LEVELS = 5     ! of the arithmetic-geometric mean
-  real(dp), parameter :: NEARLY_CIRCULAR = 2e-4_dp ! modulus beyond them whose 4th power counts not
-  ! Rounding of the frequency, of each radian, in tolerances of 1; measured: at most a quarter.
+  integer, parameter :: LEVELS = 5     ! levels of the arithmetic-geometric mean
+  real(dp), parameter :: NEARLY_CIRCULAR = 2e-4_dp ! modulus left by them: 4th power is negligible
+  ! Bound of the relative rounding error of the frequency; measured errors are at most a quarter of
+  ! it.
   real(dp), parameter :: ERROR = 8.0_dp*2.0_dp**(-53)
-  real(dp), parameter :: FAR = 1e100_dp ! from 1: products of such moduli are numbers
-  ! A result whose rounding may be amplified beyond UNSURE tolerances is left to the single kernel,
-  ! which measures that. A first bound takes no division and no root; its parts of the largest
-  ! growth for the amplitudes and for the phase.
+  real(dp), parameter :: FAR = 1e100_dp ! products of moduli from 1/FAR to FAR are finite
+  ! A result whose rounding error may be amplified beyond UNSURE tolerances is left to the
+  ! single-body kernel, which measures the amplification. A first bound takes no division and no
+  ! root. It allots the part OF_AMPLITUDES of the largest allowed amplification to the amplitudes,
+  ! and the rest to the phase.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: UNSURE = 0.3_dp
-  real(dp), parameter :: ABOVE_ESTIMATE = 1.5_dp ! as in torque_free_differences.f90
+  real(dp), parameter :: ABOVE_ESTIMATE = 1.5_dp ! margin, as in torque_free_differences.f90
   real(dp), parameter :: OF_AMPLITUDES = 0.2_dp
-  real(dp), parameter :: UNLIKE = 100.0_dp ! coefficients for which the exponential is a bound
+  real(dp), parameter :: UNLIKE = 100.0_dp ! largest ratio of coefficients for the exponential bound
   real(dp), parameter :: LEAST = tiny(1.0_dp)
-  real(dp), parameter :: NEVER = huge(1.0_dp) ! an error with which no body is finished here
+  real(dp), parameter :: NEVER = huge(1.0_dp) ! error that leaves the body to the single-body kernel
 
   type :: orbits_t
-    !! As orbit_t of torque_free.f90, axes in the same order.
+    !! The members of orbit_t of torque_free.f90, lane by lane; the axes are in the same order.
     real(dp), dimension(LANES) :: omega1, omega2, omega3
     real(dp), dimension(LANES) :: rate1, rate2, rate3
     real(dp), dimension(LANES) :: modulus, amplitude2, amplitude3, half_gap
-    real(dp), dimension(LANES) :: odd       !! the body's axis that is axis 2 here; 0: none
-    real(dp), dimension(LANES) :: gap       !! below 0: axes 1 and 3 are swapped
-    real(dp), dimension(LANES) :: error     !! estimate, in radians and tolerances of 1
-    real(dp), dimension(LANES) :: turning   !! square of the growth of phase in 1 s, times `most`
-    real(dp), dimension(LANES) :: most      !! square of the largest one, times what both divide by
-    real(dp), dimension(LANES) :: rate      !! square of the exponential rate of growth, 1/s2
-    real(dp), dimension(LANES) :: unsure    !! 1 where the first bound of the growth is not enough
-    real(dp), dimension(LANES) :: a, b      !! of the mean
-    real(dp), dimension(LANES) :: half      !! of their difference
+    real(dp), dimension(LANES) :: odd       !! body's axis that is axis 2 here; 0: none
+    real(dp), dimension(LANES) :: gap       !! negative: axes 1 and 3 are exchanged
+    real(dp), dimension(LANES) :: error     !! estimate of the relative error
+    real(dp), dimension(LANES) :: turning   !! square of phase amplification in 1 s, times a divisor
+    real(dp), dimension(LANES) :: most      !! square of its limit, times the same divisor
+    real(dp), dimension(LANES) :: rate      !! square of exponent over largest exponent, 1/s2
+    real(dp), dimension(LANES) :: unsure    !! 1 if the first amplification bound does not suffice
+    real(dp), dimension(LANES) :: a, b      !! the two means
+    real(dp), dimension(LANES) :: half      !! half of the difference of the means
     real(dp), dimension(LANES) :: frequency
     real(dp), dimension(LANES) :: sine, cosine !! in the ratio of sn and cn
-    real(dp), dimension(LANES) :: numerator, denominator !! of dn
-    real(dp), dimension(LANES) :: square    !! of the sine, of the last level but one
+    real(dp), dimension(LANES) :: numerator, denominator !! dn is their quotient
+    real(dp), dimension(LANES) :: square    !! of the sine, at the last level but one
     real(dp) :: upper(LANES, LEVELS), lower(LANES, LEVELS)
   end type orbits_t
 
 contains
 
   subroutine many_free_solve(bodies_at, n, omega, status) bind(c, name="solve_many_free_level")
-    !! Angular velocity at its time of each body that is marked; status is then COMPLETE, or
-    !! NEEDS_FALLBACK for the single kernel.
-    type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
-    integer(c_int), intent(in), value :: n                !! bodies
+    !! Compute omega of each marked body at its time. Its status becomes COMPLETE, or NEEDS_FALLBACK
+    !! if it is left to the single-body kernel.
+    type(c_ptr), intent(in), value :: bodies_at           !! address of a bodies_t, passed through C
+    integer(c_int), intent(in), value :: n                !! number of bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
     integer(i1), intent(inout) :: status(n)
     type(bodies_t), pointer :: bodies
@@ -100,8 +102,8 @@ contains
   end subroutine many_free_solve
 
   pure subroutine begin(m, tolerance, a, w, o)
-    !! All that does not depend on the time. Axis 2 of an orbit has the coefficient of the odd sign,
-    !! axis 3 keeps its direction.
+    !! Compute everything that does not depend on the time. Axis 2 of an orbit has the coefficient
+    !! with the odd sign; omega about axis 3 does not change its sign.
     integer, intent(in) :: m
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: a(LANES, 3), w(LANES, 3)
@@ -152,10 +154,11 @@ contains
       gap = abs(gap)
       o%a(i) = sqrt(o%modulus(i))
       o%b(i) = sqrt(s2*gap)
-      ! What rounding makes of a small gap, it makes of the frequency.
+      ! Where cancellation makes the gap small, the frequency has the relative rounding error of the
+      ! gap.
       o%error(i) = ERROR*(left + right)/gap
       if (.not. o%odd(i) > 0.0_dp) o%error(i) = NEVER
-      ! A number above torque_free_growth_bound, squared and without a division.
+      ! An upper bound of torque_free_growth_bound, squared and without a division.
       c1 = s2*y1 + s1*y2
       c3 = s3*y2 + s2*y3
       s12 = s1*s2
@@ -166,8 +169,9 @@ contains
       y2 = (OF_AMPLITUDES*most)**2*s12*(s2*gap)**2
       if (.not. (y1 <= y2 .and. y2 <= NEVER .and. y2 >= LEAST)) o%most(i) = -1.0_dp
       if (.not. (o%most(i) <= NEVER .and. o%most(i) >= LEAST)) o%most(i) = -1.0_dp
-      ! In units of the roots of the coefficients the symmetric part of the Jacobian matrix has the
-      ! norm (s1 s3)**(1/2) omega2: growth is at most its exponential, of short times less.
+      ! In units of the square roots of the coefficients, the symmetric part of the Jacobian matrix
+      ! has the norm (s1 s3)**(1/2) omega2. The amplification is at most the exponential of its
+      ! integral, which is the smaller bound for short times.
       o%rate(i) = NEVER
       if (max(s1, s2, s3) <= UNLIKE*min(s1, s2, s3) .and. early > 0.0_dp) o%rate(i) = s3*c1/early
       if (.not. s2 > 0.0_dp) o%error(i) = NEVER
@@ -176,7 +180,7 @@ contains
   end subroutine begin
 
   pure subroutine climb(m, o)
-    !! The arithmetic-geometric mean, as many levels for all.
+    !! Compute the arithmetic-geometric mean, with the same number of levels for all lanes.
     integer, intent(in) :: m
     type(orbits_t), intent(inout) :: o
     real(dp) :: mean
@@ -195,8 +199,8 @@ contains
   end subroutine climb
 
   pure subroutine turn(m, t, o)
-    !! Sine and cosine of the phase, and what is left of a modulus: sn : cn is tan (1 + k**2/4),
-    !! dn is 1 - k**2/2 sin**2.
+    !! Compute sine and cosine of the phase, with the effect of the modulus that remains: sn : cn is
+    !! tan (1 + k**2/4), dn is 1 - k**2/2 sin**2.
     integer, intent(in) :: m
     real(dp), intent(in) :: t(LANES) !! s
     type(orbits_t), intent(inout) :: o
@@ -210,12 +214,12 @@ contains
       if (.not. o%half(i) <= NEARLY_CIRCULAR*o%a(i)) error = NEVER
       o%numerator(i) = 0.5_dp*square
       o%denominator(i) = inverse*(1.0_dp + 0.25_dp*square)
-      ! One more level would take that off.
+      ! One more level of the mean would subtract this term.
       o%frequency(i) = (o%a(i) - 0.25_dp*square*o%a(i))*t(i)
       o%unsure(i) = 1.0_dp
       if (o%turning(i)*(t(i)*t(i)) <= o%most(i) &
           .or. o%rate(i)*(t(i)*t(i)) <= 1.0_dp) o%unsure(i) = 0.0_dp
-      if (.not. abs(t(i)) > 0.0_dp) error = NEVER ! omega as it is
+      if (.not. abs(t(i)) > 0.0_dp) error = NEVER ! the single-body kernel returns omega0
       o%error(i) = error + error*abs(o%frequency(i))
     end do
     call sine_cosine_lanes(m, o%frequency, o%sine, o%cosine)
@@ -227,8 +231,8 @@ contains
   end subroutine turn
 
   pure subroutine descend(m, o)
-    !! Back to the modulus of the orbit. Sine and cosine have a factor in common at each level, so
-    !! that no level divides.
+    !! Return to the modulus of the orbit, level by level. Sine and cosine may have a common factor
+    !! at each level, so that no level needs a division.
     integer, intent(in) :: m
     type(orbits_t), intent(inout) :: o
     real(dp) :: s2, c2
@@ -248,7 +252,7 @@ contains
   end subroutine descend
 
   pure subroutine finish(m, o, w)
-    !! The addition theorems, as in torque_free.f90.
+    !! Apply the addition theorems of sn, cn, dn, as in torque_free.f90.
     integer, intent(in) :: m
     type(orbits_t), intent(in) :: o
     real(dp), intent(inout) :: w(LANES, 3)
@@ -259,7 +263,7 @@ contains
     do i = 1, m
       c2 = o%cosine(i)*o%cosine(i)
       s2 = o%sine(i)*o%sine(i)
-      ! One division for dn and for the common factor.
+      ! One division serves both dn and the common factor.
       both = c2 + s2*o%amplitude3(i)
       inverse = 1.0_dp/(both*o%denominator(i))
       dn = o%numerator(i)*(both*inverse)
@@ -284,7 +288,7 @@ contains
   end subroutine finish
 
   pure subroutine ask_again(m, tolerance, a, w, t, o)
-    !! torque_free_growth_bound of the bodies whose first bound of the growth is not enough.
+    !! Evaluate torque_free_growth_bound for the bodies whose first bound does not suffice.
     integer, intent(in) :: m
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: a(LANES, 3), w(LANES, 3) !! rad/s, at the end

@@ -1,6 +1,6 @@
 module many_kinds
-  !! What solves each of many bodies: its own numbers alone decide, so that no result depends on the
-  !! other bodies of a call.
+  !! The choice of the kernel that solves each of many bodies. Only the numbers of a body decide it,
+  !! so that no result depends on the other bodies of a call.
   use bodies, only: acts, bodies_t, coefficients_of, FREE, has_torque, i1, MOST_WAVES, &
                     NEEDS_FALLBACK, of_body, RAMPED, STEPPED, WAVED
   use kinds, only: dp
@@ -13,11 +13,11 @@ module many_kinds
 contains
 
   subroutine mark_bodies(bodies, code, status, n_waves)
-    !! What solves each body, by its own numbers.
+    !! Mark each body with the kernel that solves it.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: code
     integer(i1), intent(out) :: status(bodies%n)
-    integer, intent(out) :: n_waves    !! the most that act on a body that is marked WAVED
+    integer, intent(out) :: n_waves    !! largest number on a body that is marked WAVED
     integer :: i
 
     n_waves = 0
@@ -38,7 +38,7 @@ contains
   end subroutine mark_bodies
 
   pure logical function shares_torque(bodies)
-    !! Whether one torque is that of all bodies.
+    !! Return whether all bodies have the same torque.
     type(bodies_t), intent(in) :: bodies
 
     shares_torque = max(size(bodies%constant, 2), size(bodies%rate, 2), size(bodies%sines, 3), &
@@ -46,7 +46,7 @@ contains
   end function shares_torque
 
   pure logical function feels_torque(bodies, i)
-    !! Whether a torque acts on body i.
+    !! Return whether a torque acts on body i.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i
 
@@ -56,7 +56,7 @@ contains
   end function feels_torque
 
   pure integer function waves_on(bodies, i)
-    !! The waves that act on body i.
+    !! Return the number of waves that act on body i.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i
     integer :: k
@@ -71,10 +71,10 @@ contains
   end function waves_on
 
   integer(i1) function mark_of(bodies, i, code, n_waves)
-    !! What solves body i.
+    !! Return the mark of body i.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i, code
-    integer, intent(inout) :: n_waves  !! the most so far
+    integer, intent(inout) :: n_waves  !! largest number so far
     integer :: own_waves
 
     if (code == CLOSED_FORM_OR_TAYLOR) then
@@ -105,7 +105,7 @@ contains
   end function is_sphere
 
   integer function single_code(bodies, i, code, with_attitude)
-    !! What the single kernel solves body i by, where `code` was asked for.
+    !! Return the method by which the single-body kernel solves body i if `code` was requested.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i, code
     logical, intent(in) :: with_attitude
@@ -114,10 +114,10 @@ contains
     if (code /= CLOSED_FORM_OR_TAYLOR) return
     if (feels_torque(bodies, i)) then
       single_code = TAYLOR
-      ! With attitude a sphere has no closed form under torque.
+      ! With attitude, a sphere under torque has no closed form.
       if (is_sphere(coefficients_of(bodies, i)) .and. .not. with_attitude) single_code = SPHERE
     else if (with_attitude .and. .not. bodies%by_moments) then
-      ! Coefficients alone do not say which angular momentum the body has.
+      ! The coefficients do not determine the angular momentum of the body.
       single_code = TAYLOR
     end if
   end function single_code

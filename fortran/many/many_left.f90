@@ -1,5 +1,6 @@
 module many_left
-  !! Bodies that no kernel of lanes solves: one after the other, by the single kernel.
+  !! Bodies that no multi-lane kernel solves: the single-body kernel solves them one after the
+  !! other.
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: acts, bodies_t, coefficients_of, i1, NEEDS_FALLBACK, of_body
   use kinds, only: dp
@@ -16,18 +17,18 @@ module many_left
   implicit none(type, external)
   private
 
-  ! As in sensitivity.py, which measures what a prepared solver reports.
+  ! As in sensitivity.py, which decides what a prepared solver reports.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  real(dp), parameter :: UNSURE = 0.3_dp ! rounding times growth, in tolerances
+  real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
   real(dp), parameter :: COARSE = 1e-3_dp, LITTLE_WORK = 5e-3_dp
-  real(dp), parameter :: HARDLY_ANY = 1e300_dp ! steps: so many roundings cancel
+  real(dp), parameter :: HARDLY_ANY = 1e300_dp ! steps: so many that their roundings average out
 
   public :: solve_left, solve_left_with_attitude
 
 contains
 
   subroutine solve_left(bodies, code, effort_, packed, omega, status, raised)
-    !! What is left, one by one.
+    !! Solve the bodies that are left, one by one.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: code
     real(dp), intent(in) :: effort_
@@ -66,7 +67,7 @@ contains
 
   subroutine solve_left_with_attitude(bodies, code, effort_, attitude0, omega, attitude, status, &
                                       raised)
-    !! The same with attitude.
+    !! Solve all bodies with attitude, one by one.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: code
     real(dp), intent(in) :: effort_
@@ -103,10 +104,10 @@ contains
   end subroutine solve_left_with_attitude
 
   pure logical function is_body(bodies, i, packed)
-    !! Whether a body has moments above 0, and all its numbers are finite.
+    !! Return whether the moments of a body are above 0 and all its numbers are finite.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i
-    real(dp), intent(in) :: packed(0:) !! the same as single kernels take it
+    real(dp), intent(in) :: packed(0:) !! the body as single-body kernels take it
 
     is_body = all(abs(packed) <= huge(1.0_dp))
     if (bodies%by_moments) then
@@ -115,13 +116,13 @@ contains
   end function is_body
 
   subroutine pack(bodies, i, code, with_attitude, effort_, packed, n_packed)
-    !! Body i for prepared.f90.
+    !! Pack body i as prepared.f90 reads it.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: i, code
     logical, intent(in) :: with_attitude
     real(dp), intent(in) :: effort_
     real(dp), intent(inout) :: packed(0:)
-    integer, intent(out) :: n_packed   !! with the waves that act on the body
+    integer, intent(out) :: n_packed   !! length, with the waves that act on the body
     real(dp) :: of(3)
     integer :: column, k
 
@@ -160,16 +161,16 @@ contains
   end subroutine pack
 
   subroutine tell_sensitive(packed, n_packed, omega0, time, steps, status)
-    !! Report a result as sensitive where a prepared solver does: a closed form and Gauss
-    !! collocation measure no error amplification by themselves.
+    !! Report a result as sensitive where a prepared solver does. The closed forms and Gauss
+    !! collocation do not measure the error amplification themselves.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)   !! rad/s
     real(dp), intent(in) :: time        !! s
-    integer(int64), intent(in) :: steps !! 0 of a closed form
+    integer(int64), intent(in) :: steps !! 0 with a closed form
     integer, intent(inout) :: status
     real(dp) :: copy(0:n_packed - 1)
-    real(dp) :: enough       ! growth beyond which the result is sensitive
+    real(dp) :: enough       ! amplification beyond which the result is sensitive
     real(dp) :: growth, omega(3), found(2)
     type(problem_t) :: torque
     integer(int64) :: coarse_steps
@@ -181,7 +182,7 @@ contains
                .or. code == CLOSED_FORM_OR_TAYLOR)) return
     enough = UNSURE*packed(TOLERANCE)/ROUNDING
     if (n_packed > WAVES) then
-      ! Terms of the torque that nearly cancel are rounded by more than omega is.
+      ! Terms of the torque that nearly cancel have larger rounding errors than omega.
       call unpack(packed, n_packed, torque)
       growth = HARDLY_ANY
       if (code > GAUSS) growth = min(HARDLY_ANY, abs(time)/packed(STEP))
@@ -209,7 +210,7 @@ contains
   end subroutine tell_sensitive
 
   pure real(dp) function remainder_of(x, y, z)
-    !! What rounding takes off (x - y)/z.
+    !! Return the rounding error of (x - y)/z.
     real(dp), intent(in) :: x, y, z
     real(dp) :: difference, difference_low, product, product_low
 

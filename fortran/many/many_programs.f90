@@ -1,5 +1,5 @@
 module many_programs
-  !! The three programs of the appendix on many bodies, a block of lanes at a time.
+  !! The three programs of the appendix on many bodies, one block of lanes at a time.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
@@ -17,7 +17,7 @@ module many_programs
   implicit none(type, external)
   private
 
-  integer(c_intptr_t), parameter :: ALIGNED = 64 ! bytes: no vector across two lines of the cache
+  integer(c_intptr_t), parameter :: ALIGNED = 64 ! bytes: no vector crosses a cache line
 
   type :: room_t
     type(block_t) :: b
@@ -31,14 +31,14 @@ module many_programs
 contains
 
   subroutine run_lanes(ensemble_at) bind(c, name="run_lanes_level")
-    !! Run them all, or until the user interrupts.
-    type(c_ptr), intent(in), value :: ensemble_at !! an ensemble_t, through C
+    !! Run all bodies, or until the user interrupts.
+    type(c_ptr), intent(in), value :: ensemble_at !! address of an ensemble_t, passed through C
     type(ensemble_t), pointer :: e
     type(room_t), pointer :: room
     real(c_double), target :: place(storage_size(room)/64 + ALIGNED/8)
     integer(c_intptr_t) :: address
     integer :: first
-    integer :: left  ! steps until the user is looked at
+    integer :: left  ! steps until the next poll for an interrupt
 
     call c_f_pointer(ensemble_at, e)
     address = transfer(c_loc(place), address)
@@ -61,7 +61,7 @@ contains
     integer(int64) :: verdict(LANE_COUNT)
     integer(int64) :: found
     integer :: step
-    integer :: row   ! the next that is wanted
+    integer :: row   ! next requested row
 
     call begin_block(e, first, b)
     if (e%program == 3) call begin_stages(b, stages)
@@ -105,7 +105,7 @@ contains
   end subroutine run_block
 
   subroutine end_overflows(e, step, verdict, b)
-    !! A step that overflows leaves no row.
+    !! End the runs that overflow in this step, which leaves no row.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: step
     integer(int64), intent(in) :: verdict(LANE_COUNT)
@@ -123,8 +123,8 @@ contains
   end subroutine end_overflows
 
   subroutine end_stops(e, step, verdict, stages, b)
-    !! One that the Lipschitz test stops leaves its own; which variable it was, the program's own
-    !! test says.
+    !! End the runs that the Lipschitz test stops in this step, which leaves a row. The program's
+    !! own test finds the variable.
     type(ensemble_t), intent(in) :: e
     integer, intent(in) :: step
     integer(int64), intent(in) :: verdict(LANE_COUNT)

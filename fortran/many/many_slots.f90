@@ -1,5 +1,5 @@
 module many_slots
-  !! Bodies under torque on their way, side by side, and those that are next.
+  !! The bodies under torque that are being integrated side by side, and those that are next.
   use bodies, only: acts, bodies_t, i1, LANES, MOST_WAVES, of_body
   use kinds, only: dp
   use many_columns, only: block_t, columns_of, equations_of, next_block, times_of
@@ -10,37 +10,39 @@ module many_slots
   implicit none(type, external)
   private
 
-  integer, parameter, public :: SLOTS = 16      !! bodies on their way
-  integer, parameter, public :: KIND_OF = 5     !! place in a wave: 1 of a cosine, else 0
+  integer, parameter, public :: SLOTS = 16      !! bodies that are being integrated
+  integer, parameter, public :: KIND_OF = 5     !! index in a wave: 1 for a cosine, else 0
   real(dp), parameter :: SURE = 0.03_dp !! error of the waves' angles, in tolerances
-  real(dp), parameter, public :: SHORTEST = 1e-7_dp !! step over the time
-  real(dp), parameter, public :: FAR = 1e60_dp  !! from 1: products of such rates are numbers
-  ! A step may leave out so much more than that of a single march, whose order it does not choose:
-  ! what it leaves out is known and taken off.
+  real(dp), parameter, public :: SHORTEST = 1e-7_dp !! shortest step over the time
+  real(dp), parameter, public :: FAR = 1e60_dp  !! products of rates from 1/FAR to FAR are finite
+  ! Factor by which the truncation error of a step may exceed that in an integration of one body,
+  ! because it is estimated and subtracted. This factor does not change the order.
   real(dp), parameter :: MORE = 3.0_dp
-  real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! whose terms are no sum over one pair of poles
-  ! Rounding of torques that cancel, in roundings of omega: nothing beside what else there is. More
-  ! counts only where it is a part of the tolerance, whatever the growth that these bodies may have.
+  real(dp), parameter :: MORE_WITH_WAVES = 2.0_dp ! with waves, whose terms do not come
+  ! from one pair of poles
+  ! Rounding error of cancelling torques, in roundings of omega, that is always acceptable. A larger
+  ! one is acceptable if it is below SURE tolerances even under the largest amplification
+  ! MOST_GROWTH.
   real(dp), parameter :: LITTLE = 10.0_dp
   real(dp), parameter, public :: MOST_GROWTH = 1000.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! of each radian of a wave
+  real(dp), parameter :: WAVES_ERR = 16.0_dp*2.0_dp**(-53) ! rounding error per radian of a wave
 
   type, public :: slots_t
-    real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding, rad/s
+    real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding error, rad/s
     real(dp), dimension(SLOTS, 3) :: a        !! A, B, C
-    real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment
-    real(dp), dimension(SLOTS, 3) :: error    !! left out and carried so far, rad/s
-    real(dp), dimension(SLOTS) :: worst       !! its largest size so far: it may shrink again
+    real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment: 1/s2, 1/s3
+    real(dp), dimension(SLOTS, 3) :: error    !! truncation error, propagated so far, rad/s
+    real(dp), dimension(SLOTS) :: worst       !! its largest size so far, as it may decrease again
     real(dp) :: small(SLOTS, 3, 3)            !! state-transition matrix from time 0: row, column
-    real(dp), dimension(SLOTS) :: growth      !! its largest norm, that of the largest component
-    real(dp), dimension(SLOTS) :: t, rest     !! s
-    real(dp), dimension(SLOTS) :: h           !! the step before, s
-    real(dp), dimension(SLOTS) :: scale       !! largest omega so far, rad/s
-    real(dp), dimension(SLOTS) :: local_tolerance !! largest last terms, relative to it
-    real(dp), dimension(SLOTS) :: spin        !! of small differences, 1/s
-    real(dp), dimension(SLOTS) :: going       !! above 0 where a body has a way to go
-    real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! what waves add to the terms, rad/s
+    real(dp), dimension(SLOTS) :: growth      !! its largest norm so far (maximum norm)
+    real(dp), dimension(SLOTS) :: t, rest     !! time so far and time to go, s
+    real(dp), dimension(SLOTS) :: h           !! previous step, s
+    real(dp), dimension(SLOTS) :: scale       !! largest |omega| so far, rad/s
+    real(dp), dimension(SLOTS) :: local_tolerance !! largest last terms, relative to scale
+    real(dp), dimension(SLOTS) :: spin        !! rate of change of perturbations, 1/s
+    real(dp), dimension(SLOTS) :: going       !! above 0 while a body is being integrated
+    real(dp) :: torque(SLOTS, 3, MOST_ORDER)  !! terms of the waves, rad/s
   end type slots_t
 
   type, public :: ready_t
@@ -57,7 +59,7 @@ module many_slots
 contains
 
   pure subroutine fill(s)
-    !! A body at rest in each slot.
+    !! Put a body at rest into each slot.
     type(slots_t), intent(inout) :: s
 
     s%w = 0.0_dp
@@ -79,8 +81,8 @@ contains
   end subroutine fill
 
   subroutine make_ready(bodies, status, waves, r)
-    !! The next bodies that are marked, as many as there are lanes; r%fits is below 0 of one that is
-    !! none for here.
+    !! Prepare the next marked bodies, as many as there are lanes. r%fits is negative for a body
+    !! that is left to the single-body kernel.
     type(bodies_t), intent(in) :: bodies
     integer(i1), intent(in) :: status(bodies%n)
     real(dp), intent(inout) :: waves(KIND_OF, MOST_WAVES, LANES)
@@ -90,7 +92,7 @@ contains
     type(problem_t) :: torque
     real(dp), target :: own(4, MOST_WAVES)
     real(dp) :: push, ramp, tolerance
-    real(dp) :: cancelled ! noise of a torque that is too much for here
+    real(dp) :: cancelled ! noise of a torque above which the body is left
     integer :: i, n
 
     call next_block(bodies%n, status, bodies%mark, r%block)
@@ -110,7 +112,8 @@ contains
       ramp = max(abs(r%rate(i, 1)), abs(r%rate(i, 2)), abs(r%rate(i, 3)))
       r%scale(i) = max(abs(r%w(i, 1)), abs(r%w(i, 2)), abs(r%w(i, 3)))
       call steady_rates(coupling(i), r%scale(i), push, ramp, r%rest(i), gain(i), rate(i))
-      ! Of numbers that are none, or not far from the end of the range, a product may be.
+      ! Numbers that are not finite, or near the limits of the range, may have products that are
+      ! not.
       r%fits(i) = 1.0_dp
       if (.not. (abs(r%w(i, 1)) + abs(r%w(i, 2)) + abs(r%w(i, 3)) <= FAR &
                  .and. r%scale(i) >= 1.0_dp/FAR)) r%fits(i) = -1.0_dp
@@ -143,7 +146,7 @@ contains
         own = waves(:4, :, i)
         torque%n_sines = 0
         do n = 1, bodies%n_waves
-          ! Sines are before cosines; what fills up the array counts as either.
+          ! Sines precede cosines; the zeros that fill up the array count as either.
           if (waves(KIND_OF, n, i) > 0.0_dp) exit
           torque%n_sines = n
         end do
@@ -168,10 +171,11 @@ contains
   end subroutine make_ready
 
   pure subroutine waves_of_body(bodies, body, waves)
-    !! The waves that act on a body, sines before cosines; after them zeros, which change no bit.
+    !! Collect the waves that act on a body, sines before cosines. The zeros after them change no
+    !! bit.
     type(bodies_t), intent(in) :: bodies
     integer, intent(in) :: body
-    real(dp), intent(inout) :: waves(:, :)  !! (KIND_OF, the most that act on a body)
+    real(dp), intent(inout) :: waves(:, :)  !! (KIND_OF, largest number of waves on a body)
     integer :: column, n, there
 
     there = 0
@@ -192,7 +196,7 @@ contains
   end subroutine waves_of_body
 
   pure subroutine put_in(r, j, s, i)
-    !! Body j of those that are ready into slot i.
+    !! Put prepared body j into slot i.
     type(ready_t), intent(in) :: r
     integer, intent(in) :: j, i
     type(slots_t), intent(inout) :: s

@@ -1,5 +1,6 @@
-/* Many starts of a prepared solver, from the interpreter into the kernel with no Python between.
-   What is not plainly right, or asks for more, goes to a function in Python. */
+/* Many starts of a prepared solver: the call from the interpreter into the kernel, with no Python
+   code between. Arguments that are not plainly valid, or need conversion, go to a function in
+   Python. */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <stddef.h>
@@ -8,7 +9,7 @@
 #define NPY_TARGET_VERSION NPY_2_0_API_VERSION
 #include <numpy/arrayobject.h>
 
-/* solve_packed_many of api.f90. */
+/* The type of solve_packed_many in api_many.f90. */
 typedef void kernel(const double *packed, const int *n_packed, const int *n, const double *omega0,
                     const int *n_times, const double *times, int *given_up, double *omega,
                     int8_t *status, int *raised);
@@ -16,12 +17,13 @@ typedef void kernel(const double *packed, const int *n_packed, const int *n, con
 typedef struct {
   PyObject_HEAD
   vectorcallfunc vectorcall;
-  PyObject *callable;    /* the kernel as Python has it: keeps its address */
+  PyObject *callable;    /* the kernel as a Python object, which keeps its address valid */
   kernel *address;
   PyArrayObject *packed; /* read-only */
-  /* The same, or NULL: for calls shorter than releasing the GIL and waiting for it again. */
+  /* The same scene for the closed form alone, or NULL. This call keeps the GIL, as it is shorter
+     than releasing the GIL and waiting for it again. */
   PyArrayObject *packed_with_gil;
-  PyObject *slowly;      /* what takes any arguments */
+  PyObject *slowly;      /* Python function that takes any arguments */
 } many_starts;
 
 enum { FEW = 16 };
@@ -33,7 +35,7 @@ static int is_plain(PyObject *object, int dimensions)
          PyArray_TYPE(array) == NPY_DOUBLE && PyArray_ISCARRAY_RO(array);
 }
 
-/* Enter the kernel; returns whether every start has a result at once. */
+/* Enter the kernel. Return whether every start has a result at the first attempt. */
 static int enter(const many_starts *self, PyArrayObject *packed, int n, const double *start,
                  int n_times, const double *times, double *omega, int8_t *status)
 {
@@ -89,7 +91,7 @@ slowly:
   return PyObject_Vectorcall(self->slowly, given, n_given, names);
 }
 
-/* The address behind one of f2py's functions; NULL where it is another's. */
+/* Return the address behind one of f2py's functions, or NULL for any other callable. */
 static void *address_of(PyObject *callable)
 {
   PyObject *capsule = PyObject_GetAttrString(callable, "_cpointer");

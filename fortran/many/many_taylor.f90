@@ -1,8 +1,8 @@
 module many_taylor
-  !! Many bodies under torque, side by side: Taylor series with a step of its own for each. A body
-  !! that has come to its end makes room for the next one. What a step leaves out is measured,
-  !! carried to the end and taken off there; where it, or what the motion makes of it, is too much
-  !! to be sure of, the body is left to the single kernel.
+  !! Many bodies under torque side by side: Taylor series with a step of its own for each body. When
+  !! a body reaches its end, the next one takes its slot. The truncation error of each step is
+  !! estimated, propagated to the end and subtracted there. If this error or its amplification is
+  !! too large to rely on the estimate, the body is left to the single-body kernel.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use bodies, only: A_GROUP, bodies_t, i1, LANES, NEEDS_FALLBACK, MOST_WAVES
@@ -16,20 +16,21 @@ module many_taylor
   implicit none(type, external)
   private
 
-  integer, parameter :: BETWEEN_LOOKS = 100000 ! at the user, steps of all slots
-  ! Error that is taken off, in tolerances; less where the motion makes more of what is not known.
+  integer, parameter :: BETWEEN_LOOKS = 100000 ! steps of all slots between polls for an interrupt
+  ! Largest error that is subtracted, in tolerances; less if unknown errors are amplified.
   real(dp), parameter :: TRUSTED = 0.4_dp
-  real(dp), parameter :: DOUBTED = 64.0_dp   ! growth at which it is half of that
+  real(dp), parameter :: DOUBTED = 64.0_dp   ! amplification at which it is half of that
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  ! Rounding times growth, in tolerances: a third of what the single kernel reports as sensitive, as
-  ! it measures the growth from later instants too.
+  ! Largest rounding error times amplification, in tolerances. This is a third of what the
+  ! single-body kernel reports as sensitive, as that kernel measures the amplification from later
+  ! instants too.
   real(dp), parameter :: SURE = 0.1_dp
-  real(dp), parameter :: A_STEP = 3.0_dp     ! norm up to which an exponential is taken at once
+  real(dp), parameter :: A_STEP = 3.0_dp     ! largest norm of an exponent that is taken at once
   real(dp), parameter :: RIDGE = 1.001_dp
   real(dp), parameter :: LEAST = 1e-290_dp
-  integer, parameter :: SPARE = 12           ! bits of a number that its logarithm can do without
-  real(dp), parameter :: MOST_BITS = 2.0_dp**45 ! of a ratio, without those
-  ! Whole numbers to reals and back by a sum: few processors convert many at once.
+  integer, parameter :: SPARE = 12           ! bits of a number that its logarithm does not need
+  real(dp), parameter :: MOST_BITS = 2.0_dp**45 ! largest logarithm of a ratio, without those bits
+  ! Integers are converted to reals and back by a sum: few processors convert many at once.
   real(dp), parameter :: WHOLE = 1.5_dp*2.0_dp**52
 
   public :: many_taylor_solve
@@ -38,17 +39,17 @@ contains
 
   subroutine many_taylor_solve(bodies_at, n, omega, status, interrupted) &
     bind(c, name="solve_many_taylor_level")
-    !! Angular velocity at its time of each body that is marked; status is then COMPLETE, or
-    !! NEEDS_FALLBACK for the single kernel.
-    type(c_ptr), intent(in), value :: bodies_at           !! a bodies_t, through C
-    integer(c_int), intent(in), value :: n                !! bodies
+    !! Compute omega of each marked body at its time. Its status becomes COMPLETE, or NEEDS_FALLBACK
+    !! if it is left to the single-body kernel.
+    type(c_ptr), intent(in), value :: bodies_at           !! address of a bodies_t, passed through C
+    integer(c_int), intent(in), value :: n                !! number of bodies
     real(c_double), intent(inout) :: omega(3, n)          !! rad/s
     integer(i1), intent(inout) :: status(n)
-    integer(c_int), intent(out) :: interrupted            !! 1: by the user
+    integer(c_int), intent(out) :: interrupted            !! 1: interrupted by the user
     type(bodies_t), pointer :: bodies
     type(slots_t) :: s
     real(dp) :: waves(KIND_OF, MOST_WAVES, SLOTS)
-    integer :: body(SLOTS)   ! in each slot; 0: none
+    integer :: body(SLOTS)   ! the body in each slot; 0: none
     type(ready_t) :: ready
     real(dp) :: ready_waves(KIND_OF, MOST_WAVES, LANES)
     integer :: n_waves, order, active, n_slots, i, j, unseen
@@ -63,7 +64,7 @@ contains
     ready%block%last = 0
     call make_ready(bodies, status, ready_waves, ready)
     n_slots = SLOTS
-    if (ready%block%there <= A_GROUP) n_slots = A_GROUP ! a register: the others would stay empty
+    if (ready%block%there <= A_GROUP) n_slots = A_GROUP ! one register; the others would stay empty
     active = 0
     unseen = 0
     do
@@ -105,7 +106,8 @@ contains
   end subroutine many_taylor_solve
 
   pure integer function order_for(tolerance)
-    !! One of unroll_many.py: the same for all, so that a body's result does not depend on others.
+    !! Return one of the orders of unroll_many.py. It is the same for all bodies, so that the result
+    !! of a body does not depend on the others.
     real(dp), intent(in) :: tolerance
 
     if (tolerance >= 1e-4_dp) then
@@ -120,7 +122,7 @@ contains
   end function order_for
 
   pure real(dp) function going(rest, h, t, growth)
-    !! Above 0 where a body has a way to go, and is none that is left to the single kernel.
+    !! Return a value above 0 while the body must be advanced further by this kernel, else 0.
     real(dp), intent(in) :: rest, h, t !! s
     real(dp), intent(in) :: growth
 
@@ -130,7 +132,7 @@ contains
   end function going
 
   pure subroutine take_out(tolerance, s, i, omega, status)
-    !! What has come of a slot's body.
+    !! Take the result of a slot's body, or leave the body to the single-body kernel.
     real(dp), intent(in) :: tolerance
     type(slots_t), intent(in) :: s
     integer, intent(in) :: i
@@ -141,7 +143,7 @@ contains
     omega = s%w(i, :) + (s%low(i, :) - s%error(i, :))
     scale = max(s%scale(i), abs(omega(1)), abs(omega(2)), abs(omega(3)))
     status = NEEDS_FALLBACK
-    ! A sum, as a NaN may be lost in a maximum.
+    ! A sum, because a maximum may lose a NaN.
     if (.not. abs(s%rest(i)) > 0.0_dp .and. sum(abs(omega)) + s%scale(i) <= FAR &
         .and. s%worst(i)*(1.0_dp + s%growth(i)/DOUBTED) <= TRUSTED*tolerance*scale &
         .and. s%growth(i) <= min(MOST_GROWTH, SURE*tolerance/ROUNDING)) then
@@ -150,7 +152,7 @@ contains
   end subroutine take_out
 
   subroutine wave_terms(order, n_waves, waves, s)
-    !! What waves of torque add to the terms of a step as long as the one before.
+    !! Compute the terms that waves of the torque add to a step as long as the previous one.
     integer, intent(in) :: order, n_waves
     real(dp), intent(in) :: waves(KIND_OF, MOST_WAVES, SLOTS)
     type(slots_t), intent(inout) :: s
@@ -166,7 +168,7 @@ contains
         power(i) = s%h(i)
       end do
       call sine_cosine_lanes(SLOTS, angle, sine, cosine)
-      ! The derivatives of a wave run value, slope, -value, -slope.
+      ! The derivatives of a wave are its value, slope, -value and -slope in turn.
       do i = 1, SLOTS
         even(i) = merge(cosine(i), sine(i), waves(KIND_OF, n, i) > 0.0_dp)
         odd(i) = merge(-sine(i), cosine(i), waves(KIND_OF, n, i) > 0.0_dp)
@@ -188,8 +190,8 @@ contains
   end subroutine wave_terms
 
   pure real(dp) function ratio(order, allowed, last)
-    !! Of the step with which the last terms would be as large as allowed: the bits of a positive
-    !! number, read as an integer, are its logarithm to 6 %.
+    !! Return the factor on the step with which the last terms would be as large as allowed. The
+    !! bits of a positive number, read as an integer, are its logarithm to 6 %.
     integer, intent(in) :: order
     real(dp), intent(in) :: allowed, last
     integer(int64) :: bits
@@ -204,9 +206,9 @@ contains
 
   ! unroll: many_step
   pure subroutine step(order, waves, m, s)
-    !! One step of each slot.
+    !! Take one step in each slot.
     integer, intent(in) :: order, m
-    logical, intent(in) :: waves !! else the torque has none
+    logical, intent(in) :: waves !! whether the torque has waves
     type(slots_t), intent(inout) :: s
     integer :: i
 
@@ -216,7 +218,8 @@ contains
   end subroutine step
 
   pure subroutine step_of(order, waves, i, s)
-    !! The terms with the step before, their ratio to it, the sum, what is left out.
+    !! Compute the terms with the previous step, the factor on the step, the sum and the truncation
+    !! error.
     integer, intent(in) :: order, i
     logical, intent(in) :: waves
     type(slots_t), intent(inout) :: s
@@ -262,7 +265,7 @@ contains
     part = total - terms(:, 0)
     s%low(i, :) = (terms(:, 0) - (total - part)) + (change - part)
     s%w(i, :) = total
-    ! As estimate_truncation of taylor_error.f90.
+    ! Truncation error, as in estimate_truncation of taylor_error.f90.
     last4 = terms(:, order - 3:order)/max(allowed, LEAST)
     uu = RIDGE*(sum(last4(:, 3)**2) + sum(last4(:, 2)**2))
     vv = RIDGE*(sum(last4(:, 2)**2) + sum(last4(:, 1)**2))
@@ -274,7 +277,7 @@ contains
     q = uv*p - uu*q
     determinant = max((determinant - r) + q, abs(r - q), abs(q), LEAST)
     left = allowed*(((r - q)/determinant)*last4(:, 4) - (q/determinant)*last4(:, 3))
-    ! As propagate_variations of taylor_series.f90.
+    ! Magnus's series, as in propagate_variations of taylor_series.f90.
     mean = terms(:, 0)
     moment = 0.0_dp
     do k = 1, MOMENTS
@@ -289,7 +292,7 @@ contains
     o(2, 3) = f(2)*(mean(1) + f(1)*c(1))
     o(3, 1) = f(3)*(mean(2) + f(2)*c(2))
     o(3, 2) = f(3)*(mean(1) - f(1)*c(1))
-    ! In units in which the matrix of a body is symmetric but for signs.
+    ! In these units the matrix of a body is symmetric except for signs.
     s%spin(i) = sqrt(abs(o(1, 2)*o(2, 1)) + abs(o(1, 3)*o(3, 1)) + abs(o(2, 3)*o(3, 2))) &
                 /max(abs(next), LEAST)
     rows = 0.0_dp
@@ -309,7 +312,7 @@ contains
         rows = rows + abs(e)
       end if
     end do
-    ! Sums, as a NaN may be lost in a maximum.
+    ! Sums, because a maximum may lose a NaN.
     s%growth(i) = max(s%growth(i), rows(1), rows(2), rows(3)) + 0.0_dp*sum(rows)
     s%t(i) = s%t(i) + next
     s%rest(i) = s%rest(i) - next

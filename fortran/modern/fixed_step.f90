@@ -1,6 +1,6 @@
 module fixed_step
-  !! The methods of III.2 in steps of one size: improved Euler (eq. 29), three terms of the
-  !! Taylor series (eq. 30), classical Runge-Kutta (eq. 31).
+  !! The methods of III.2 with a fixed step: improved Euler (eq. 29), three terms of the Taylor
+  !! series (eq. 30), classical Runge-Kutta (eq. 31).
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -11,11 +11,11 @@ module fixed_step
   implicit none(type, external)
   private
 
-  ! Without waves; some ten seconds, as long as anyone waits who was not asked.
+  ! Work limit without waves. It is some ten seconds, unless the caller allows more.
   real(dp), parameter :: MOST_STEPS = 4e8_dp
-  real(dp), parameter :: COUNTABLE = 1e18_dp  ! steps
-  real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e6_dp ! at the user; without waves
-  real(dp), parameter :: EXCESS = 1e-6_dp     ! of a step, rather than one step more
+  real(dp), parameter :: COUNTABLE = 1e18_dp  ! steps: more cannot be counted
+  real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e6_dp ! steps between polls, without waves
+  real(dp), parameter :: EXCESS = 1e-6_dp     ! the last step may be longer by this part
 
   public :: fixed_step_rows
 
@@ -23,34 +23,35 @@ contains
 
   subroutine fixed_step_rows(problem, omega0, n_times, times, method, step, effort, rows, n_rows, &
                              status, steps, evaluations, needed)
-    !! Angular velocity at each of `times`, which lead away from 0: as many whole steps as fit
-    !! between two of them, then a shorter one (or the last one longer by up to EXCESS).
+    !! Compute the angular velocity at each of `times`, which are ordered away from 0. Between two
+    !! of them there are as many whole steps as fit and then a shorter one. The last whole step may
+    !! be longer by up to EXCESS instead.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)         !! s
     integer, intent(in) :: method                  !! IMPROVED_EULER, TAYLOR_3 or RK4
     real(dp), intent(in) :: step                   !! s, above 0
-    real(dp), intent(in) :: effort                 !! factor on the steps allowed
+    real(dp), intent(in) :: effort                 !! factor on the work limit
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
-    integer, intent(out) :: n_rows                 !! rows that hold a result
+    integer, intent(out) :: n_rows                 !! number of rows that hold a result
     integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
-    integer(int64), intent(out) :: steps           !! taken
-    integer(int64), intent(out) :: evaluations     !! right-hand sides
-    real(dp), intent(out) :: needed                !! effort that the times ask for
+    integer(int64), intent(out) :: steps           !! steps taken
+    integer(int64), intent(out) :: evaluations     !! right-hand sides evaluated
+    real(dp), intent(out) :: needed                !! effort that the times require
     real(dp) :: y(3)
     real(dp) :: begin, h, n_steps
-    real(dp) :: total          ! steps to all times
-    real(dp) :: cost           ! of a step, in steps without waves
-    integer(int64) :: stride   ! steps between looks at the user
-    integer(int64) :: unseen   ! steps since the last look
-    integer(int64) :: done     ! of those to this time
+    real(dp) :: total          ! number of steps to all times
+    real(dp) :: cost           ! cost of a step, in steps without waves
+    integer(int64) :: stride   ! steps between polls for an interrupt
+    integer(int64) :: unseen   ! steps since the last poll
+    integer(int64) :: done     ! steps taken towards this time
     integer(int64) :: piece
     integer :: i
 
     n_rows = 0
     status = GAVE_UP
-    ! A torque that varies costs as much as the step, a wave twice that.
+    ! A varying torque costs as much as the rest of the step, and a wave twice that.
     cost = 1.0_dp + 2.0_dp*real(problem%n_sines + problem%n_cosines, dp) &
            + merge(1.0_dp, 0.0_dp, any(abs(problem%rate) > 0.0_dp))
     steps = 0
@@ -102,7 +103,7 @@ contains
   end subroutine fixed_step_rows
 
   pure real(dp) function steps_to(time, step)
-    !! Steps in a time.
+    !! Return the number of steps in a time.
     real(dp), intent(in) :: time                   !! s
     real(dp), intent(in) :: step                   !! s
 
@@ -110,14 +111,14 @@ contains
   end function steps_to
 
   pure integer function per_step(method)
-    !! Right-hand sides in a step; the derivative of one counts as another.
+    !! Return the number of right-hand sides in a step. The derivative of one counts as another.
     integer, intent(in) :: method
 
     per_step = merge(4, 2, method == RK4)
   end function per_step
 
   pure subroutine advance(problem, method, begin, h, first, last, y)
-    !! The steps after `first`, to `last`, of a number of equal ones.
+    !! Take the steps after number `first`, up to number `last`, of a sequence of equal steps.
     type(problem_t), intent(in) :: problem
     integer, intent(in) :: method
     real(dp), intent(in) :: begin                  !! s
@@ -160,7 +161,7 @@ contains
       k1 = rates(a, m, y)
       select case (method)
       case (IMPROVED_EULER)
-        ! Eq. 29: the mean of the rates at both ends.
+        ! Eq. 29: the mean of the rates at both ends of the step.
         k2 = rates(a, m_end, y + h*k1)
         y = y + (0.5_dp*h)*(k1 + k2)
       case (TAYLOR_3)
@@ -170,7 +171,7 @@ contains
         k2(3) = m_slope(3) + a(3)*(k1(1)*y(2) + y(1)*k1(2))
         y = y + h*(k1 + (0.5_dp*h)*k2)
       case default
-        ! Eq. 31.
+        ! Eq. 31: classical Runge-Kutta.
         k2 = rates(a, m_middle, y + (0.5_dp*h)*k1)
         k3 = rates(a, m_middle, y + (0.5_dp*h)*k2)
         k4 = rates(a, m_end, y + h*k3)
@@ -180,7 +181,7 @@ contains
   end subroutine advance
 
   pure function rates(a, m, y) result(f)
-    !! Equations 16-18.
+    !! Evaluate the right-hand sides of equations 16-18, rad/s2.
     real(dp), intent(in) :: a(3), m(3), y(3)
     real(dp) :: f(3)
 
@@ -190,20 +191,20 @@ contains
   end function rates
 
   pure subroutine runge_kutta_constant(problem, h, n_steps, y)
-    !! Eq. 31 where the torque is constant: half a step is in the coefficients, and each stage
-    !! is a sum of the last one's rates. What counts is the time from one product to the next.
+    !! Eq. 31 for a constant torque. The coefficients contain half a step, and each stage adds the
+    !! rates of the previous one. The run time is the latency from one product to the next.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: h
     integer(int64), intent(in) :: n_steps
     real(dp), intent(inout) :: y(3)
     real(dp), parameter :: third = 1.0_dp/3.0_dp
-    real(dp) :: a1, a2, a3, m1, m2, m3 ! half a step of the coefficients and of the torque
-    real(dp) :: u1, u2, u3 ! omega at the begin of the step
-    real(dp) :: b1, b2, b3 ! the same plus half a step of the torque
+    real(dp) :: a1, a2, a3, m1, m2, m3 ! coefficients and torque times half a step
+    real(dp) :: u1, u2, u3 ! omega at the beginning of the step
+    real(dp) :: b1, b2, b3 ! the same plus the torque times half a step
     real(dp) :: v1, v2, v3, w1, w2, w3 ! omega at the stages
-    real(dp) :: p1, p2, p3 ! half a step of the products at u
+    real(dp) :: p1, p2, p3 ! products at u times half a step
     real(dp) :: q1, q2, q3 ! the same at v
-    real(dp) :: s1, s2, s3 ! sum of the increments
+    real(dp) :: s1, s2, s3 ! sums of the increments
     integer(int64) :: n
 
     a1 = 0.5_dp*h*problem%coefficients(1)
@@ -231,8 +232,9 @@ contains
       w1 = b1 + q1
       w2 = b2 + q2
       w3 = b3 + q3
-      ! The sum of increments k1 + 2 k2 + 2 k3 + k4: not read off v - u and w - u, in whose
-      ! roundings, the same from step to step, a million steps drown.
+      ! The sum of the increments k1 + 2 k2 + 2 k3 + k4 is not computed from v - u and w - u. The
+      ! rounding errors of these differences are the same from step to step and would dominate after
+      ! a million steps.
       s1 = (m1 + p1) + 2.0_dp*(m1 + q1)
       s2 = (m2 + p2) + 2.0_dp*(m2 + q2)
       s3 = (m3 + p3) + 2.0_dp*(m3 + q3)

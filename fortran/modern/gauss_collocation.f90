@@ -1,7 +1,8 @@
 module gauss_collocation
-  !! Gauss collocation of 1 to 8 stages, order twice that, in equal steps between the times.
-  !! Iterated until rounding stops it, sums carried along, weights in two words, after Hairer,
-  !! McLachlan and Razakarivony 2008: then energy and momentum wander like rounding, no faster.
+  !! Gauss collocation of 1 to 8 stages, with equal steps between the output times. Its order is
+  !! twice the number of stages. As in Hairer, McLachlan and Razakarivony 2008, the iteration runs
+  !! until rounding stops it, sums are compensated, and the weights are double-double. Energy and
+  !! momentum then drift no faster than rounding errors accumulate.
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -15,12 +16,12 @@ module gauss_collocation
   private
 
   integer, parameter :: MOST_ITERATIONS = 60
-  integer, parameter :: PATIENT = 50 ! iterations that converge, if they do
-  real(dp), parameter :: MOST_EVALUATIONS = 4e8_dp ! some ten seconds
+  integer, parameter :: PATIENT = 50 ! an iteration that converges needs no more
+  real(dp), parameter :: MOST_EVALUATIONS = 4e8_dp ! work limit: some ten seconds
   real(dp), parameter :: COUNTABLE = 4e18_dp
-  real(dp), parameter :: BETWEEN_LOOKS = 5e5_dp ! at the user; right-hand sides, some 8 a step
-  real(dp), parameter :: ROUNDING = 1e-13_dp    ! changes below it, relative, may stop falling
-  real(dp), parameter :: EXCESS = 1e-6_dp       ! of a step, rather than one step more
+  real(dp), parameter :: BETWEEN_LOOKS = 5e5_dp ! right-hand sides between polls; some 8 a step
+  real(dp), parameter :: ROUNDING = 1e-13_dp    ! smaller relative changes may stop falling
+  real(dp), parameter :: EXCESS = 1e-6_dp       ! the last step may be longer by this part
 
   public :: gauss_rows
 
@@ -28,40 +29,40 @@ contains
 
   subroutine gauss_rows(problem, omega0, n_times, times, stages, step, effort, rows, reached, &
                         n_rows, status, evaluations)
-    !! Angular velocity at each of `times`, which lead away from 0.
+    !! Compute the angular velocity at each of `times`, which are ordered away from 0.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)         !! s
     integer, intent(in) :: stages                  !! 1 to 8
-    real(dp), intent(in) :: step                   !! at the most, s, above 0
-    real(dp), intent(in) :: effort                 !! factor on the right-hand sides allowed
+    real(dp), intent(in) :: step                   !! largest step, s, above 0
+    real(dp), intent(in) :: effort                 !! factor on the work limit
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
-    real(dp), intent(out) :: reached(4)            !! time and omega after the last good step
-    integer, intent(out) :: n_rows                 !! rows that hold a result
+    real(dp), intent(out) :: reached(4)            !! time and omega after the last successful step
+    integer, intent(out) :: n_rows                 !! number of rows that hold a result
     integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
-    integer(int64), intent(out) :: evaluations     !! right-hand sides
+    integer(int64), intent(out) :: evaluations     !! right-hand sides evaluated
     real(dp) :: y(3)
-    real(dp) :: carry(3)             ! what rounding took off y
-    real(dp) :: m(MOST_STAGES, 3)    ! torque at the nodes
-    real(dp) :: f(MOST_STAGES, 3)    ! rates at the nodes
+    real(dp) :: carry(3)             ! rounding error of y
+    real(dp) :: m(MOST_STAGES, 3)    ! torque over moment at the nodes, 1/s2
+    real(dp) :: f(MOST_STAGES, 3)    ! rates at the nodes, rad/s2
     real(dp) :: at_node(3)
     real(dp) :: begin, h
-    real(dp) :: h_low                ! what the rounding of the step left out, s
+    real(dp) :: h_low                ! rounding error of the step, s
     real(dp) :: waves, n_steps
-    real(dp) :: cost                 ! of the steps to the next time, in right-hand sides
+    real(dp) :: cost                 ! right-hand sides to the next output time
     real(dp) :: done
-    real(dp) :: span                 ! from time to time, s
+    real(dp) :: span                 ! from one output time to the next, s
     real(dp) :: span_low
-    real(dp) :: walked               ! since `begin`, s
+    real(dp) :: walked               ! time since `begin`, s
     real(dp) :: walked_low
-    real(dp) :: time                 ! of the step's beginning, s
+    real(dp) :: time                 ! beginning of the step, s
     real(dp) :: time_low
-    real(dp) :: node                 ! of a node, s
+    real(dp) :: node                 ! time of a node, s
     real(dp) :: node_low
-    integer(int64) :: most           ! right-hand sides
-    real(dp) :: stride               ! steps between looks at the user
-    real(dp) :: next_look            ! steps of the way to this time
+    integer(int64) :: most           ! right-hand sides allowed
+    real(dp) :: stride               ! steps between polls for an interrupt
+    real(dp) :: next_look            ! steps from `begin` to the next poll
     logical :: varies
     integer :: i, k
 
@@ -83,7 +84,7 @@ contains
     begin = 0.0_dp
     do i = 1, n_times
       n_steps = max(1.0_dp, aint(abs(times(i) - begin)/step + (1.0_dp - EXCESS)))
-      ! Two iterations a step at the least; a wave costs as much as one.
+      ! At least two iterations a step; a wave costs as much as one iteration.
       cost = n_steps*real(stages, dp)*(2.0_dp + waves)
       if (.not. cost <= real(most - evaluations, dp)) then
         status = GAVE_UP
@@ -93,7 +94,7 @@ contains
       h = span/n_steps
       call two_product(n_steps, h, walked, walked_low)
       h_low = (((span - walked) - walked_low) + span_low)/n_steps
-      ! The step is new: what the rates of the last one say about it is of no use.
+      ! The step has changed, so the rates of the last step are no help for this one.
       f = 0.0_dp
       done = 0.0_dp
       do while (done < n_steps)
@@ -127,20 +128,20 @@ contains
   end subroutine gauss_rows
 
   pure subroutine advance(coefficients, m, h, stages, most, y, carry, f, status, evaluations)
-    !! One step.
+    !! Take one step.
     real(dp), intent(in) :: coefficients(3)
     real(dp), intent(in) :: m(MOST_STAGES, 3)
     real(dp), intent(in) :: h
     integer, intent(in) :: stages
-    integer(int64), intent(in) :: most            !! right-hand sides
+    integer(int64), intent(in) :: most            !! right-hand sides allowed
     real(dp), intent(inout) :: y(3), carry(3)
     real(dp), intent(inout) :: f(MOST_STAGES, 3)  !! rates of the last step, 0 if there is none
     integer, intent(out) :: status
     integer(int64), intent(inout) :: evaluations
-    real(dp) :: z(MOST_STAGES, 3)       ! states at the nodes less y
+    real(dp) :: z(MOST_STAGES, 3)       ! states at the nodes minus y
     real(dp) :: zero(MOST_STAGES, 3), z_before(MOST_STAGES, 3)
     real(dp) :: states(MOST_STAGES, 3)
-    real(dp) :: low(MOST_STAGES, 3)     ! what the low words of the matrix add
+    real(dp) :: low(MOST_STAGES, 3)     ! contribution of MATRIX_LOW
     real(dp) :: change, change_before, scale
     real(dp) :: push                    ! largest torque over moment, 1/s2
     real(dp) :: increment, total, part, back, rest
@@ -160,13 +161,15 @@ contains
           states(k, axis) = y(axis) + (z(k, axis) + carry(axis))
         end do
       end do
+      ! equations 16-18 at the nodes
       do k = 1, stages
         f(k, 1) = m(k, 1) + coefficients(1)*states(k, 2)*states(k, 3)
         f(k, 2) = m(k, 2) + coefficients(2)*states(k, 3)*states(k, 1)
         f(k, 3) = m(k, 3) + coefficients(3)*states(k, 1)*states(k, 2)
       end do
       z_before = z
-      ! Rounding of the matrix would make energy drift; of so small a part, one look is enough.
+      ! Rounding of the matrix would make the energy drift. The correction is so small that one
+      ! evaluation of it suffices.
       if (iteration == 2) call stage_sums(MATRIX_LOW(:, :, stages), f, zero, stages, low)
       call stage_sums(MATRIX(:, :, stages), f, low, stages, z)
       z = h*z
@@ -178,7 +181,7 @@ contains
       end do
       if (.not. change > 0.0_dp) status = COMPLETE
       if (change >= change_before .and. change <= ROUNDING*scale) status = COMPLETE
-      ! A torque that gives far more than is there, and takes it back, leaves its rounding.
+      ! A torque that adds far more than omega, and removes it again, leaves its rounding error.
       if (iteration > PATIENT .and. change >= change_before &
           .and. change <= ROUNDING*(scale + abs(h)*push)) status = COMPLETE
       if (status == COMPLETE) exit
@@ -194,7 +197,8 @@ contains
         part = part + WEIGHTS_LOW(k, stages)*f(k, axis)
         increment = increment + WEIGHTS(k, stages)*f(k, axis)
       end do
-      ! The low words are finer than the last place of the sum: what it can't hold is carried.
+      ! The low parts are finer than the last place of the sum. What the sum cannot hold goes into
+      ! `carry` (compensated summation, after Hairer, McLachlan and Razakarivony 2008).
       increment = h*increment
       part = carry(axis) + h*part
       total = increment + part
@@ -210,7 +214,7 @@ contains
   end subroutine advance
 
   pure subroutine stage_sums(table, f, start, stages, z)
-    !! z = start + table times f.
+    !! Compute z = start + table f.
     real(dp), intent(in) :: table(MOST_STAGES, MOST_STAGES)
     real(dp), intent(in) :: f(MOST_STAGES, 3), start(MOST_STAGES, 3)
     integer, intent(in) :: stages

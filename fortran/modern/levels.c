@@ -1,5 +1,6 @@
-/* The hot modules are compiled once per instruction set; the best that this processor has is
-   chosen when the library is loaded. Plain code runs everywhere. */
+/* The choice of the instruction set. The performance-critical modules are compiled once per
+   instruction set, and the best one that this processor has is chosen when the library is loaded.
+   Plain code runs on every processor. */
 #include <stdint.h>
 
 #define ARGUMENTS                                                                              \
@@ -53,7 +54,7 @@ static struct {
 };
 static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
 
-/* All of x86-64-v3 that a processor with AVX2 may lack, or that a virtual machine may hide. */
+/* All features of x86-64-v3 that a processor with AVX2 may lack, or a virtual machine may hide. */
 #define HAS_AVX2                                                                               \
   (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&                          \
    __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2"))
@@ -62,7 +63,7 @@ static int level = 0; /* 0 plain, 1 AVX2 with FMA, 2 AVX-512 */
    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&                 \
    __builtin_cpu_supports("avx512vl"))
 
-/* Take a level, or the best below it that the processor has; return the one taken. */
+/* Choose a level, or the best below it that the processor has. Return the level that was chosen. */
 int choose_level(int highest)
 {
   level = 0;

@@ -1,6 +1,6 @@
 module levels
-  !! The doors of levels.c: the kernels of the instruction set that was chosen. C passes a
-  !! problem_t, a bodies_t or an ensemble_t on as it is, and knows no more of it than its address.
+  !! The interfaces of levels.c: the kernels of the chosen instruction set. C passes on the address
+  !! of a problem_t, a bodies_t or an ensemble_t and does not read it.
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
   use bodies, only: i1
   implicit none(type, external)
@@ -11,7 +11,7 @@ module levels
 
   interface
     integer(c_int) function choose_level(highest) bind(c, name="choose_level")
-      !! Take a level (0 plain, 1 AVX2, 2 AVX-512) or the best below it; which one it is.
+      !! Choose a level (0 plain, 1 AVX2, 2 AVX-512) or the best below it, and return it.
       import :: c_int
       implicit none(type, external)
       integer(c_int), intent(in), value :: highest
@@ -20,7 +20,7 @@ module levels
     subroutine taylor_solve(problem, omega, tolerance, effort, n_times, times, rows, &
                             n_attitudes, attitudes, n_rows, status, steps, needed, found) &
       bind(c, name="taylor_solve")
-      !! As in taylor.f90.
+      !! Call taylor_solve of taylor.f90 at the chosen level.
       import :: c_double, c_int, c_int64_t
       implicit none(type, external)
       type(*), intent(in) :: problem
@@ -37,7 +37,7 @@ module levels
 
     subroutine quick_solve(problem, omega, tolerance, effort, t_end, contest, result, status, &
                            steps, error) bind(c, name="quick_solve")
-      !! As in scaled_runge_kutta.f90.
+      !! Call quick_solve of scaled_runge_kutta.f90 at the chosen level.
       import :: c_double, c_int
       implicit none(type, external)
       type(*), intent(in) :: problem
@@ -49,7 +49,7 @@ module levels
     end subroutine quick_solve
 
     subroutine many_free(bodies, n, omega, status) bind(c, name="many_free")
-      !! As in many_free.f90.
+      !! Call many_free_solve of many_free.f90 at the chosen level.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
@@ -59,7 +59,7 @@ module levels
     end subroutine many_free
 
     subroutine many_taylor(bodies, n, omega, status, interrupted) bind(c, name="many_taylor")
-      !! As in many_taylor.f90.
+      !! Call many_taylor_solve of many_taylor.f90 at the chosen level.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
@@ -70,7 +70,7 @@ module levels
     end subroutine many_taylor
 
     subroutine many_fixed(bodies, method, n, omega, status, interrupted) bind(c, name="many_fixed")
-      !! As in many_fixed.f90.
+      !! Call many_fixed_solve of many_fixed.f90 at the chosen level.
       import :: c_double, c_int, c_ptr, i1
       implicit none(type, external)
       type(c_ptr), intent(in), value :: bodies
@@ -81,7 +81,7 @@ module levels
     end subroutine many_fixed
 
     subroutine run_lanes(ensemble) bind(c, name="run_lanes")
-      !! As in many_programs.f90.
+      !! Call run_lanes of many_programs.f90 at the chosen level.
       implicit none(type, external)
       type(*), intent(in) :: ensemble
     end subroutine run_lanes

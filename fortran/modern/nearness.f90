@@ -1,18 +1,18 @@
 module nearness
-  !! Numbers near 1, so that their products neither overflow nor underflow.
+  !! Scaling of numbers to near 1, so that their products neither overflow nor underflow.
   use kinds, only: dp
   implicit none(type, external)
   private
 
-  real(dp), parameter, public :: LARGE = 2.0_dp**100 ! beyond it, or below its inverse: far from 1
+  real(dp), parameter, public :: LARGE = 2.0_dp**100 ! above it, or below 1/LARGE: scaled
 
   public :: bring_near_one
 
 contains
 
   pure subroutine bring_near_one(x, power)
-    !! Where the largest of x is far from 1, divide by the power of two that brings it into
-    !! [1/2, 1).
+    !! Divide x by the power of two that brings its largest element into [1/2, 1), if that element
+    !! is far from 1.
     real(dp), intent(inout) :: x(:)
     integer, intent(out) :: power
     real(dp) :: largest

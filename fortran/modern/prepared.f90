@@ -1,6 +1,6 @@
 module prepared
-  !! One door for a solver that was prepared: all that does not change lies packed in one array,
-  !! so that a call from Python converts three arguments and not fourteen.
+  !! The entry point for prepared solvers. All data that does not change from call to call is packed
+  !! in one array, so that a call from Python converts three arguments instead of fourteen.
   use, intrinsic :: iso_fortran_env, only: int64
   use fixed_step, only: fixed_step_rows
   use gauss_collocation, only: gauss_rows
@@ -19,8 +19,8 @@ module prepared
   implicit none(type, external)
   private
 
-  ! Beyond it, or below its inverse, products of omegas may overflow or underflow, though the
-  ! solution is an ordinary number.
+  ! Above it, or below its inverse, products of omegas may overflow or underflow although the
+  ! solution is in range.
   real(dp), parameter :: LARGE = 2.0_dp**300
   integer, parameter :: MOST_POWER = 1000
 
@@ -29,15 +29,15 @@ module prepared
 contains
 
   subroutine solve_prepared(packed, n_packed, omega0, t_end, omega, status, steps, found)
-    !! Angular velocity at `t_end` by the method that was prepared; NaN where there is none.
+    !! Compute the angular velocity at `t_end` by the prepared method; NaN if there is no result.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
-    integer, intent(out) :: status     !! of the module statuses
+    integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(2)  !! estimated error, relative, and growth; below 0: unknown
+    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
     real(dp) :: largest
 
     largest = max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3)))
@@ -46,27 +46,27 @@ contains
     else
       call solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps, found)
     end if
-    ! Not ieee_value: that module ties the binary to libgfortran.
+    ! ieee_value is not used: its module makes the binary depend on libgfortran.
     if (.not. is_result(status)) omega = transfer(huge(0_int64), 1.0_dp)
   end subroutine solve_prepared
 
   subroutine solve_near_one(packed, n_packed, omega0, t_end, largest, omega, status, steps, found)
-    !! The same in units that bring omega near 1, by a power of two: it changes no digit.
+    !! Solve in units that bring omega near 1. The scale is a power of two, so no digit changes.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
-    real(dp), intent(in) :: largest    !! of omega0, rad/s
+    real(dp), intent(in) :: largest    !! largest component of omega0, rad/s
     real(dp), intent(out) :: omega(3)  !! rad/s
-    integer, intent(out) :: status     !! of the module statuses
+    integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(2)  !! relative, so that no unit changes it
+    real(dp), intent(out) :: found(2)  !! relative, so independent of the units
     real(dp), target :: copy(0:n_packed - 1)
     real(dp) :: start(3)
-    real(dp) :: reach      ! omega0 and what the torque gives, rad/s
-    real(dp) :: share      ! of its amplitude that a wave comes to
+    real(dp) :: reach      ! bound of omega0 and of what the torque adds, rad/s
+    real(dp) :: share      ! part of its amplitude that a wave reaches
     real(dp) :: time       ! in the new units
-    integer :: power       ! omega is 2**power times what it is in the new units
+    integer :: power       ! omega is 2**power times its value in the new units
     integer :: code, i
 
     reach = largest
@@ -75,7 +75,7 @@ contains
     end do
     do i = WAVES, WAVES + 4*int(packed(N_SINES) + packed(N_COSINES)) - 4, 4
       share = 1.0_dp
-      ! A slow sine never comes to its amplitude.
+      ! A slow sine does not reach its amplitude.
       if (i < WAVES + 4*int(packed(N_SINES))) share = min(1.0_dp, abs(packed(i + 3)*t_end))
       reach = max(reach, maxval(abs(packed(i:i + 2)*t_end*share)))
     end do
@@ -86,7 +86,7 @@ contains
     power = max(-MOST_POWER, min(MOST_POWER, power))
     time = scale(t_end, power)
     copy = packed
-    ! Where the step plays no part it may be no number in the new unit.
+    ! A step that the method does not use may be out of range in the new units.
     code = int(packed(METHOD))
     if (code > GAUSS .or. (code >= IMPROVED_EULER .and. code <= RK4)) then
       copy(STEP) = scale(packed(STEP), power)
@@ -99,7 +99,8 @@ contains
       copy(i) = scale(packed(i), -power)
       if (mod(i - WAVES, 4) /= 3) copy(i) = scale(copy(i), -power)
     end do
-    ! In so short a time that it, or a torque, is no number then, products don't matter.
+    ! If the time or a torque is out of range then, the time is so short that products do not
+    ! matter.
     if (.not. (all(abs(copy) <= huge(time)) .and. abs(time) <= huge(time) &
                .and. (abs(time) >= tiny(time) .or. .not. abs(t_end) > 0.0_dp))) power = 0
     if (power == 0) then
@@ -110,7 +111,7 @@ contains
       start(i) = scale(omega0(i), -power)
     end do
     call solve_as_given(copy, n_packed, start, time, omega, status, steps, found)
-    ! Else omega means nothing, and may be no number at all.
+    ! Without a result omega has no meaning and may be NaN.
     if (is_result(status)) then
       do i = 1, 3
         omega(i) = scale(omega(i), power)
@@ -120,15 +121,15 @@ contains
   end subroutine solve_near_one
 
   subroutine solve_as_given(packed, n_packed, omega0, t_end, omega, ended, count, found)
-    !! The same without a look at the scale; omega means nothing where there is no result.
+    !! Solve without regard to the scale. Without a result omega has no meaning.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: omega(3)  !! rad/s
-    integer, intent(out) :: ended      !! of the module statuses
+    integer, intent(out) :: ended      !! code of the module statuses
     integer(int64), intent(out) :: count !! or right-hand sides, of Gauss collocation
-    real(dp), intent(out) :: found(2)  !! estimated error, relative, and growth; below 0: unknown
+    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
     type(problem_t) :: problem
     real(dp) :: times(1)
     real(dp) :: reached(4)
@@ -161,7 +162,7 @@ contains
         call quick_solve(problem, omega0, packed(TOLERANCE), packed(EFFORT), t_end, &
                          merge(1, 0, code == QUICK_OR_TAYLOR), omega, ended, quick_steps, &
                          found(1))
-        ! Whoever let the kernel choose learns by the sign what it chose.
+        ! A negative number of steps tells the caller that the kernel chose quick.
         count = merge(-quick_steps, quick_steps, code == QUICK_OR_TAYLOR)
         if (code == QUICK .and. ended == SENSITIVE) then
           call compare_with_series(problem, omega0, packed(TOLERANCE), packed(EFFORT), times, &
@@ -182,21 +183,22 @@ contains
       call gauss_rows(problem, omega0, 1, times, code - GAUSS, packed(STEP), packed(EFFORT), &
                       omega, reached, n_rows, ended, count)
     end select
-    ! A start that is not finite may come back as it is, at time 0 for one.
+    ! A start that is not finite may be returned as it is, for example at time 0.
     if (is_result(ended)) then
       if (.not. all(abs(omega) <= huge(t_end))) ended = OVERFLOW
     end if
   end subroutine solve_as_given
 
   subroutine compare_with_series(problem, omega0, tolerance, effort, times, omega, ended, found)
-    !! Error and growth of a result whose method does not measure the amplification of rounding.
+    !! Compare with the series a result whose method does not measure the amplification of rounding
+    !! errors: compute its error and amplification.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega0(3)  !! rad/s
     real(dp), intent(in) :: tolerance, effort
     real(dp), intent(in) :: times(1)   !! s
     real(dp), intent(in) :: omega(3)   !! the result, rad/s
-    integer, intent(inout) :: ended    !! SENSITIVE, or COMPLETE where the series rules that out
-    real(dp), intent(inout) :: found(2) !! estimated error, relative, and growth; below 0: unknown
+    integer, intent(inout) :: ended    !! SENSITIVE, or COMPLETE if the series excludes that
+    real(dp), intent(inout) :: found(2) !! estimated relative error, amplification; below 0: unknown
     real(dp) :: other(3, 1), no_attitude(4, 1)
     real(dp) :: needed, estimates(3)
     integer :: n_rows, ended_other
@@ -216,15 +218,15 @@ contains
   end subroutine compare_with_series
 
   subroutine solve_prepared_attitude(packed, n_packed, start, t_end, state, status, steps, found)
-    !! Angular velocity and attitude at `t_end`; NaN where there are none.
+    !! Compute angular velocity and attitude at `t_end`; NaN if there is no result.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     real(dp), intent(in) :: start(7)   !! omega, rad/s, and a unit quaternion, scalar first
     real(dp), intent(in) :: t_end      !! s
     real(dp), intent(out) :: state(7)
-    integer, intent(out) :: status     !! of the module statuses
+    integer, intent(out) :: status     !! code of the module statuses
     integer(int64), intent(out) :: steps
-    real(dp), intent(out) :: found(2)  !! estimated error, relative, and growth; below 0: unknown
+    real(dp), intent(out) :: found(2)  !! estimated relative error, amplification; negative: unknown
     type(problem_t) :: problem
     real(dp) :: times(1)
     integer :: code, n_rows
@@ -264,14 +266,14 @@ contains
   end subroutine solve_prepared_attitude
 
   pure logical function is_result(status)
-    !! Whether there is an omega, though rounding may have cost it its digits.
+    !! Return whether there is an omega, even if rounding errors have cost all of its digits.
     integer, intent(in) :: status
 
     is_result = status == COMPLETE .or. status == SENSITIVE
   end function is_result
 
   subroutine unpack(packed, n_packed, problem)
-    !! The waves stay where they are.
+    !! Unpack the coefficients and the torque. The waves are not copied.
     integer, intent(in) :: n_packed
     real(dp), intent(in), target :: packed(0:n_packed - 1)
     type(problem_t), intent(out) :: problem
@@ -282,7 +284,7 @@ contains
     problem%rate = packed(RATE:RATE + 2)
     problem%n_sines = int(packed(N_SINES))
     problem%n_cosines = int(packed(N_COSINES))
-    ! To point at nothing would cost time.
+    ! The pointers are set only if there is a wave, to save time.
     if (problem%n_sines + problem%n_cosines > 0) then
       middle = WAVES + 4*problem%n_sines
       problem%sines(1:4, 1:problem%n_sines) => packed(WAVES:middle - 1)

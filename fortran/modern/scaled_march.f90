@@ -1,15 +1,16 @@
 module scaled_march
-  !! Equal Runge-Kutta steps (eq. 31) of three lengths at once, in the unknowns of scaled_motion.
+  !! Runge-Kutta (eq. 31) with three fixed steps at once, in the unknowns of scaled_motion.
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use scaled_motion, only: MOST_WAVES, motion_t, turned, versine
   implicit none(type, external)
   private
 
-  integer, parameter :: EXACT_AGAIN = 64     ! fours of steps until sine and cosine are made afresh
+  integer, parameter :: EXACT_AGAIN = 64     ! groups of four steps between recomputed sines
   real(dp), parameter :: THIRD_PART = 1.0_dp/3.0_dp
-  integer, parameter :: BETWEEN_LOOKS = 2**17 - 1 ! at the user: turns of the loops
-  ! Steps of twice the length err 16 times as much: the gap is 15 times the error that is left.
+  integer, parameter :: BETWEEN_LOOKS = 2**17 - 1 ! passes of the loops between interrupt polls
+  ! Steps of twice the length have 16 times the error, so the gap is 15 times the error of the
+  ! shorter ones.
   real(dp), parameter, public :: GAIN = 15.0_dp
 
   public :: march_constant, march_varying
@@ -17,22 +18,25 @@ module scaled_march
 contains
 
   subroutine march_constant(motion, start, h, fours, x, gaps, top, spread, ended)
-    !! Fours of equal steps under constant torque; and beside them, in the time that the processor
-    !! waits for them, steps of twice and of four times the length.
+    !! Take groups of four equal steps under constant torque. Steps of twice and of four times the
+    !! length are taken alongside, in time that the processor would spend waiting.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: start(3)
+    ! start: the unknowns at time 0, 1/s
     real(dp), intent(in) :: h           !! s
     integer, intent(in) :: fours
+    ! fours: number of groups of four steps
     real(dp), intent(out) :: x(3)
-    real(dp), intent(out) :: gaps(3, 2) !! from where steps of twice the length lead, and theirs
-    real(dp), intent(out) :: top(3)     !! largest size of the unknowns
+    ! x: the unknowns at the end, 1/s
+    real(dp), intent(out) :: gaps(3, 2) !! step h minus step 2 h, and step 2 h minus step 4 h
+    real(dp), intent(out) :: top(3)     !! largest size of each unknown
     real(dp), intent(out) :: spread     !! integral of the second unknown's size over time
-    logical, intent(out) :: ended       !! by the user
+    logical, intent(out) :: ended       !! whether the user interrupted
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
-    real(dp) :: y(3, 2)                 ! by the longer steps
-    real(dp) :: whole, half, third, sixth          ! of a step
-    real(dp) :: whole_2, half_2, third_2, sixth_2  ! of the second unknown, with its sign
-    real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, of longer steps
+    real(dp) :: y(3, 2)                 ! results of the longer steps
+    real(dp) :: whole, half, third, sixth          ! parts of a step, s
+    real(dp) :: whole_2, half_2, third_2, sixth_2  ! the same for the second unknown, with its sign
+    real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, for the longer steps
     integer :: i, k, n
 
     whole = h
@@ -57,10 +61,11 @@ contains
     y(:, 1) = start
     y(:, 2) = start
     top = abs(start)
-    ! The trapezoidal rule on every second step, whose last node is taken as a half after the loop.
+    ! The trapezoidal rule on every second step; its last node gets the weight 1/2 after the loop.
     spread = 0.5_dp*top(2)
     ended = .false.
     do i = 1, 2*fours
+      ! eq. 31 with the longer steps
       do k = 1, 1 + mod(i, 2)
         a1 = m1 + y(2, k)*y(3, k)
         a2 = m2 + y(1, k)*y(3, k)
@@ -87,6 +92,7 @@ contains
         y(2, k) = ((y(2, k) + sixths(2, k)*a2) + thirds(2, k)*(b2 + c2)) + sixths(2, k)*d2
         y(3, k) = ((y(3, k) + sixths(1, k)*a3) + thirds(1, k)*(b3 + c3)) + sixths(1, k)*d3
       end do
+      ! eq. 31 with the step h
       do n = 1, 2
         a1 = m1 + x2*x3
         a2 = m2 + x1*x3
@@ -129,26 +135,28 @@ contains
   end subroutine march_constant
 
   subroutine march_varying(motion, start, aside, t_end, fours, x, gaps, top, spread, ended)
-    !! The same under a torque of time: its integral is exact, and what remains is smooth.
+    !! Do the same under a torque that varies. The integral of the torque is exact, and the rest is
+    !! smooth.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: start(3)
-    real(dp), intent(in) :: aside(3)     !! the longer steps start so much off
+    real(dp), intent(in) :: aside(3)     !! offset of the start of the longer steps
     real(dp), intent(in) :: t_end        !! s
     integer, intent(in) :: fours
     real(dp), intent(out) :: x(3)        !! without the integral of the torque
     real(dp), intent(out) :: gaps(3, 2)
+    ! gaps: as in march_constant
     real(dp), intent(out) :: top(3)      !! with the integral
     real(dp), intent(out) :: spread      !! integral of the second unknown's size over time
-    logical, intent(out) :: ended        !! by the user
+    logical, intent(out) :: ended        !! whether the user interrupted
     real(dp) :: x1, x2, x3, a1, a2, a3, b1, b2, b3, c1, c2, c3, d1, d2, d3, p1, p2, p3, m1, m2, m3
-    real(dp) :: y(3, 2)                  ! by the longer steps
-    real(dp) :: whole, half, third, sixth          ! of a step
-    real(dp) :: whole_2, half_2, third_2, sixth_2  ! of the second unknown, with its sign
-    real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, of longer steps
-    real(dp) :: s(3, 0:8)    ! integral of the torque at halves of the steps
-    real(dp) :: sines(MOST_WAVES)        ! where the waves are
+    real(dp) :: y(3, 2)                  ! results of the longer steps
+    real(dp) :: whole, half, third, sixth          ! parts of a step, s
+    real(dp) :: whole_2, half_2, third_2, sixth_2  ! the same for the second unknown, with its sign
+    real(dp) :: wholes(2, 2), halves(2, 2), thirds(2, 2), sixths(2, 2) ! both, for the longer steps
+    real(dp) :: s(3, 0:8)    ! integral of the torque at multiples of half a step
+    real(dp) :: sines(MOST_WAVES)        ! sines of the waves now
     real(dp) :: versines(MOST_WAVES)
-    real(dp) :: turn_sines(MOST_WAVES)   ! of half a step
+    real(dp) :: turn_sines(MOST_WAVES)   ! sines of half a step
     real(dp) :: turn_versines(MOST_WAVES)
     real(dp) :: h
     logical :: afresh
@@ -185,7 +193,7 @@ contains
     y(:, 1) = x + aside
     y(:, 2) = x - GAIN*aside
     top = abs(start)
-    ! The trapezoidal rule on every second step, whose last node is taken as a half after the loop.
+    ! The trapezoidal rule on every second step; its last node gets the weight 1/2 after the loop.
     spread = 0.5_dp*top(2)
     s(:, 8) = motion%mean
     ended = .false.
@@ -198,6 +206,7 @@ contains
                     versines, s(:, n))
         end do
       end if
+      ! eq. 31 with the longer steps
       do k = 1, 1 + mod(i, 2)
         begin = merge(0, 4, mod(i, 2) == 1)
         middle = begin + 2*k
@@ -230,6 +239,7 @@ contains
         y(2, k) = ((y(2, k) + sixths(2, k)*a2) + thirds(2, k)*(b2 + c2)) + sixths(2, k)*d2
         y(3, k) = ((y(3, k) + sixths(1, k)*a3) + thirds(1, k)*(b3 + c3)) + sixths(1, k)*d3
       end do
+      ! eq. 31 with the step h
       do n = 0, 2, 2
         begin = merge(0, 4, mod(i, 2) == 1) + n
         middle = begin + 1
@@ -279,11 +289,11 @@ contains
   end subroutine march_varying
 
   pure subroutine turn(motion, t, afresh, turn_sines, turn_versines, sines, versines, s)
-    !! Waves half a step on, and the integral of the torque there.
+    !! Advance the waves by half a step, and compute the integral of the torque there.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t                          !! s
-    logical, intent(in) :: afresh                      !! from t, not from half a step before
-    real(dp), intent(in) :: turn_sines(MOST_WAVES)     !! of half a step
+    logical, intent(in) :: afresh                      !! compute at t, not from half a step before
+    real(dp), intent(in) :: turn_sines(MOST_WAVES)     !! sines of half a step
     real(dp), intent(in) :: turn_versines(MOST_WAVES)
     real(dp), intent(inout) :: sines(MOST_WAVES), versines(MOST_WAVES)
     real(dp), intent(out) :: s(3)

@@ -1,6 +1,6 @@
 module scaled_motion
-  !! Unknowns scaled so that every product has the coefficient 1 or -1, and the integral of the
-  !! torque in them; waves that are fast and weak are averaged, to second order.
+  !! Scaled unknowns in which every product has the coefficient 1 or -1, and the integral of the
+  !! torque in these unknowns. Waves that are fast and weak are averaged, to second order.
   use, intrinsic :: iso_fortran_env, only: int64
   use two_words, only: sine_cosine_of
   use kinds, only: dp
@@ -10,28 +10,28 @@ module scaled_motion
   private
 
   integer, parameter, public :: MOST_WAVES = 8
-  real(dp), parameter :: FAST = 8.0_dp       ! frequency of a wave over the rate of the motion
-  real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that counts
-  real(dp), parameter :: SLOW = 1e-8_dp      ! rad; a wave that turns less is a line to rounding
-  real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! of Simpson's rule, times radians**4
+  real(dp), parameter :: FAST = 8.0_dp       ! frequency of a fast wave over rate of the motion
+  real(dp), parameter :: RESOLVED_STEPS = 0.7_dp ! for a radian of a wave that is resolved
+  real(dp), parameter :: SLOW = 1e-8_dp      ! rad; a wave of a smaller angle is linear to rounding
+  real(dp), parameter :: WAVE_ERROR = 1.0_dp/2880.0_dp ! error of Simpson's rule over radians**4
 
-  ! An exponent beyond which no amplification says more.
+  ! A larger exponent of an amplification would have no further meaning.
   real(dp), parameter :: MOST_EXPONENT = 300.0_dp
   real(dp), parameter :: LOG2_E = 1.4426951_dp
 
   type, public :: motion_t
-    real(dp) :: scale(3)     ! angular velocity is scale times unknown, rad/s
-    real(dp) :: slope(3)     ! constant torque in the unknowns, 1/s
-    real(dp) :: climb(3)     ! rate of the torque, 1/s2
-    integer :: waves         ! all of them
-    integer :: resolved      ! the first so many; the others are averaged
+    real(dp) :: scale(3)     ! angular velocity (rad/s) is scale times unknown (1/s)
+    real(dp) :: slope(3)     ! constant torque in the unknowns, 1/s2
+    real(dp) :: climb(3)     ! rate of the torque in the unknowns, 1/s3
+    integer :: waves         ! number of waves
+    integer :: resolved      ! the first waves, which are resolved; the others are averaged
     real(dp) :: frequency(MOST_WAVES)    ! rad/s
-    real(dp) :: on_sine(3, MOST_WAVES)   ! integral of the wave: these times sine
-    real(dp) :: on_versine(3, MOST_WAVES) ! and these times 1 - cosine
-    real(dp) :: mean(3)      ! of the waves that are averaged, in the unknowns
-    real(dp) :: push(3)      ! mean of their products, 1/s2
-    real(dp) :: sign_2       ! of the second product: -1 for a body
-    integer :: axes(3)       ! of the body
+    real(dp) :: on_sine(3, MOST_WAVES)   ! the integral of the wave is this times sine
+    real(dp) :: on_versine(3, MOST_WAVES) ! plus this times 1 - cosine
+    real(dp) :: mean(3)      ! mean of the averaged waves' integral, 1/s
+    real(dp) :: push(3)      ! mean of the products of these integrals, 1/s2
+    real(dp) :: sign_2       ! sign of the second product: -1 for a body
+    integer :: axes(3)       ! axis of the body for each unknown
   end type motion_t
 
   public :: amplification, average, integral, reach_of, scaled, steps_for_waves, turned, versine
@@ -39,17 +39,17 @@ module scaled_motion
 contains
 
   pure subroutine scaled(problem, t_end, motion, status)
-    !! Unknowns in which every product has the coefficient 1 or -1, and -1 only the second.
-    type(problem_t), intent(in) :: problem !! of no more than MOST_WAVES waves
+    !! Compute the unknowns in which all products have the coefficient 1, or -1 for the second one.
+    type(problem_t), intent(in) :: problem !! with at most MOST_WAVES waves
     real(dp), intent(in) :: t_end    !! s
     type(motion_t), intent(out) :: motion
     integer, intent(out) :: status
     real(dp) :: c(3), root(3)
-    real(dp) :: turned       ! -1 where all signs are turned by turning the third axis
+    real(dp) :: turned       ! -1: the third axis is reversed, which changes all signs
     integer :: i
 
     status = REFUSED
-    ! The axis whose sign stands alone becomes the second.
+    ! The axis with the odd sign becomes the second.
     motion%axes = [3, 1, 2]
     c = problem%coefficients
     if (c(1)*c(2) > 0.0_dp) motion%axes = [2, 3, 1]
@@ -78,7 +78,7 @@ contains
   end subroutine scaled
 
   pure subroutine add_wave(wave, is_cosine, t_end, motion)
-    !! The integral of one more wave; waves of one frequency share their sine and versine.
+    !! Add the integral of one more wave. Waves of one frequency share their sine and versine.
     real(dp), intent(in) :: wave(4)       !! amplitude (3), 1/s2; frequency, rad/s
     logical, intent(in) :: is_cosine
     real(dp), intent(in) :: t_end         !! s
@@ -114,16 +114,16 @@ contains
   end subroutine add_wave
 
   pure subroutine average(motion, rate, t_end, faint, left_out)
-    !! Take the waves that are fast and weak out of the products, but for their means and for the
-    !! turn that they give the motion forth and back (`turned`): what is left is of second order.
+    !! Take waves that are fast and weak out of the products, except for their means and for the
+    !! oscillation that they cause (`turned`). The error that remains is of second order.
     type(motion_t), intent(inout) :: motion
-    real(dp), intent(in) :: rate         !! 1/s
+    real(dp), intent(in) :: rate         !! largest rate of the motion, 1/s
     real(dp), intent(in) :: t_end        !! s
-    real(dp), intent(in) :: faint        !! error allowed, rad/s
-    real(dp), intent(out) :: left_out    !! error, in the unknowns
-    real(dp) :: largest                  ! scale
-    real(dp) :: change                   ! of the unknowns, 1/s2
-    real(dp) :: f                        ! rad/s
+    real(dp), intent(in) :: faint        !! allowed error, rad/s
+    real(dp), intent(out) :: left_out    !! error of averaging, in the unknowns
+    real(dp) :: largest                  ! largest scale
+    real(dp) :: change                   ! rate of change of the unknowns, 1/s2
+    real(dp) :: f                        ! frequency, rad/s
     real(dp) :: size, error
     integer :: n, k
 
@@ -138,7 +138,7 @@ contains
       size = size_of(motion, n)
       error = left_out + 2.0_dp*(size/f)*(change/f + size + 2.0_dp*rate*abs(t_end)*size)
       do k = 1, motion%waves
-        ! Two waves together make a slow one.
+        ! Two waves together contain their difference frequency, which may be slow.
         if (k /= n) error = error + 4.0_dp*size*size_of(motion, k) &
                             *min(abs(t_end), 1.0_dp/abs(f - abs(motion%frequency(k))))
       end do
@@ -155,7 +155,7 @@ contains
   end subroutine average
 
   pure subroutine swap(motion, n, k)
-    !! Two waves change places.
+    !! Exchange two waves.
     type(motion_t), intent(inout) :: motion
     integer, intent(in) :: n, k
 
@@ -166,7 +166,7 @@ contains
   end subroutine swap
 
   pure function turned(motion, y, t) result(change)
-    !! What the waves that are averaged do to the unknowns by their integral, forth and back.
+    !! Compute the oscillation of the unknowns that the averaged waves cause through their integral.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: y(3)         !! unknowns
     real(dp), intent(in) :: t            !! s
@@ -187,11 +187,11 @@ contains
   end function turned
 
   pure real(dp) function steps_for_waves(motion, t_end, aim)
-    !! Waves that are not averaged have to be resolved.
+    !! Return the number of steps that resolve the waves that are not averaged.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t_end        !! s
-    real(dp), intent(in) :: aim          !! relative
-    real(dp) :: wave         ! what it adds to the unknowns, times time
+    real(dp), intent(in) :: aim          !! target error, relative
+    real(dp) :: wave         ! amplitude in the unknowns, times the time
     integer :: n
 
     steps_for_waves = 0.0_dp
@@ -203,7 +203,7 @@ contains
   end function steps_for_waves
 
   pure real(dp) function size_of(motion, n)
-    !! Of the integral of wave n, 1/s.
+    !! Return the size of the integral of wave n, 1/s.
     type(motion_t), intent(in) :: motion
     integer, intent(in) :: n
 
@@ -211,7 +211,7 @@ contains
   end function size_of
 
   pure real(dp) function reach_of(motion, n, t_end)
-    !! The most that the integral of wave n can be until t_end, 1/s.
+    !! Return the largest value that the integral of wave n can reach until t_end, 1/s.
     type(motion_t), intent(in) :: motion
     integer, intent(in) :: n
     real(dp), intent(in) :: t_end        !! s
@@ -223,48 +223,48 @@ contains
   end function reach_of
 
   pure subroutine amplification(motion, t_end, spread, top, exponent, bound)
-    !! A bound of the norm of the state-transition matrix of omega from any time to any later one.
-    !! In these unknowns of a body the Jacobian [0 z y; -z 0 -x; y x 0] has the symmetric part
-    !! [0 0 y; 0 0 0; y 0 0], so that its logarithmic norm (Dahlquist 1958) is |y|: the norm of the
-    !! matrix is at most the exponential of the integral of |y| over time.
+    !! Compute a bound of the norm of the state-transition matrix of omega from any time to any
+    !! later one. In these unknowns of a body the Jacobian [0 z y; -z 0 -x; y x 0] has the symmetric
+    !! part [0 0 y; 0 0 0; y 0 0]. Its logarithmic norm (Dahlquist 1958) is therefore |y|, and the
+    !! norm of the matrix is at most the exponential of the integral of |y| over time.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t_end        !! s
     real(dp), intent(in) :: spread       !! integral of the second unknown's size over time
-    real(dp), intent(in) :: top(3)       !! largest size of the unknowns
+    real(dp), intent(in) :: top(3)       !! largest size of each unknown, 1/s
     real(dp), intent(out) :: exponent    !! integral of the logarithmic norm over time
-    real(dp), intent(out) :: bound       !! in rad/s for rad/s
-    real(dp) :: size(3)                  ! of the scales, rad/s
+    real(dp), intent(out) :: bound       !! bound of the norm, for omega in rad/s
+    real(dp) :: size(3)                  ! sizes of the scales
     integer :: n
 
     exponent = spread
-    ! Where all three signs are alike the matrix is symmetric: its largest row is a bound.
+    ! If all three signs are alike the matrix is symmetric, and its largest row sum is a bound.
     if (motion%sign_2 > 0.0_dp) exponent = abs(t_end)*(sum(top) - minval(top))
     do n = motion%resolved + 1, motion%waves
       exponent = exponent + 2.0_dp*abs(t_end)*size_of(motion, n)
     end do
     exponent = min(MOST_EXPONENT, exponent)
     size = abs(motion%scale)
-    ! A power of two no less than the exponential, from its bits, costs no call.
+    ! A power of two no less than the exponential, formed from its bits, costs no call.
     bound = transfer(ishft(1024_int64 + int(LOG2_E*exponent, int64), 52), bound) &
             *(max(size(1), size(2), size(3))/min(size(1), size(2), size(3)))
   end subroutine amplification
 
   pure elemental real(dp) function versine(angle)
-    !! 1 - cosine, which would have no digit of it where the angle is small.
+    !! Return 1 - cosine by a formula that keeps its digits for a small angle.
     real(dp), intent(in) :: angle        !! rad
-    real(dp) :: sine                     ! of half the angle
+    real(dp) :: sine                     ! sine of half the angle
 
     sine = sin(0.5_dp*angle)
     versine = 2.0_dp*sine*sine
   end function versine
 
   pure subroutine wave_at(frequency, t, sine, vers)
-    !! Sine and versine of frequency t, with what the rounding of the product left out: a fast wave
-    !! that is averaged may have turned by any number of radians.
+    !! Compute sine and versine of frequency times t, with the rounding error of the product: the
+    !! angle of a fast wave that is averaged may be any number of radians.
     real(dp), intent(in) :: frequency    !! rad/s
     real(dp), intent(in) :: t            !! s
     real(dp), intent(out) :: sine, vers
-    real(dp) :: s                        ! of half the angle
+    real(dp) :: s                        ! sine of half the angle
     real(dp) :: c
 
     call sine_cosine_of(frequency, 0.5_dp*t, 0.0_dp, s, c)
@@ -273,7 +273,7 @@ contains
   end subroutine wave_at
 
   pure function integral(motion, t) result(s)
-    !! The whole torque's integral from 0 to t, in the unknowns.
+    !! Compute the integral of the whole torque from 0 to t, in the unknowns.
     type(motion_t), intent(in) :: motion
     real(dp), intent(in) :: t
     real(dp) :: s(3)
@@ -288,7 +288,7 @@ contains
   end function integral
 
   pure function slopes(x, sign_2) result(f)
-    !! Products of the unknowns.
+    !! Compute the products of the unknowns.
     real(dp), intent(in) :: x(3)
     real(dp), intent(in) :: sign_2
     real(dp) :: f(3)

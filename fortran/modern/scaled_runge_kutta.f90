@@ -1,6 +1,7 @@
 module scaled_runge_kutta
-  !! Classical Runge-Kutta (eq. 31) for few digits: unknowns scaled so that a slope is one fused
-  !! multiply-add, waves of the torque integrated exactly, equal steps of three lengths at once.
+  !! Classical Runge-Kutta (eq. 31) for few digits. The unknowns are scaled so that a slope is one
+  !! fused multiply-add. The waves of the torque are integrated exactly. Equal steps of three
+  !! lengths are taken at once.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
@@ -15,36 +16,40 @@ module scaled_runge_kutta
 
   real(dp), parameter :: LEAST_STEPS = 2.0_dp
   real(dp), parameter :: MOST_STEPS = 2e6_dp
-  real(dp), parameter :: COUNTABLE = 2e9_dp  ! steps
-  ! Beyond so many times the steps planned, the motion makes more of rounding than is allowed.
+  real(dp), parameter :: COUNTABLE = 2e9_dp  ! steps: more cannot be counted
+  ! If more than this multiple of the planned steps is needed, the motion amplifies rounding errors
+  ! too much.
   real(dp), parameter :: MOST_TIMES = 12.0_dp
-  ! Error after time T: about FIRST_GUESS (rate h)**4 rate T; from the cases.
+  ! The error after time T is about FIRST_GUESS (rate h)**4 rate T. The factor comes from the cases.
   real(dp), parameter :: FIRST_GUESS = 0.0022_dp
-  real(dp), parameter :: LONGEST = 1e40_dp ! rad; far beyond what MOST_STEPS can go
-  real(dp), parameter :: COARSEST = 0.004_dp ! aim for which steps are so long that they say little
-  real(dp), parameter :: FARTHEST = 0.15_dp  ! gap of the longest steps, relative
-  real(dp), parameter :: SHARE = 0.35_dp     ! of the tolerance: two gaps may be small by chance
-  ! Start of the longer steps, in errors of averaging; along no axis of growth.
+  real(dp), parameter :: LONGEST = 1e40_dp ! rad; far more than MOST_STEPS can cover
+  real(dp), parameter :: COARSEST = 0.004_dp ! for coarser targets, steps would be too long to judge
+  real(dp), parameter :: FARTHEST = 0.15_dp  ! largest gap of the longest steps, relative
+  real(dp), parameter :: SHARE = 0.35_dp     ! target over tolerance: gaps may be small by chance
+  ! Offset of the start of the longer steps, in errors of averaging; along no axis of amplification.
   real(dp), parameter :: ASIDE(3) = [1.0_dp, -0.6_dp, 0.3_dp]
-  ! Against the series, in steps of this method for a radian of motion: so many, and so many more
-  ! for each binary digit: measured in Cases 5 to 7, and in random scenes.
+  ! Cost of the series, in steps of this method per radian of the motion: a constant part, and a
+  ! part for each binary digit. Measured in Cases 5 to 7 and in random scenes.
   real(dp), parameter :: SERIES_STEPS = 1.9_dp
   real(dp), parameter :: SERIES_STEPS_A_BIT = 0.25_dp
-  real(dp), parameter :: WAVE_RADIAN = 0.4_dp ! of a wave, in radians of motion, to the series
-  real(dp), parameter :: VARYING = 1.5_dp    ! cost of a step under a torque of time
-  real(dp), parameter :: A_WAVE = 0.9_dp     ! and of each wave in it
-  real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging, of the aim
+  real(dp), parameter :: WAVE_RADIAN = 0.4_dp ! cost of a wave's radian to the series, in radians
+  real(dp), parameter :: VARYING = 1.5_dp    ! cost of a step under varying torque
+  real(dp), parameter :: A_WAVE = 0.9_dp     ! cost of each wave in such a step
+  real(dp), parameter :: WEAK = 0.5_dp       ! error of averaging over the target
 
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  ! Roundings of a wave, which is turned from half step to half step, some hundred times until it is
-  ! made afresh.
+  ! Rounding errors of a wave, which is advanced from half step to half step some hundred times
+  ! until it is recomputed.
   real(dp), parameter :: OF_WAVES = 32.0_dp
-  ! Amplified rounding, in tolerances, up to which the series would say complete too: it says
-  ! sensitive from 0.3 on, and the bound of the amplification is from steps of a few digits.
+  ! Largest amplified rounding error, in tolerances, for which the series would report complete too.
+  ! The series reports sensitive from 0.3 on, and the bound of the amplification comes from steps of
+  ! few digits.
   real(dp), parameter :: CERTAIN = 0.1_dp
-  ! A spin of which the second unknown is so large a part of the first radians keeps it.
+  ! The integral of the second unknown is expected to be at least this part of its initial value
+  ! times the time.
   real(dp), parameter :: KEPT = 0.6_dp
-  real(dp), parameter :: BITS_KEPT = 51.0_dp ! of amplified rounding: those of 2**-53 and of CERTAIN
+  real(dp), parameter :: BITS_KEPT = 51.0_dp ! limit of the bits of target and amplification,
+  ! from 2**-53 and CERTAIN
   real(dp), parameter :: LOG_2 = 0.6931_dp
 
   public :: quick_solve
@@ -54,47 +59,47 @@ contains
   subroutine quick_solve(problem_at, omega, tolerance, effort, t_end, contest, result, status, &
                          steps, error) &
     bind(c, name="quick_solve_level")
-    !! Angular velocity at `t_end`.
-    type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
+    !! Compute the angular velocity at `t_end`.
+    type(c_ptr), intent(in), value :: problem_at        !! address of a problem_t, passed through C
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! relative
-    real(c_double), intent(in) :: effort                !! factor on the steps allowed
+    real(c_double), intent(in) :: effort                !! factor on the work limit
     real(c_double), intent(in) :: t_end                 !! s
-    !! not 0: REFUSED where a series is faster, or will have to be asked anyway
+    !! not 0: REFUSED if the series is faster, or will be needed anyway
     integer(c_int), intent(in), value :: contest
     real(c_double), intent(out) :: result(3)            !! rad/s
-    !! any but STOPPED; SENSITIVE where rounding may count: only a series can tell by how much
+    !! any but STOPPED; SENSITIVE if rounding may count: only the series can tell by how much
     integer(c_int), intent(out) :: status
-    integer(c_int), intent(out) :: steps                !! of the last try
-    !! estimated, relative, with amplified rounding where complete and without where sensitive
+    integer(c_int), intent(out) :: steps                !! of the last attempt
+    !! estimated relative error, with amplified rounding if complete and without if sensitive
     real(c_double), intent(out) :: error
     type(problem_t), pointer :: problem
     type(motion_t) :: motion
     logical :: varies
     real(dp) :: start(3), x(3)
-    real(dp) :: gaps(3, 2)   ! between steps of one length and of the next
-    real(dp) :: top(3)       ! largest unknowns
-    real(dp) :: rate         ! 1/s
-    real(dp) :: rate_0       ! the same at time 0
-    real(dp) :: turn_0       ! the whole way at the first rate, rad
-    real(dp) :: turn         ! the same at the last
-    real(dp) :: power_5      ! mean of the fifth power of the turn, whose rate grows with the torque
+    real(dp) :: gaps(3, 2)   ! differences of the results by steps of successive lengths
+    real(dp) :: top(3)       ! largest size of each unknown, 1/s
+    real(dp) :: rate         ! bound of the unknowns, 1/s
+    real(dp) :: rate_0       ! its value at time 0
+    real(dp) :: turn_0       ! rate_0 times the whole time, rad
+    real(dp) :: turn         ! rate times the whole time, rad
+    real(dp) :: power_5      ! mean of x**5 for x from turn_0 to turn
     real(dp) :: n_steps
-    real(dp) :: most         ! steps
-    real(dp) :: allowed      ! the same, whatever was planned
-    real(dp) :: aim          ! error, relative
-    real(dp) :: faint        ! what averaging may cost, rad/s
-    real(dp) :: left_out     ! what it costs, in the unknowns
-    real(dp) :: far          ! what the second gap says of the error
+    real(dp) :: most         ! number of steps allowed
+    real(dp) :: allowed      ! the same without regard to the plan
+    real(dp) :: aim          ! target error, relative
+    real(dp) :: faint        ! allowed error of averaging, rad/s
+    real(dp) :: left_out     ! error of averaging, in the unknowns
+    real(dp) :: far          ! weight of the second gap in the error
     real(dp) :: radians      ! of the motion and of the waves
     real(dp) :: cost         ! in steps under constant torque
-    real(dp) :: bits         ! of the tolerance
+    real(dp) :: bits         ! bits of the target error
     real(dp) :: spread       ! integral of the second unknown's size over time
     real(dp) :: exponent     ! integral of the logarithmic norm over time
     real(dp) :: bound        ! of the norm of the state-transition matrix
     real(dp) :: noise        ! bound of amplified rounding, relative
-    real(dp) :: blurred      ! by rounding of torques that cancel, relative
-    logical :: ended         ! by the user
+    real(dp) :: blurred      ! rounding error of torques that cancel, relative
+    logical :: ended         ! whether the user interrupted
     integer :: n
 
     aim = SHARE*tolerance
@@ -114,7 +119,7 @@ contains
     do n = 1, motion%waves
       rate = rate + reach_of(motion, n, t_end)
     end do
-    ! In radians, whose powers are numbers whatever the unit of time.
+    ! In radians, whose powers are in range in any unit of time.
     turn_0 = rate_0*abs(t_end)
     turn = rate*abs(t_end)
     status = GAVE_UP
@@ -162,7 +167,7 @@ contains
         status = INTERRUPTED
         return
       end if
-      ! Not by the error: a maximum passes over what is no number.
+      ! The gaps are tested, not the error: a maximum may lose a NaN.
       if (.not. sum(abs(gaps)) <= huge(error)) then
         status = merge(GAVE_UP, OVERFLOW, sum(abs(x)) <= huge(error))
         n_steps = 2.0_dp*n_steps
@@ -192,12 +197,12 @@ contains
       blurred = OF_WAVES*ROUNDING*torque_noise_of(problem, t_end, real(steps, dp), &
                                                   maxval(abs(top*motion%scale)))
     end if
-    ! Each step rounds omega; where perturbations grow alike from step to step, the last exponent's
-    ! worth of steps before a time make up for nearly all that has grown until then.
+    ! Each step rounds omega. If perturbations grow at the same rate from step to step, the steps in
+    ! the last 1/(1 + exponent) of the time contribute nearly all of the amplified rounding.
     call amplification(motion, t_end, spread, top, exponent, bound)
     noise = ROUNDING*(1.0_dp + 0.5_dp*real(steps, dp)/(1.0_dp + exponent))*bound
     if (.not. abs(t_end) > 0.0_dp) then
-      ! Nothing errs, not even by the units.
+      ! There is no error, not even by the change of units.
       result = omega
       noise = 0.0_dp
     end if

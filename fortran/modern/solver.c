@@ -1,8 +1,9 @@
-/* The call of a prepared solver, from the interpreter into the kernel with no Python between: the
-   arguments are looked at, not converted, and what is not plainly right goes to a check in Python.
+/* The call of a prepared solver, from the interpreter into the kernel with no Python code between.
+   Arguments are inspected, not converted; those that are not plainly valid go to a check in Python.
 
-   The kernel is f2py's: its address comes from there, so that no Fortran is linked twice. It only
-   reads the packed array, and writes into this call's own stack; so threads may share a solver. */
+   The kernel is f2py's. Its address comes from f2py's module, so that no Fortran is linked twice.
+   The kernel only reads the packed array and writes to the stack of this call, so threads may share
+   a solver. */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <stddef.h>
@@ -11,20 +12,22 @@
 #define NPY_TARGET_VERSION NPY_2_0_API_VERSION
 #include <numpy/arrayobject.h>
 
-/* solve_packed of api.f90, of three numbers; or solve_packed_attitude, of seven. */
+/* The type of solve_packed in api.f90, for three numbers; or of solve_packed_attitude, for
+   seven. */
 typedef void kernel(const double *packed, const int *n_packed, const double *start,
                     const double *t_end, double *state, int *status, int64_t *steps,
                     double *found);
 
-enum { OMEGA = 3, ATTITUDE = 4, MOST = OMEGA + ATTITUDE }; /* numbers of each */
+enum { OMEGA = 3, ATTITUDE = 4, MOST = OMEGA + ATTITUDE }; /* numbers in each */
 
-/* How a thread's last call ended, and what it was: what a closed form did to rounding is worked out
-   when it is asked for. A thread's number is never given again, as its address is. */
+/* The outcome of a thread's last call, and its arguments: the amplification over a closed form is
+   computed only when it is requested. A thread's number is never used again, but its address may
+   be. */
 typedef struct {
   uint64_t thread;
   int status;
   int64_t steps;
-  double found[2]; /* estimated error and growth, below 0 where unknown */
+  double found[2]; /* estimated error and amplification; negative: unknown */
   double start[3];
   double time;
 } ending;
@@ -32,26 +35,28 @@ typedef struct {
 typedef struct {
   PyObject_HEAD
   vectorcallfunc vectorcall;
-  PyObject *callable;    /* the kernel as Python has it */
-  kernel *address;       /* NULL where it is not f2py's: then it is called as Python would */
+  PyObject *callable;    /* the kernel as a Python object */
+  kernel *address;       /* NULL if the kernel is not f2py's; it is then called through Python */
   PyArrayObject *packed; /* read-only */
-  /* The same, or NULL: for calls shorter than releasing the GIL and waiting for it again. */
+  /* The same scene for the closed form alone, or NULL. This call keeps the GIL, as it is shorter
+     than releasing the GIL and waiting for it again. */
   PyArrayObject *packed_with_gil;
-  PyObject *check;       /* (omega0, t_end, third) -> (a start's floats, float), or its InputError */
-  int width;             /* numbers of a start: OMEGA, or MOST */
-  double attitude[ATTITUDE]; /* at time 0, where a call gives none */
+  PyObject *check;       /* (omega0, t_end, third) -> (floats of a start, float), or InputError */
+  int width;             /* numbers in a start: OMEGA or MOST */
+  double attitude[ATTITUDE]; /* at time 0, for a call that specifies none */
   ending *endings;
   Py_ssize_t n_endings;
   Py_ssize_t room;
-  Py_ssize_t latest; /* where the last call's ending is */
+  Py_ssize_t latest; /* index of the last call's ending */
 } bound_kernel;
 
-enum { COMPLETE = 0 }; /* of the statuses */
+enum { COMPLETE = 0 }; /* one of the statuses */
 
-/* How far the square of a length of 1 may be off: nothing is divided by such a length. */
+/* Largest deviation of a squared norm from 1 with which a quaternion is used without
+   normalisation. */
 #define ROUNDED 0x1p-51
 
-static PyObject *out_name; /* interned, as the compiler's names of keywords are */
+static PyObject *out_name; /* interned, like the compiler's names of keywords */
 static npy_intp three[1] = {OMEGA}, four[1] = {ATTITUDE};
 
 /* ---- Endings ------------------------------------------------------------------------------ */
@@ -79,8 +84,8 @@ static int is_running(uint64_t thread)
   return 0;
 }
 
-/* Give a thread a place. Those of threads that are gone are taken first, so that there are never
-   more than four times as many places as there were threads at once. */
+/* Add an entry for a thread. Entries of threads that have ended are removed first, so that there
+   are never more than four times as many entries as there were threads at once. */
 static ending *add_ending(bound_kernel *self, uint64_t thread)
 {
   if (self->n_endings == self->room) {
@@ -122,7 +127,7 @@ typedef struct {
   PyObject *third; /* out or attitude0; or None */
 } arguments;
 
-/* Put what was given into its place by position and name, as its signature says. */
+/* Store each argument in its place, by position or name, as the solver's signature says. */
 static int sort_arguments(arguments *found, int width, PyObject *const *given, Py_ssize_t count,
                           PyObject *names)
 {
@@ -170,7 +175,7 @@ static inline int is_of(int count, PyArrayObject *array)
   return PyArray_NDIM(array) == 1 && PyArray_DIM(array, 0) == count;
 }
 
-/* NumPy's numbers that are all in the range of a double: no longdouble, no time span. */
+/* Whether a NumPy number is in the range of a double: longdouble and timedelta64 are excluded. */
 static int is_narrow(PyObject *object)
 {
   return PyArray_IsScalar(object, Floating)  ? !PyArray_IsScalar(object, LongDouble)
@@ -197,7 +202,7 @@ static inline int read_number(PyObject *object, double *number)
   return 0;
 }
 
-/* Read an array of another kind of numbers, or of bytes that lie otherwise. */
+/* Read an array of another type of number, or with another layout of its bytes. */
 static int read_converted(PyArrayObject *array, int count, double *numbers)
 {
   const int type = PyArray_TYPE(array);
@@ -215,7 +220,7 @@ static int read_converted(PyArrayObject *array, int count, double *numbers)
   return 1;
 }
 
-/* Read so many numbers, if that is plainly what it is; an array's stride may be any. */
+/* Read `count` numbers, if the object plainly has them; an array may have any stride. */
 static inline int read_numbers(PyObject *object, int count, double *numbers)
 {
   if (PyArray_CheckExact(object)) {
@@ -244,7 +249,7 @@ static inline int read_numbers(PyObject *object, int count, double *numbers)
   return 0;
 }
 
-/* Read an attitude that need not be divided by its length. */
+/* Read an attitude that needs no normalisation. */
 static inline int read_unit(PyObject *object, double *q)
 {
   if (!read_numbers(object, ATTITUDE, q)) return 0;
@@ -259,7 +264,7 @@ static inline int is_buffer(PyObject *object)
          PyArray_ISCARRAY(array);
 }
 
-/* Read the third argument: out is looked at, an attitude is read behind omega. */
+/* Read the third argument: check `out`, or store an attitude after omega. */
 static inline int read_third(const bound_kernel *self, PyObject *third, double *start)
 {
   if (self->width == OMEGA) return third == Py_None || is_buffer(third);
@@ -268,7 +273,7 @@ static inline int read_third(const bound_kernel *self, PyObject *third, double *
   return 1;
 }
 
-/* Let Python say what is wrong, or convert what is not. */
+/* Let the check in Python raise an error, or convert the arguments. */
 static int read_slowly(bound_kernel *self, const arguments *given, double *start, double *time)
 {
   PyObject *found =
@@ -285,7 +290,7 @@ static int read_slowly(bound_kernel *self, const arguments *given, double *start
 
 /* ---- The call ----------------------------------------------------------------------------- */
 
-/* Copy numbers that a kernel of another kind returned. */
+/* Copy numbers that a kernel other than f2py's returned. */
 static int copy_numbers(PyObject *values, npy_intp count, double *numbers)
 {
   PyArrayObject *array =
@@ -298,7 +303,7 @@ static int copy_numbers(PyObject *values, npy_intp count, double *numbers)
   return is_right;
 }
 
-/* Enter a kernel of another kind, one that stands in f2py's place. */
+/* Call a kernel other than f2py's, which is a Python callable. */
 static int call_object(bound_kernel *self, const double *start, double *state, ending *now)
 {
   int is_right = 0;
@@ -378,7 +383,7 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
       PyEval_SaveThread();
       enter(self, self->packed, start, state, &now);
       PyEval_RestoreThread(thread);
-      /* Ctrl-C, which a kernel asks about now and then, ends it with this set. */
+      /* A kernel polls for Ctrl-C, which ends it and sets this error. */
       if (PyErr_Occurred()) return NULL;
     }
     now.thread = PyThreadState_GetID(thread);
@@ -400,9 +405,9 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
 
 /* ---- The type ----------------------------------------------------------------------------- */
 
-static PyTypeObject bound_attitude_kernel_type; /* as bound_kernel_type, of seven numbers */
+static PyTypeObject bound_attitude_kernel_type; /* as bound_kernel_type, for seven numbers */
 
-/* A packed array of a solver's own; NULL with an error set where it is none. */
+/* Return a solver's own copy of a packed array, or NULL with an error set if it is invalid. */
 static PyArrayObject *own_packed(PyObject *packed)
 {
   PyArrayObject *own = (PyArrayObject *)PyArray_FROM_OTF(packed, NPY_DOUBLE,
@@ -455,7 +460,7 @@ failed:
   return NULL;
 }
 
-/* Before Python 3.12 a class does not inherit the quick call, though it may: nothing in it is
+/* Before Python 3.12 a class does not inherit the fast call, although it could: nothing in it is
    overridden. */
 static PyObject *init_subclass(PyObject *class, PyObject *Py_UNUSED(unused))
 {

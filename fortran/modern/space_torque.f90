@@ -1,9 +1,9 @@
 module space_torque
   !! Torque about the axes of space: a joint Taylor series of omega and the attitude q,
-  !! omega' = (A w2 w3, ...) + (R(q)**T N(t))/I, q' = q (0, omega)/2. Two integrations, the second
-  !! with a finer local tolerance: their difference is the error of the first, and the rows of the
-  !! second are the result. The omega of the first is perturbed by a rounding in each step, so that
-  !! their difference has the amplification of rounding errors as well.
+  !! omega' = (A w2 w3, ...) + (R(q)**T N(t))/I, q' = q (0, omega)/2. There are two integrations,
+  !! the second with a smaller local tolerance. Their difference is the error of the first, and the
+  !! rows of the second are the result. The omega of the first is perturbed by a rounding in each
+  !! step, so that the difference contains the amplification of rounding errors as well.
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -17,34 +17,36 @@ module space_torque
   private
 
   integer, parameter :: MOST_TRIES = 60
-  real(dp), parameter :: FINER = 1e-2_dp        ! the local tolerance of the next march
-  real(dp), parameter :: SAFETY = 0.1_dp        ! where one had to be still finer
-  ! In tolerances: two integrations with errors above the tolerance may agree to so much by chance,
-  ! one in some thousand does; three do not.
+  real(dp), parameter :: FINER = 1e-2_dp        ! next local tolerance over this one
+  real(dp), parameter :: SAFETY = 0.1_dp        ! the same where it must be still smaller
+  ! In tolerances. Two integrations with errors above the tolerance may agree to this by chance,
+  ! which one in some thousand does; three do not.
   real(dp), parameter :: TRUSTED = 0.1_dp
-  real(dp), parameter :: MARGIN = 1.5_dp        ! of a difference that is the error itself
-  real(dp), parameter :: ONE_SAMPLE = 4.0_dp    ! another may be so much larger
-  ! Of the largest omega, in turn about every axis: the perturbation of every other integration.
+  real(dp), parameter :: MARGIN = 1.5_dp        ! on a difference that is the error itself
+  real(dp), parameter :: ONE_SAMPLE = 4.0_dp    ! another sample may be larger by this factor
+  ! The perturbation of every other integration, over the largest omega, about each axis in turn.
   real(dp), parameter :: PERTURBATION(3) = 2.0_dp**(-52)*[1.0_dp, -0.8_dp, 0.6_dp]
   real(dp), parameter :: SHORTER = 0.5_dp
-  real(dp), parameter :: MOST_STEPS = 8e6_dp    ! without waves; some ten seconds
-  real(dp), parameter :: A_WAVE = 0.2_dp        ! of a step
-  real(dp), parameter :: BETWEEN_LOOKS = 5e4_dp ! at the user, steps
+  real(dp), parameter :: MOST_STEPS = 8e6_dp    ! work limit without waves; some ten seconds
+  real(dp), parameter :: A_WAVE = 0.2_dp        ! cost of a wave, in steps
+  real(dp), parameter :: BETWEEN_LOOKS = 5e4_dp ! steps between polls for an interrupt
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
-  real(dp), parameter :: HOPELESS = 10.0_dp     ! times the steps allowed, of the first one's length
-  real(dp), parameter :: GROWING = 1.3_dp       ! power of time with which steps do, not by chance
+  ! If the first step forecasts more than this multiple of the steps allowed, the integration ends.
+  real(dp), parameter :: HOPELESS = 10.0_dp
+  ! If the steps increase with a larger power of time, this is not by chance.
+  real(dp), parameter :: GROWING = 1.3_dp
   real(dp), parameter :: COUNTABLE = 4e18_dp
-  real(dp), parameter :: MARCHES = 2.3_dp       ! of the first one's steps, in all
+  real(dp), parameter :: MARCHES = 2.3_dp       ! steps of all integrations over those of the first
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  real(dp), parameter :: NO_DIGIT = 1e100_dp    ! an error that says no more
+  real(dp), parameter :: NO_DIGIT = 1e100_dp    ! a relative error that leaves no digit
 
-  ! What a march came to.
+  ! The outcome of an integration.
   type :: outcome_t
     integer :: status
     integer :: n_rows
     integer(int64) :: steps
-    real(dp) :: scale  ! largest omega, rad/s
-    real(dp) :: ahead  ! steps to the end, as far as known; where it gave up
+    real(dp) :: scale  ! largest |omega|, rad/s
+    real(dp) :: ahead  ! estimated steps to the end, if the work limit is exceeded
   end type outcome_t
 
   public :: space_torque_solve
@@ -53,32 +55,32 @@ contains
 
   subroutine space_torque_solve(problem, ratios, omega, tolerance, effort, n_times, times, rows, &
                                 attitudes, n_rows, status, steps, needed, found)
-    !! Solution at `times`, which lead away from 0 on one side.
+    !! Compute the solution at `times`, which have one sign and are ordered away from 0.
     type(problem_t), intent(in) :: problem  !! torque over the largest moment, about axes of space
-    real(dp), intent(in) :: ratios(3)       !! the largest moment over each
+    real(dp), intent(in) :: ratios(3)       !! largest moment over each moment
     real(dp), intent(in) :: omega(3)        !! at time 0, rad/s
     real(dp), intent(in) :: tolerance       !! of omega, relative, and of the angle, rad
-    real(dp), intent(in) :: effort          !! factor on the steps allowed
+    real(dp), intent(in) :: effort          !! factor on the work limit
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)  !! s
     real(dp), intent(inout) :: rows(3, n_times) !! omega for n_rows times, rad/s
-    real(dp), intent(inout) :: attitudes(4, 0:n_times) !! the first is given
+    real(dp), intent(inout) :: attitudes(4, 0:n_times) !! column 0: the attitude at time 0
     integer, intent(out) :: n_rows
-    integer, intent(out) :: status          !! 0 complete, 2 overflow, 4 gave up, 5 interrupted, 6
-    integer(int64), intent(out) :: steps    !! of the last march
-    real(dp), intent(out) :: needed         !! effort, as far as known; where it gave up
-    real(dp), intent(out) :: found(3)       !! error; growth, unknown; steps of all integrations
+    integer, intent(out) :: status          !! COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED or SENSITIVE
+    integer(int64), intent(out) :: steps    !! of the last integration
+    real(dp), intent(out) :: needed         !! estimated effort, if the work limit is exceeded
+    real(dp), intent(out) :: found(3)       !! error; -1: amplification unknown; steps of all
     real(dp), allocatable :: before(:, :), before_q(:, :)
-    type(outcome_t) :: last, now ! the march before, and this one
-    real(dp) :: local_tolerance  ! of this integration: largest last terms, relative to the scale
+    type(outcome_t) :: last, now ! the integration before, and this one
+    real(dp) :: local_tolerance  ! of this integration: largest last terms, relative to scale
     real(dp) :: local_tolerance_before, next
-    real(dp) :: h             ! first guess of a step, s
+    real(dp) :: h             ! first estimate of a step, s
     real(dp) :: cost, most, spent
     real(dp) :: error
-    real(dp) :: blurred       ! by rounding of torques that cancel, relative
-    integer :: count          ! of integrations
+    real(dp) :: blurred       ! rounding error of torques that cancel, relative
+    integer :: count          ! number of integrations
     integer :: failed
-    logical :: is_perturbed   ! this integration
+    logical :: is_perturbed   ! whether this integration is perturbed
 
     n_rows = 0
     steps = 0
@@ -104,7 +106,7 @@ contains
     count = 0
     do
       is_perturbed = mod(count, 2) == 0
-      ! Integrations with the same local tolerance differ by their order.
+      ! Integrations with the same local tolerance have different orders.
       call march(problem, ratios, omega, is_perturbed, local_tolerance, &
                  order_for(local_tolerance) + 2*mod(count, 2), h, most - spent, &
                  1 + int(BETWEEN_LOOKS/cost, int64), times, rows, attitudes, now)
@@ -131,7 +133,7 @@ contains
     end do
     if (is_perturbed .and. count > 1 .and. now%status /= GAVE_UP &
         .and. now%status /= INTERRUPTED) then
-      ! The other one has the error that was found: all of it, not a hundredth.
+      ! The result is the other integration. Its error is the difference, not a hundredth of it.
       error = MARGIN*error
       now = last
       rows(:, :) = before
@@ -142,11 +144,11 @@ contains
     steps = now%steps
     blurred = 0.0_dp
     if (problem%n_sines + problem%n_cosines > 0) then
-      ! Any axis of the body may come to lie along the torque.
+      ! Any axis of the body may become parallel to the torque.
       blurred = ROUNDING*torque_noise_of(problem, times(n_times), real(steps, dp), &
                                          now%scale/maxval(ratios))
-      ! A torque that is wrong all the time changes omega in proportion to the time, and the
-      ! attitude by the integral of that.
+      ! A constant error of the torque changes omega in proportion to the time, and the attitude by
+      ! the integral of that.
       blurred = blurred*max(1.0_dp, 0.5_dp*now%scale*abs(times(n_times)))
     end if
     found(1) = error + (ROUNDING + blurred)
@@ -155,7 +157,7 @@ contains
     found(3) = spent
     if (status == COMPLETE .and. .not. error + blurred <= tolerance) then
       status = SENSITIVE
-      ! Of amplified rounding errors there is one sample.
+      ! Amplified rounding errors have been sampled only once.
       found(1) = ONE_SAMPLE*found(1)
     end if
     if (status == GAVE_UP) then
@@ -167,7 +169,7 @@ contains
 
   subroutine march(problem, ratios, omega, is_perturbed, local_tolerance, order, guess, &
                    most_steps, stride, times, rows, attitudes, found)
-    !! Once from 0 to the last of the times.
+    !! Integrate once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: ratios(3), omega(3)
     logical, intent(in) :: is_perturbed
@@ -175,19 +177,19 @@ contains
     integer, intent(in) :: order
     real(dp), intent(in) :: guess           !! of the first step, s
     real(dp), intent(in) :: most_steps
-    integer(int64), intent(in) :: stride    !! steps between looks at the user
+    integer(int64), intent(in) :: stride    !! steps between polls for an interrupt
     real(dp), intent(in) :: times(:)        !! s
     real(dp), intent(inout) :: rows(:, :)
     real(dp), intent(inout) :: attitudes(:, 0:)
     type(outcome_t), intent(out) :: found
     type(series_t) :: s
-    real(dp) :: y(7), y_low(7)  ! omega and q, and what their rounding left out
+    real(dp) :: y(7), y_low(7)  ! omega and q, and their rounding errors
     real(dp) :: change(7)       ! of y in a step
     real(dp) :: t, t_low, h, rest, factor, power
     logical :: at_end
     integer :: k, tries
-    integer(int64) :: next_look, half_way ! steps; the latter of those allowed
-    real(dp) :: t_half                    ! the time then, s
+    integer(int64) :: next_look, half_way ! steps; the latter: half of those allowed
+    real(dp) :: t_half                    ! the time after half_way steps, s
 
     y = [omega, attitudes(:, 0)]
     y_low = 0.0_dp
@@ -206,11 +208,11 @@ contains
       s%q(:, 0) = y(4:)
       call torque_terms(problem, t, t_low, h, order, s)
       call expand(problem, ratios, h, order, s)
-      ! What a body at rest is about to reach.
+      ! The scale of a body at rest is the omega that it is about to reach.
       if (found%steps == 0) found%scale = maxval(abs(s%w(:, :4)))
       factor = fitting(s, order, local_tolerance, found%scale)
       if (.not. factor > 0.0_dp) then
-        ! The terms are no numbers.
+        ! The terms are not finite.
         tries = tries + 1
         if (tries > MOST_TRIES) then
           found%status = OVERFLOW
@@ -222,7 +224,7 @@ contains
       at_end = factor*abs(h) >= abs(rest)
       if (found%steps == 0 .and. (factor < SHORTER .or. (factor >= LONGER .and. .not. at_end)) &
           .and. tries < MOST_TRIES) then
-        ! The first step is a guess, and what is about to be reached as good as that.
+        ! The first step is a guess, and so is the omega that a body at rest is about to reach.
         tries = tries + 1
         h = factor*h
         cycle
@@ -262,7 +264,8 @@ contains
                                                   int(min(COUNTABLE, most_steps), int64)))
         if (found%steps == half_way) t_half = t
         if (found%steps < half_way) next_look = min(next_look, half_way)
-        ! As many steps a second as so far, or more as the motion grows faster.
+        ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes
+        ! faster.
         power = 1.0_dp
         if (found%steps > half_way) then
           power = log(real(found%steps, dp)/real(half_way, dp))/log(t/t_half)
@@ -283,7 +286,7 @@ contains
   end subroutine march
 
   subroutine add_rows(s, order, t, t_low, h, at_end, y_low, times, rows, attitudes, found)
-    !! Rows within the step, but for the last of all.
+    !! Compute the rows within the step, except the last row of all.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: t, t_low, h     !! s
@@ -292,7 +295,7 @@ contains
     real(dp), intent(in) :: times(:)        !! s
     real(dp), intent(inout) :: rows(:, :)
     real(dp), intent(inout) :: attitudes(:, 0:)
-    type(outcome_t), intent(inout) :: found !! its rows and its status
+    type(outcome_t), intent(inout) :: found !! n_rows and status change
     real(dp) :: change(7), q(4)
     integer :: n, last
 
@@ -319,7 +322,7 @@ contains
   end subroutine add_rows
 
   pure subroutine add_change(change, y, y_low)
-    !! To the end of the step, with what rounding leaves out.
+    !! Advance y to the end of the step, with its rounding error.
     real(dp), intent(in) :: change(7)
     real(dp), intent(inout) :: y(7), y_low(7)
     integer :: i
@@ -330,7 +333,8 @@ contains
   end subroutine add_change
 
   pure real(dp) function difference(rows, others, scale, attitudes, other_attitudes)
-    !! The largest of two solutions, of omega over its largest and of the angle, rad.
+    !! Return the largest difference of two solutions: of omega over its largest, or of the angle,
+    !! rad.
     real(dp), intent(in) :: rows(:, :), others(:, :)           !! rad/s
     real(dp), intent(in) :: scale                              !! rad/s
     real(dp), intent(in) :: attitudes(:, :), other_attitudes(:, :)

@@ -1,5 +1,5 @@
 module space_torque_plan
-  !! What a march under a torque about the axes of space begins with: local tolerance, order, step.
+  !! Local tolerance, order and first step of an integration with a torque about the axes of space.
   use kinds, only: dp
   use problem, only: problem_t
   use space_torque_series, only: MOST_ORDER
@@ -14,11 +14,11 @@ module space_torque_plan
 contains
 
   pure subroutine plan(problem, ratios, omega, tolerance, time, local_tolerance, h)
-    !! The first local tolerance, and a guess of the first step, from the rates of the problem.
+    !! Choose the first local tolerance, and estimate the first step, from the rates of the problem.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: ratios(3), omega(3)
     real(dp), intent(in) :: tolerance
-    real(dp), intent(in) :: time    !! to go, s
+    real(dp), intent(in) :: time    !! time to go, s
     real(dp), intent(out) :: local_tolerance
     real(dp), intent(out) :: h      !! s
     real(dp) :: coupling, scale, push, gain, fastest, way
@@ -39,8 +39,9 @@ contains
     gain = gain*maxval(ratios)
     h = 0.5_dp/max(tiny(h), coupling*scale + sqrt(coupling)*sqrt(push) + fastest)
     h = sign(min(h, abs(time)), time)
-    ! An error of omega turns the body all the way. With these weights the first march errs by less
-    ! than the tolerance in all but a few of random scenes, by a hundredth in the median.
+    ! An error of omega rotates the body until the end. With these weights the error of the first
+    ! integration is below the tolerance in all but a few random scenes, and a hundredth of it in
+    ! the median.
     way = coupling*abs(time)*(0.3_dp*scale + 0.12_dp*gain)
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, &
                           tolerance/(0.8_dp + 0.1_dp*way + way*(way/140.0_dp)))
@@ -61,7 +62,7 @@ contains
   end subroutine add_wave
 
   pure integer function order_for(local_tolerance)
-    !! With the least work for the digits that are asked for (Jorba and Zou 2005).
+    !! Return the order with the least work for the requested digits (Jorba and Zou 2005).
     real(dp), intent(in) :: local_tolerance
 
     order_for = max(LEAST_ORDER, min(MOST_ORDER - 2, 1 + ceiling(-0.5_dp*log(local_tolerance))))

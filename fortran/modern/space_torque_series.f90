@@ -1,6 +1,6 @@
 module space_torque_series
   !! Terms of a Taylor series of omega and the attitude q under a torque about the axes of space. A
-  !! term holds the power of the step in it.
+  !! term includes its power of the step.
   use kinds, only: dp
   use problem, only: problem_t
   use two_words, only: sine_cosine_of
@@ -8,8 +8,8 @@ module space_torque_series
   private
 
   integer, parameter, public :: MOST_ORDER = 30
-  integer, parameter :: LOOKED_AT = 3 ! last terms: from rest a ramp makes every third one only
-  real(dp), parameter, public :: LONGER = 16.0_dp ! at the most, a step than what was tried
+  integer, parameter :: LOOKED_AT = 3 ! last terms checked: from rest a ramp makes only every third
+  real(dp), parameter, public :: LONGER = 16.0_dp ! largest factor on the step that was tried
 
   type, public :: series_t
     real(dp) :: w(3, 0:MOST_ORDER)      ! rad/s
@@ -23,7 +23,8 @@ module space_torque_series
 contains
 
   pure subroutine torque_terms(problem, t, t_low, h, order, s)
-    !! Terms of the torque around t: a sine's are a cosine's before it times the turn, and round.
+    !! Compute the terms of the torque around t. A term of a sine is the previous term of its cosine
+    !! times the angle of the step, and vice versa.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: t, t_low, h    !! s
     integer, intent(in) :: order
@@ -67,18 +68,18 @@ contains
   end subroutine add_wave_terms
 
   pure subroutine expand(problem, ratios, h, order, s)
-    !! Terms 1 to `order` of omega and q, by the products of series; those at 0 are given.
+    !! Compute terms 1 to `order` of omega and q, by products of series; terms 0 are inputs.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: ratios(3)
     real(dp), intent(in) :: h              !! s
     integer, intent(in) :: order
     type(series_t), intent(inout) :: s
     real(dp) :: products(3)                ! of equations 13-15, (rad/s)**2
-    real(dp) :: push(3)                    ! the torque about the axes of the body, 1/s2
-    real(dp) :: rates(4)                   ! of q, twice, 1/s
+    real(dp) :: push(3)                    ! torque about the axes of the body, 1/s2
+    real(dp) :: rates(4)                   ! twice the rate of q, 1/s
     integer :: j, k, last
 
-    ! A torque without waves is a constant and a slope.
+    ! A torque without waves has only terms 0 and 1.
     last = merge(order, 1, problem%n_sines + problem%n_cosines > 0)
     do k = 0, order - 1
       s%turned(:, k) = 0.0_dp
@@ -108,7 +109,7 @@ contains
   end subroutine expand
 
   pure subroutine add_product(n, q, total)
-    !! Hamilton's product (0, n) q.
+    !! Add Hamilton's product (0, n) q.
     real(dp), intent(in) :: n(3), q(4)
     real(dp), intent(inout) :: total(4)
 
@@ -119,12 +120,12 @@ contains
   end subroutine add_product
 
   pure real(dp) function fitting(s, order, local_tolerance, scale)
-    !! Factor on the step with which the last terms are as large as allowed; 0 where they are no
-    !! numbers.
+    !! Return the factor on the step with which the last terms would be as large as allowed; 0 if
+    !! they are not finite.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: local_tolerance
-    real(dp), intent(in) :: scale   !! largest omega, rad/s
+    real(dp), intent(in) :: scale   !! largest |omega|, rad/s
     real(dp) :: size
     integer :: k
 
@@ -140,7 +141,8 @@ contains
   end function fitting
 
   pure function evaluate(s, order, part) result(change)
-    !! Change of omega and q from the beginning of the step to a part of it.
+    !! Compute the change of omega and q from the beginning of the step to the fraction `part` of
+    !! it.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: part

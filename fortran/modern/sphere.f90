@@ -8,8 +8,8 @@ module sphere
   implicit none(type, external)
   private
 
-  real(dp), parameter :: MOST_TERMS = 2e8_dp ! at all times together, some ten seconds
-  integer, parameter :: BETWEEN_LOOKS = 300000 ! at the user; terms
+  real(dp), parameter :: MOST_TERMS = 2e8_dp ! work limit: terms at all times, some ten seconds
+  integer, parameter :: BETWEEN_LOOKS = 300000 ! terms between polls for an interrupt
 
   real(dp), parameter :: SMALL = 1e-280_dp
 
@@ -18,21 +18,21 @@ module sphere
 contains
 
   subroutine sphere_rows(problem, omega0, effort, n_times, times, rows, n_rows, status, needed)
-    !! Angular velocity of a sphere, or of any body with A = B = C = 0: omega0 and the integral
-    !! of the torque over the moment.
-    type(problem_t), intent(in) :: problem         !! whose coefficients are not looked at
+    !! Compute the angular velocity of a sphere, or of any body with A = B = C = 0: omega0 plus the
+    !! integral of the torque over the moment.
+    type(problem_t), intent(in) :: problem         !! its coefficients are not used
     real(dp), intent(in) :: omega0(3)              !! at time 0, rad/s
-    real(dp), intent(in) :: effort                 !! factor on the terms allowed
+    real(dp), intent(in) :: effort                 !! factor on the work limit
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)         !! s, in any order
     real(dp), intent(out) :: rows(3, n_times)      !! rad/s
-    integer, intent(out) :: n_rows                 !! rows that hold a result
+    integer, intent(out) :: n_rows                 !! number of rows that hold a result
     integer, intent(out) :: status                 !! COMPLETE, OVERFLOW, GAVE_UP or INTERRUPTED
-    real(dp), intent(out) :: needed                !! effort that the times ask for
+    real(dp), intent(out) :: needed                !! effort that the times require
     real(dp) :: total(3)
-    real(dp) :: rest(3)    ! what rounding took off the total
+    real(dp) :: rest(3)    ! rounding error of the total
     real(dp) :: t
-    real(dp) :: unseen     ! terms since the last look
+    real(dp) :: unseen     ! terms since the last poll
     integer :: i
 
     n_rows = 0
@@ -70,7 +70,7 @@ contains
   end subroutine sphere_rows
 
   pure subroutine add_waves(total, rest, n, waves, are_sines, t)
-    !! Add the integral of each wave: amplitude times t times a part.
+    !! Add the integral of each wave: amplitude times t times a factor.
     real(dp), intent(inout) :: total(3), rest(3)
     integer, intent(in) :: n
     real(dp), intent(in) :: waves(4, n)
@@ -84,7 +84,7 @@ contains
     do k = 1, n
       call half_angle(waves(4, k), t, sine, cosine, quotient)
       part = merge(sine, cosine, are_sines)*quotient
-      ! Where the factors alone would leave the range of numbers, in another order.
+      ! A small factor is not multiplied by t first, as the product might underflow.
       if (abs(t*part) >= SMALL) then
         call add(total, rest, waves(1:3, k), t*part)
       else
@@ -111,7 +111,7 @@ contains
   end subroutine add
 
   pure subroutine half_angle(frequency, t, sine, cosine, quotient)
-    !! Sine and cosine of frequency t/2, and the sine over it.
+    !! Compute sine and cosine of frequency t/2, and that sine over its angle.
     real(dp), intent(in) :: frequency, t
     real(dp), intent(out) :: sine, cosine, quotient
     real(dp) :: angle, angle_low

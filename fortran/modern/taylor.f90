@@ -1,5 +1,6 @@
 module taylor
-  !! Taylor series: marches from 0 to the last time, until one errs little enough or none can.
+  !! Taylor series: integrations from 0 to the last time, until the error of one is small enough or
+  !! cannot be reduced.
   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int
   use, intrinsic :: iso_c_binding, only: c_int64_t, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
@@ -13,23 +14,24 @@ module taylor
   implicit none(type, external)
   private
 
-  ! Without waves; some ten seconds. A wave costs A_WAVE of a step without any.
+  ! Work limit without waves: some ten seconds. A wave costs A_WAVE of a step without waves.
   real(dp), parameter :: MOST_STEPS = 1e7_dp
   real(dp), parameter :: A_WAVE = 0.5_dp
-  real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e5_dp ! at the user
+  real(dp), parameter :: STEPS_BETWEEN_LOOKS = 1e5_dp ! between polls for an interrupt
   real(dp), parameter :: FARTHEST_COUNT = 4e18_dp
-  real(dp), parameter :: ANOTHER = 2.2_dp ! marches in the cost of one
-  ! One march does for errors so large, in tolerances, and for differences that grow so much: else
-  ! errors may cancel in the one that is carried. Another one may err less by a factor.
+  real(dp), parameter :: ANOTHER = 2.2_dp ! cost of this and another integration over this one
+  ! One integration suffices if its error is at most TRUSTED tolerances and its amplification at
+  ! most PLANNED_GROWTH. Otherwise errors may cancel in the one that is propagated, and another
+  ! integration is planned with an error smaller by SAFETY.
   real(dp), parameter :: TRUSTED = 0.25_dp
-  real(dp), parameter :: DOUBTED = 256.0_dp ! growth at which an estimate is trusted half as much
+  real(dp), parameter :: DOUBTED = 256.0_dp ! amplification that halves the trust in an estimate
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
   real(dp), parameter :: SAFETY = 10.0_dp
-  real(dp), parameter :: CHOOSING = 1e15_dp ! growth with which rounding is no small difference
+  real(dp), parameter :: CHOOSING = 1e15_dp ! amplification that makes rounding errors large
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
-  real(dp), parameter :: UNSURE = 0.3_dp ! rounding times growth, in tolerances
-  integer, parameter :: FEW_WAVES = 16    ! that need no room of their own
-  integer(c_intptr_t), parameter :: ALIGNED = 64 ! bytes: no column across two lines of the cache
+  real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
+  integer, parameter :: FEW_WAVES = 16    ! waves that need no allocated array
+  integer(c_intptr_t), parameter :: ALIGNED = 64 ! bytes: no column crosses a cache line
 
   public :: taylor_solve
 
@@ -38,21 +40,21 @@ contains
   subroutine taylor_solve(problem_at, omega, tolerance, effort, n_times, times, rows, &
                           n_attitudes, attitudes, n_rows, status, steps, needed, found) &
     bind(c, name="taylor_solve_level")
-    !! Solution at `times`, which lead away from 0 on one side.
-    type(c_ptr), intent(in), value :: problem_at        !! a problem_t, through C
+    !! Compute the solution at `times`, which have one sign and are ordered away from 0.
+    type(c_ptr), intent(in), value :: problem_at        !! address of a problem_t, passed through C
     real(c_double), intent(in) :: omega(3)              !! at time 0, rad/s
     real(c_double), intent(in) :: tolerance             !! of the error at `times`, relative
-    real(c_double), intent(in) :: effort                !! factor on the steps allowed
+    real(c_double), intent(in) :: effort                !! factor on the work limit
     integer(c_int), intent(in), value :: n_times
     real(c_double), intent(in) :: times(n_times)        !! s
     real(c_double), intent(inout) :: rows(3, n_times)   !! omega for n_rows times, rad/s
     integer(c_int), intent(in), value :: n_attitudes    !! n_times, or 0
-    real(c_double), intent(inout) :: attitudes(4, 0:n_attitudes) !! the first is given
+    real(c_double), intent(inout) :: attitudes(4, 0:n_attitudes) !! column 0: at time 0
     integer(c_int), intent(out) :: n_rows
-    integer(c_int), intent(out) :: status !! 0 complete, 2 overflow, 4 gave up, 5 interrupted, 6
-    integer(c_int64_t), intent(out) :: steps            !! of the last march
-    real(c_double), intent(out) :: needed               !! effort, as far as known; where it gave up
-    real(c_double), intent(out) :: found(3) !! error, relative; growth; steps of all marches
+    integer(c_int), intent(out) :: status !! COMPLETE, OVERFLOW, GAVE_UP, INTERRUPTED or SENSITIVE
+    integer(c_int64_t), intent(out) :: steps            !! of the last integration
+    real(c_double), intent(out) :: needed               !! estimated effort, if above the work limit
+    real(c_double), intent(out) :: found(3) !! relative error; amplification; steps in total
     type(problem_t), pointer :: problem
     type(room_t), pointer :: room
     real(c_double), target :: place(storage_size(room)/64 + ALIGNED/8)
@@ -83,7 +85,7 @@ contains
 
   subroutine solve(problem, omega, tolerance, effort, n_times, times, n_waves, room, waves, rows, &
                    n_attitudes, attitudes, n_rows, status, steps, needed, found)
-    !! The same with room.
+    !! Compute the solution with working storage.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3), tolerance, effort
     integer, intent(in) :: n_times
@@ -98,16 +100,16 @@ contains
     integer(int64), intent(out) :: steps
     real(dp), intent(out) :: needed, found(3)
     type(outcome_t) :: outcome
-    real(dp) :: asked   ! tolerance of this march
-    real(dp) :: planned ! growth that it allows for
-    real(dp) :: cost    ! of a step, in steps without waves
-    real(dp) :: most    ! steps left
-    real(dp) :: spent   ! steps of the marches before
+    real(dp) :: asked   ! tolerance of this integration
+    real(dp) :: planned ! amplification that it allows for
+    real(dp) :: cost    ! cost of a step, in steps without waves
+    real(dp) :: most    ! steps allowed for all integrations
+    real(dp) :: spent   ! steps of all integrations so far
     real(dp) :: growth
-    real(dp) :: error    ! of this march, as far as it can be known, relative
+    real(dp) :: error    ! error of this integration, as far as it is known, relative
     real(dp) :: blurred  ! by rounding at the end, relative
-    logical :: again    ! the growth is known too coarsely
-    logical :: precise  ! this march knows it well
+    logical :: again    ! whether the amplification is known too coarsely
+    logical :: precise  ! whether this integration determines it well
 
     asked = tolerance
     planned = PLANNED_GROWTH
@@ -123,19 +125,21 @@ contains
                  room%now, room%attitude, waves, rows, n_attitudes, attitudes, &
                  outcome)
       spent = spent + real(outcome%steps, dp)
-      ! Rounding chose the way where a difference grew so much; at its end is another motion.
+      ! If a perturbation grew so much, rounding chose the trajectory, which ends in another motion.
       growth = outcome%growth
       if (outcome%largest > CHOOSING) growth = outcome%largest
       if (outcome%status /= COMPLETE) exit
       if (outcome%finest .and. (precise .or. growth <= planned)) exit
       again = growth > planned
       precise = precise .or. again
-      ! A few steps make most of the error where differences grow: theirs may be wrong by chance.
+      ! Where perturbations grow, a few steps cause most of the error; their estimates may be wrong
+      ! by chance.
       error = max(outcome%error, outcome%least)*(1.0_dp + min(growth, PLANNED_GROWTH)/DOUBTED)
-      ! Or the way is too long to measure it again.
+      ! Exit as well if a precise integration would take too many steps.
       if (precise .and. outcome%precise_steps > most - spent) exit
       if (again .and. ROUNDING*growth > UNSURE*tolerance) then
-        ! Before that is said: long steps may make much of a motion near the separatrix.
+        ! Before the result is called sensitive: long steps may overestimate the amplification near
+        ! the separatrix.
         asked = 0.0_dp
       else if (again .or. error > TRUSTED*tolerance) then
         asked = asked*min(1.0_dp, TRUSTED*tolerance/(SAFETY*max(error, ROUNDING**2)), &
@@ -148,7 +152,7 @@ contains
     n_rows = outcome%n_rows
     status = outcome%status
     steps = outcome%steps
-    ! The way is known as it is: it asks for no march that is more precise.
+    ! The factor for the attitude is known, and requires no precise integration.
     growth = growth*outcome%way
     blurred = ROUNDING*growth
     if (problem%n_sines + problem%n_cosines > 0) then
@@ -163,7 +167,7 @@ contains
     found = [error, growth, spent]
     if (status == COMPLETE .and. blurred > UNSURE*tolerance) status = SENSITIVE
     if (status == GAVE_UP) then
-      ! An error that is too large already will ask for another march, in shorter steps.
+      ! If the error is too large already, another integration with shorter steps will be needed.
       if (outcome%error > tolerance) outcome%ahead = ANOTHER*outcome%ahead
       needed = (spent - real(steps, dp) + outcome%ahead)*cost/MOST_STEPS
       steps = int(spent, int64)

@@ -1,6 +1,7 @@
 module taylor_attitude
-  !! Attitude beside omega: q' = q (0, omega)/2, q scalar first, from body to space. Its terms by a
-  !! recurrence like that of omega, its error as a small turn in space, taken off the rows.
+  !! Attitude beside omega: q' = q (0, omega)/2, with q scalar first, from body to space. Its terms
+  !! come from a recurrence like that of omega. Its error is a small rotation in space, which is
+  !! subtracted from the rows.
   use, intrinsic :: iso_c_binding, only: c_int
   use kinds, only: dp
   use series, only: MOST_ORDER
@@ -10,18 +11,19 @@ module taylor_attitude
   implicit none(type, external)
   private
 
-  ! Where an attitude stands.
+  ! The state of the attitude during an integration.
   type, public :: attitude_t
     real(dp) :: q(4)
-    real(dp) :: q_low(4)  !! what its rounding left out
-    real(dp) :: error(3)  !! half the turn, about axes of space, by which it errs
+    ! q: the attitude where the step begins, scalar first
+    real(dp) :: q_low(4)  !! rounding error of q
+    real(dp) :: error(3)  !! half the rotation, about axes of space, by which q is wrong
     real(dp) :: before(3) !! the same where the step began
     real(dp) :: ends(4, 2)  !! the attitude where the step began, and where it ended
-    ! What omega's error turns, and how that changes, were it all along as it is at either end: half
-    ! a turn a step, about the axes of the body.
+    ! Rotation rate that the error of omega causes, and its change, for the error at either end of
+    ! the step: half the rotation per step, about the axes of the body.
     real(dp) :: rates(3, 2)
     real(dp) :: slopes(3, 2)
-    real(dp) :: left(4)   !! terms that the step leaves out
+    real(dp) :: left(4)   !! truncation error of the step
     real(dp) :: worst     !! largest error of a row so far, rad
     real(dp) :: peak      !! half the largest error so far, of a row or not, rad
   end type attitude_t
@@ -32,10 +34,11 @@ contains
 
   ! unroll: expand_both
   subroutine expand_both(order, s)
-    !! The terms of omega as by `expand`, those of the attitude and two more, and the sum without.
+    !! Compute the terms of omega as `expand` does, those of the attitude and two more, and the sum
+    !! without these two.
     integer(c_int), intent(in), value :: order
-    type(series_t), intent(inout) :: s   !! turns(:, 0) and half are given too
-    real(dp) :: parts(4, 3, 0:MOST_ORDER + MORE_TURNS) ! of each term, times the units of the axes
+    type(series_t), intent(inout) :: s   !! turns(:, 0) and half are inputs too
+    real(dp) :: parts(4, 3, 0:MOST_ORDER + MORE_TURNS) ! each term times the units of the axes
     real(dp) :: sums(4)
     integer :: i, j, k
 
@@ -60,7 +63,7 @@ contains
   ! end unroll
 
   pure subroutine times_units(q, factor, parts)
-    !! q times the unit of each axis, times a factor.
+    !! Compute q times the unit quaternion of each axis, times a factor.
     real(dp), intent(in) :: q(4), factor
     real(dp), intent(out) :: parts(4, 3)
 
@@ -78,20 +81,21 @@ contains
   end subroutine begin_attitude
 
   pure subroutine turn_error(s, order, from_rest, before, carried, now)
-    !! The error at the end of the step: what that of omega turns, by Hermite's cubic, and what the
-    !! step leaves out of the attitude itself: where omega is steady that is all there is.
+    !! Compute the error at the end of the step. It is the rotation that the error of omega causes,
+    !! by Hermite's cubic, plus the truncation error of the attitude itself. If omega is steady,
+    !! only the latter exists.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
     logical, intent(in) :: from_rest   !! the first step of a body at rest
     real(dp), intent(in) :: before(3)  !! error of omega where the step begins, rad/s
-    real(dp), intent(in) :: carried(3) !! and where it ends, but for what it leaves out, rad/s
+    real(dp), intent(in) :: carried(3) !! the same where it ends, without truncation, rad/s
     type(attitude_t), intent(inout) :: now
     real(dp) :: q(4)
 
     now%before = now%error
     q = now%q + s%turn
-    ! The next two terms are most of what is left out. A pair of poles could not tell those of a
-    ! turn that begins at no speed: its every second term is at right angles to the one before.
+    ! The next two terms are most of the truncation error. A fit of a pair of poles would fail for a
+    ! rotation that starts from rest: every second term is at right angles to the one before.
     now%left = s%turns(:, order + 1) + s%turns(:, order + 2)
     if (from_rest) call take_thirds(order + MORE_TURNS, s%turns, 1.0_dp, now%left)
     now%ends(:, 1) = now%q
@@ -102,12 +106,13 @@ contains
   end subroutine turn_error
 
   pure subroutine rate_of_turn(s, w, error, rate, slope)
-    !! How fast an error of omega turns the attitude, and how that changes about axes of space.
+    !! Compute the rate at which an error of omega rotates the attitude, and the change of that rate
+    !! about axes of space.
     type(series_t), intent(in) :: s
     real(dp), intent(in) :: w(3)      !! omega, rad/s
     real(dp), intent(in) :: error(3)  !! of omega, rad/s
     real(dp), intent(out) :: rate(3), slope(3) !! about the axes of the body
-    real(dp) :: change(3) ! of the error, over the step
+    real(dp) :: change(3) ! change of the error over the step
 
     change = rise(s%factors(:3), w, error)
     change(1) = change(1) + 2.0_dp*s%half(1)*(w(2)*error(3) - w(3)*error(2))
@@ -118,10 +123,11 @@ contains
   end subroutine rate_of_turn
 
   pure function error_within(now, order, part, q) result(error)
-    !! Half the turn by which an attitude q within the step errs, about axes of space.
+    !! Compute half the rotation, about axes of space, by which an attitude q within the step is
+    !! wrong.
     type(attitude_t), intent(in) :: now
     integer, intent(in) :: order
-    real(dp), intent(in) :: part !! of the step
+    real(dp), intent(in) :: part !! fraction of the step
     real(dp), intent(in) :: q(4)
     real(dp) :: error(3)
     real(dp) :: square, cube, fourth ! powers of the part
@@ -138,7 +144,7 @@ contains
   end function error_within
 
   pure subroutine turn_on(s, now)
-    !! To the end of the step.
+    !! Advance the attitude to the end of the step.
     type(series_t), intent(in) :: s
     type(attitude_t), intent(inout) :: now
     integer :: i
@@ -149,11 +155,11 @@ contains
   end subroutine turn_on
 
   pure subroutine add_attitude_row(small, order, part, known, now, row)
-    !! A row, its error taken off where it is small enough to be known; of length 1.
-    real(dp), intent(in) :: small(4) !! what is added to the attitude
+    !! Compute a row, of unit norm. Its error is subtracted if it is small enough to be known.
+    real(dp), intent(in) :: small(4) !! added to the attitude
     integer, intent(in) :: order
-    real(dp), intent(in) :: part     !! of the step
-    real(dp), intent(in) :: known    !! error that may be taken off, rad
+    real(dp), intent(in) :: part     !! fraction of the step
+    real(dp), intent(in) :: known    !! largest error that may be subtracted, rad
     type(attitude_t), intent(inout) :: now
     real(dp), intent(out) :: row(4)
     real(dp) :: error(3), size
@@ -167,7 +173,7 @@ contains
   end subroutine add_attitude_row
 
   pure function from_left(v, q) result(r)
-    !! (0, v) q
+    !! Compute (0, v) q.
     real(dp), intent(in) :: v(3), q(4)
     real(dp) :: r(4)
 
@@ -178,7 +184,7 @@ contains
   end function from_left
 
   pure function left_turn(p, q) result(v)
-    !! The vector of p times the conjugate of q.
+    !! Compute the vector part of p times the conjugate of q.
     real(dp), intent(in) :: p(4), q(4)
     real(dp) :: v(3)
 
@@ -188,10 +194,10 @@ contains
   end function left_turn
 
   pure function in_space(q, v) result(u)
-    !! A vector of the body about the axes of space: q (0, v) times the conjugate of q.
+    !! Compute a vector of the body about the axes of space: q (0, v) times the conjugate of q.
     real(dp), intent(in) :: q(4), v(3)
     real(dp) :: u(3)
-    real(dp) :: x, y, z ! twice the vector of q across v
+    real(dp) :: x, y, z ! twice the cross product of the vector part of q and v
 
     x = 2.0_dp*(q(3)*v(3) - q(4)*v(2))
     y = 2.0_dp*(q(4)*v(1) - q(2)*v(3))

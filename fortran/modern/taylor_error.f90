@@ -1,7 +1,7 @@
 module taylor_error
-  !! What the steps of a series leave out, and what the motion makes of it: the remainder of each
-  !! step, blocks through the linearised motion, and with it the derivative of omega at the end by
-  !! omega at earlier times, whose largest norm is the growth of a perturbation.
+  !! The truncation error of the steps of a series, and its propagation by the linearised equations.
+  !! The state-transition matrix of omega from earlier times to the end is formed in blocks of
+  !! steps. The largest norm of that matrix is the error amplification.
   use kinds, only: dp
   use taylor_series, only: series_t
   implicit none(type, external)
@@ -10,20 +10,21 @@ module taylor_error
   integer, parameter :: STEPS_IN_BLOCK = 8
   integer, parameter :: STEPS_IN_FINE_BLOCK = 2
   integer, parameter :: MOST_BLOCKS = 512 ! even
-  real(dp), parameter :: RIDGE = 1.001_dp   ! so that one pole, or none, does for the pair
+  real(dp), parameter :: RIDGE = 1.001_dp   ! makes the fit work for one pole or none
   real(dp), parameter :: LEAST = tiny(1.0_dp)
-  real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! lane
-  real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! growth
-  ! Beyond it no growth says more; a square of a product of two is still a number.
+  real(dp), parameter :: FIRST(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp] ! selects the first lane
+  real(dp), parameter :: WORTH_A_LOOK = 1e6_dp ! amplification from which all blocks are checked
+  ! A larger norm would have no further meaning; the square of a product of two such is in range.
   real(dp), parameter :: LARGEST = 1e75_dp
   real(dp), parameter :: UNIT(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
 
-  ! Since each block's beginning, to be merged by pairs where there is no room for more.
+  ! State-transition matrices over blocks of steps. Blocks are merged in pairs when the array is
+  ! full.
   type, public :: blocks_t
-    real(dp) :: derivatives(3, 3, MOST_BLOCKS) !! of omega at a block's end by that at its beginning
-    logical :: has_row(MOST_BLOCKS) !! of the output, before the last
-    integer :: steps        !! in the open one
+    real(dp) :: derivatives(3, 3, MOST_BLOCKS) !! of omega at a block's end by omega at its start
+    logical :: has_row(MOST_BLOCKS) !! whether it has a row of the output before the last
+    integer :: steps        !! steps in the open block
     integer :: closed
     integer :: steps_a_block
   end type blocks_t
@@ -34,7 +35,7 @@ module taylor_error
 contains
 
   pure subroutine begin(precise, lanes, blocks)
-    !! In the lanes: no error, and each axis where it is.
+    !! Set the lanes to no error and to the unit vector of each axis.
     logical, intent(in) :: precise
     real(dp), intent(out) :: lanes(4, 3)
     type(blocks_t), intent(inout) :: blocks
@@ -48,12 +49,13 @@ contains
   end subroutine begin
 
   pure subroutine estimate_truncation(s, order, unit, left)
-    !! Sum of the terms of omega that a step leaves out, as if one pair of poles made its last four:
-    !! v(k + 1) = a v(k) - b v(k - 1), by least squares; the error has it from here on.
+    !! Estimate the sum of the terms of omega that a step leaves out. One pair of poles is fitted to
+    !! its last four terms by least squares: v(k + 1) = a v(k) - b v(k - 1). The estimate is
+    !! subtracted from the error in lane 1, which is propagated from here on.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
-    real(dp), intent(in) :: unit       !! over which terms are near 1, s/rad
-    real(dp), intent(out) :: left(4)   !! rad/s
+    real(dp), intent(in) :: unit       !! brings the terms near 1, s/rad
+    real(dp), intent(out) :: left(4)   !! truncation error, rad/s
     real(dp), dimension(4) :: uu, vv, uv, ux, vx ! products of the terms
     real(dp) :: x, u, v, w
     real(dp) :: a, b, determinant
@@ -83,11 +85,11 @@ contains
   end subroutine estimate_truncation
 
   pure subroutine estimate_truncation_from_rest(s, order, unit, left)
-    !! The same where a body begins at rest.
+    !! Do the same for a body that starts from rest.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: unit       !! s/rad
-    real(dp), intent(inout) :: left(4) !! as found before, rad/s
+    real(dp), intent(inout) :: left(4) !! the previous estimate, rad/s
 
     s%lanes(1, :) = s%lanes(1, :) + left(:3)
     call take_thirds(order, s%terms, unit, left)
@@ -95,8 +97,8 @@ contains
   end subroutine estimate_truncation_from_rest
 
   pure subroutine fit_poles(uu, vv, uv, ux, vx, a, b)
-    !! The pair of poles of v(k + 1) = a v(k) - b v(k - 1), for the sum of all terms beyond x, the
-    !! last, and u, the one before: a x - b u.
+    !! Fit the pair of poles of v(k + 1) = a v(k) - b v(k - 1). With x, the last term, and u, the
+    !! one before, the sum of all further terms is a x - b u.
     real(dp), intent(in) :: uu, vv, uv, ux, vx !! products of the terms
     real(dp), intent(out) :: a, b
     real(dp) :: determinant
@@ -104,18 +106,19 @@ contains
     determinant = (RIDGE*uu)*(RIDGE*vv) - uv*uv
     a = (RIDGE*vv)*ux - uv*vx
     b = uv*ux - (RIDGE*uu)*vx
-    ! Poles within the step, or nearly, are none of a series that converges.
+    ! A series that converges has no poles within the step, or nearly within.
     determinant = max((determinant - a) + b, abs(a - b), abs(b), LEAST)
     a = (a - b)/determinant
     b = b/determinant
   end subroutine fit_poles
 
   pure subroutine take_thirds(order, terms, unit, left)
-    !! From rest a torque that grows with time makes every third term only, of which four in a row
-    !! tell nothing: the sum of all further terms with three for each, where that is more.
+    !! Estimate the sum of all further terms from groups of three terms, and use it if it is larger.
+    !! From rest, a torque that grows with time makes only every third term, and four terms in a row
+    !! show nothing.
     integer, intent(in) :: order
     real(dp), intent(in) :: terms(4, 0:order)
-    real(dp), intent(in) :: unit       !! over which terms are near 1
+    real(dp), intent(in) :: unit       !! brings the terms near 1
     real(dp), intent(inout) :: left(4)
     real(dp), dimension(4, 3) :: x, u, v, w
     real(dp) :: thirds(4)
@@ -132,8 +135,8 @@ contains
   end subroutine take_thirds
 
   pure real(dp) function likely_remainder(order, terms)
-    !! Size of the terms beyond the last, should they decay as the last six do: the fit of a pair of
-    !! poles may come out small by chance, and where there are few steps no other makes up for it.
+    !! Return the size of the terms beyond the last if they decay as the last six do. The fit of a
+    !! pair of poles may be small by chance, and where there are few steps no other one compensates.
     integer, intent(in) :: order
     real(dp), intent(in) :: terms(4, 0:order)
     real(dp) :: last, before
@@ -144,7 +147,7 @@ contains
   end function likely_remainder
 
   pure function rise(factors, w, error)
-    !! Rate of change of a perturbation, times the step, rad/s.
+    !! Compute the rate of change of a perturbation times the step, rad/s.
     real(dp), intent(in) :: factors(3), w(3), error(3)
     real(dp) :: rise(3)
 
@@ -154,10 +157,11 @@ contains
   end function rise
 
   pure subroutine count_step(precise, with_row, lanes, blocks)
-    !! One more step: where its block is full, the derivative is put aside and begun anew; if need
-    !! be along axes that turn with it, so that no rounding of what has grown is taken for growth.
+    !! Count one more step. When its block is full, store the derivative and start a new one. A
+    !! precise integration continues along axes that rotate with the derivative, so that rounding
+    !! errors of large elements are not taken for amplification.
     logical, intent(in) :: precise
-    logical, intent(in) :: with_row !! the step has a row of the output before the last
+    logical, intent(in) :: with_row !! whether the step has a row of the output before the last
     real(dp), intent(inout) :: lanes(4, 3)
     type(blocks_t), intent(inout) :: blocks
     integer :: n
@@ -188,7 +192,8 @@ contains
   end subroutine count_step
 
   pure subroutine turn_axes(derivative, lanes)
-    !! By Gram and Schmidt: axes in the lanes, and along them where the old ones lead.
+    !! Orthonormalise the axes in the lanes by Gram and Schmidt; `derivative` has the old axes along
+    !! the new ones.
     real(dp), intent(inout) :: derivative(3, 3)
     real(dp), intent(inout) :: lanes(4, 3)
     real(dp) :: length
@@ -207,8 +212,8 @@ contains
   end subroutine turn_axes
 
   pure subroutine growths_of(precise, lanes, blocks, growth, largest)
-    !! Largest norms of derivatives by omega where a block began: of omega at the times requested,
-    !! and of omega at the end of any block.
+    !! Compute the largest norms of derivatives by omega at the beginning of any block: `growth` for
+    !! omega at the requested times, `largest` for omega at the end of any block.
     logical, intent(in) :: precise
     real(dp), intent(in) :: lanes(4, 3)
     type(blocks_t), intent(in) :: blocks
@@ -229,7 +234,8 @@ contains
   end subroutine growths_of
 
   pure real(dp) function growth_until(last, behind, blocks)
-    !! Largest norm of the derivative by omega where a block began, from the first to the last.
+    !! Return the largest norm of the derivative by omega at the beginning of any block up to
+    !! `last`.
     integer, intent(in) :: last
     real(dp), intent(in) :: behind(3, 3) !! derivative by omega at the end of the last block
     type(blocks_t), intent(in) :: blocks
@@ -246,7 +252,8 @@ contains
   end function growth_until
 
   pure real(dp) function norm(a)
-    !! Of a matrix of determinant 1: about its largest singular value, and 1 of a rotation.
+    !! Return the norm of a matrix of determinant 1: nearly its largest singular value; 1 for a
+    !! rotation.
     real(dp), intent(in) :: a(3, 3)
     integer :: i, j
 
@@ -260,7 +267,7 @@ contains
   end function norm
 
   elemental real(dp) function bounded(x)
-    !! An entry of a derivative; what is no number is as large as any.
+    !! Limit an element of a derivative to LARGEST, which also replaces NaN.
     real(dp), intent(in) :: x
 
     bounded = LARGEST
@@ -268,7 +275,8 @@ contains
   end function bounded
 
   pure function composed(a, b)
-    !! Of two derivatives, which are rows of where each axis leads: that of b's motion, then a's.
+    !! Compute the product of two derivatives: the motion of b, then that of a. Row i of a
+    !! derivative is the image of axis i.
     real(dp), intent(in) :: a(3, 3), b(3, 3)
     real(dp) :: composed(3, 3)
     integer :: j

@@ -1,6 +1,6 @@
 module taylor_march
-  !! Taylor series, once from 0 to the last time: the order fixed, the step adapted, the error
-  !! measured and taken off.
+  !! One integration by Taylor series, from 0 to the last time: the order is fixed, the step is
+  !! adapted, the error is estimated and subtracted.
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -19,20 +19,24 @@ module taylor_march
   implicit none(type, external)
   private
 
-  integer, parameter :: MANY_WAVES = 1000 ! so that a step is worth a look
+  ! With this many waves every attempt at a step that fails polls for an interrupt.
+  integer, parameter :: MANY_WAVES = 1000
   integer, parameter :: MOST_TRIES = 60
-  real(dp), parameter :: HOPELESS = 10.0_dp ! times the steps allowed, of the first one's length
-  real(dp), parameter :: GROWING = 1.3_dp ! power of time with which steps do, not by chance
-  ! Radians about the body in a step: differences turn where omega does not.
+  ! If the first step forecasts more than this multiple of the steps allowed, the integration ends.
+  real(dp), parameter :: HOPELESS = 10.0_dp
+  ! If the steps increase with a larger power of time, this is not by chance.
+  real(dp), parameter :: GROWING = 1.3_dp
+  ! Radians about the body in a step. Perturbations rotate even where omega is steady.
   real(dp), parameter :: A_STEP = 60.0_dp
   real(dp), parameter :: A_PRECISE_STEP = 1.0_dp
-  real(dp), parameter :: LARGEST = 2.0_dp**511 ! omega whose products are numbers, rad/s
-  ! Of the largest error so far: an estimate that is smaller may be so by chance.
+  real(dp), parameter :: LARGEST = 2.0_dp**511 ! largest omega whose products are in range, rad/s
+  ! Part of the largest error so far: a smaller estimate may be small by chance.
   real(dp), parameter :: BY_CHANCE = 0.1_dp
   integer, parameter :: FEW_STEPS = 2
-  real(dp), parameter :: NO_DIGIT = 1e100_dp ! an error that says no more, relative
+  real(dp), parameter :: NO_DIGIT = 1e100_dp ! a relative error that leaves no digit
 
-  ! Columns of four begin where a register's load does: Fortran can't ask for it of a variable.
+  ! This type aligns columns of four to the loads of a register, which Fortran cannot request of a
+  ! variable.
   type, public :: room_t
     type(series_t) :: s
     type(blocks_t) :: blocks
@@ -46,14 +50,15 @@ contains
 
   subroutine march(problem, omega, asked, tolerance, precise, most_steps, stride, n_times, times, &
                    s, blocks, now, attitude, waves, rows, n_attitudes, attitudes, found)
-    !! Once from 0 to the last of the times.
+    !! Integrate once from 0 to the last of the times.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: omega(3)                    !! at time 0, rad/s
-    real(dp), intent(in) :: asked                       !! tolerance of this march
+    real(dp), intent(in) :: asked                       !! tolerance of this integration
     real(dp), intent(in) :: tolerance                   !! of the error at `times`, relative
-    logical, intent(in) :: precise                      !! propagate variations as exactly as can be
+    logical, intent(in) :: precise                      !! propagate variations with high accuracy
     real(dp), intent(in) :: most_steps
-    integer(int64), intent(in) :: stride                !! steps between looks at the user
+    ! most_steps: number of steps allowed
+    integer(int64), intent(in) :: stride                !! steps between polls for an interrupt
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)              !! s
     type(series_t), intent(inout) :: s
@@ -62,32 +67,33 @@ contains
     type(attitude_t), intent(inout) :: attitude
     type(wave_t), intent(inout) :: waves(:)
     real(dp), intent(inout) :: rows(3, n_times)         !! omega for n_rows times, rad/s
-    integer, intent(in) :: n_attitudes                  !! as many as times, or 0
-    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes) !! at time 0, and then
+    integer, intent(in) :: n_attitudes                  !! n_times, or 0
+    real(dp), intent(inout) :: attitudes(4, 0:n_attitudes) !! column 0: at time 0
     type(outcome_t), intent(out) :: found
-    real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, and 0
-    real(dp) :: left(4)       ! by the step, rad/s
-    real(dp) :: error(3)      ! carried so far, rad/s
+    real(dp) :: coefficients(4), constant(4), rate(4) ! of the problem, then 0
+    real(dp) :: left(4)       ! truncation error of the step, rad/s
+    real(dp) :: error(3)      ! propagated so far, rad/s
     real(dp) :: h             ! step, s
     real(dp) :: rest          ! time to go, s
-    real(dp) :: next          ! the step after this one, s
-    real(dp) :: local_tolerance  ! part of the scale that the last terms may have
+    real(dp) :: next          ! next step, s
+    real(dp) :: local_tolerance  ! largest last terms over the scale
     real(dp) :: allowed       ! the same in rad/s
     real(dp) :: last          ! size of the last two terms, rad/s
-    real(dp) :: longest       ! turn of a wave
+    real(dp) :: longest       ! largest angle for the weights of a wave, rad
     real(dp) :: coupling
-    real(dp) :: farthest      ! in a step, rad: a spin has no terms that would tell
+    ! coupling: largest rate of perturbations over omega
+    real(dp) :: farthest      ! in a step, rad: the terms of a spin do not limit it
     logical :: at_end, with_attitude
     logical :: from_rest      ! the first step of a body at rest
-    integer(int64) :: decay   ! logarithm, of the last terms over two orders
+    integer(int64) :: decay   ! logarithm of the ratio of last terms over two orders
     integer(int64) :: part    ! 65536 over the order
     integer :: order
-    integer :: lasting        ! steps that turn the waves
+    integer :: lasting        ! steps for which waves are advanced, not recomputed
     integer :: n_before       ! rows before this step
     integer :: i, tries
-    integer(int64) :: next_look  ! steps
-    integer(int64) :: half_way   ! of the steps allowed
-    real(dp) :: t_half           ! the time then, s
+    integer(int64) :: next_look  ! step of the next poll
+    integer(int64) :: half_way   ! half of the steps allowed
+    real(dp) :: t_half           ! the time after half_way steps, s
 
     found = outcome_t(COMPLETE, 0, 0_int64, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, &
                       .true., 1.0_dp)
@@ -125,7 +131,7 @@ contains
       call shorten_to(farthest, coupling*now%scale, h)
       call fit_to_end(h, rest, at_end)
       allowed = local_tolerance*now%scale
-      ! Four at once: what was stored one by one could not be loaded together without a wait.
+      ! Four at once: numbers stored one by one could not be loaded together without a wait.
       do i = 1, 4
         s%terms(i, 0) = now%w(i)
         s%factors(i) = h*coefficients(i)
@@ -144,17 +150,17 @@ contains
       end if
       if (found%steps == 0) then
         call predict_step(h, s, order, part, allowed, decay, next)
-        ! What a body at rest is about to reach.
+        ! The scale of a body at rest is the omega that it is about to reach.
         now%scale = max(now%scale, min(huge(h), maxval(abs(s%terms(:3, 1:4)))))
         allowed = local_tolerance*now%scale
         if (with_attitude) s%weight = now%scale
       end if
       last = size_of(s, order)
-      ! From rest a torque that grows with time makes every third term only.
+      ! From rest, a torque that grows with time makes only every third term.
       if (found%steps == 0) last = last + size_of(s, order - 2)
       call predict_step(h, s, order, part, allowed, decay, next)
       if ((.not. last <= SLACK*allowed) .or. (found%steps == 0 .and. tries == 0)) then
-        ! The first step is a guess, and a later one may be too long: the terms need only a factor.
+        ! The first step is a guess, and a later one may be too long: the terms are only rescaled.
         tries = tries + 1
         if (.not. last <= huge(h)) then
           if (tries > MOST_TRIES) then
@@ -203,14 +209,14 @@ contains
       if (found%status /= COMPLETE) exit
       call count_step(precise, found%n_rows > n_before, s%lanes, blocks)
       if (blocks%steps == 0) then
-        ! Not at every step, which would take time.
+        ! Not at every step, to save time.
         now%peak = max(now%peak, maxval(abs(error)))
         if (with_attitude) attitude%peak = max(attitude%peak, sum(abs(attitude%error)))
       end if
       call add_change(s%change, now)
       if (with_attitude) call turn_on(s, attitude)
       found%steps = found%steps + 1
-      ! Where products overflow a step may pass that leads nowhere.
+      ! Where products overflow, a step may be accepted that has no meaning.
       if (.not. now%scale > LARGEST) tries = 1
       if (.not. all(abs(now%w) <= huge(h))) then
         found%status = OVERFLOW
@@ -228,7 +234,8 @@ contains
       h = next
       if (found%steps >= next_look) then
         if (real(found%steps, dp) >= most_steps) then
-          ! As many steps a second as so far, or more as the motion grows faster.
+          ! Extrapolate the steps so far in proportion to the time, or faster if the motion becomes
+          ! faster.
           found%ahead = 1.0_dp
           if (found%steps > half_way .and. abs(now%t) > abs(t_half)) then
             found%ahead = log(real(found%steps, dp)/real(half_way, dp))/log(now%t/t_half)
@@ -266,7 +273,7 @@ contains
   end subroutine march
 
   pure real(dp) function coupling_of(coefficients)
-    !! The largest rate of small differences over the largest omega.
+    !! Return the largest rate of perturbations over the largest omega.
     real(dp), intent(in) :: coefficients(3)
     real(dp) :: sizes(3)
 
@@ -283,7 +290,7 @@ contains
   end subroutine shorten_to
 
   pure subroutine fit_to_end(h, rest, at_end)
-    !! Equal steps near the end: the last one would be short, and cost as much.
+    !! Make the steps near the end equal: a short last step would cost as much as the others.
     real(dp), intent(inout) :: h   !! s
     real(dp), intent(in) :: rest   !! s
     logical, intent(out) :: at_end
@@ -297,7 +304,7 @@ contains
   end subroutine fit_to_end
 
   pure subroutine add_change(change, now)
-    !! Omega at the end of the step, with what its rounding leaves out.
+    !! Compute omega at the end of the step, with its rounding error.
     real(dp), intent(in) :: change(4)
     type(state_t), intent(inout) :: now
     integer :: i

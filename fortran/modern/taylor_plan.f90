@@ -1,6 +1,7 @@
 module taylor_plan
-  !! The order of a Taylor series, from the tolerance; its local tolerance, the largest error of a
-  !! step relative to the scale; and its first step, from the rates of the problem.
+  !! The plan of a Taylor series. Its order follows from the tolerance, its first step from the
+  !! rates of the problem. Its local tolerance is the largest error of a step, relative to the
+  !! scale.
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: problem_t
@@ -8,28 +9,28 @@ module taylor_plan
   implicit none(type, external)
   private
 
-  real(dp), parameter :: ALIKE = 0.05_dp ! of the error in a step, for a radian of a wave
+  real(dp), parameter :: ALIKE = 0.05_dp ! weight of a radian of a wave in the local tolerance
 
   public :: add_wave_rates, plan, tolerance_and_step, steady_rates
 
 contains
 
   pure subroutine plan(problem, scale, tolerance, time, with_attitude, order, local_tolerance, h)
-    !! Order from the tolerance, the first step from the rates of the problem.
+    !! Choose the order from the tolerance, and the first step from the rates of the problem.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
     real(dp), intent(in) :: tolerance
-    real(dp), intent(in) :: time            !! to go, s
-    logical, intent(in) :: with_attitude    !! which turns though omega may not
+    real(dp), intent(in) :: time            !! time to go, s
+    logical, intent(in) :: with_attitude    !! the attitude rotates even if omega is steady
     integer, intent(out) :: order
-    real(dp), intent(out) :: local_tolerance !! part of the scale that the last terms may have
+    real(dp), intent(out) :: local_tolerance !! largest last terms over the scale
     real(dp), intent(out) :: h              !! s
     real(dp) :: coupling
     real(dp) :: push                        ! largest torque over moment, 1/s2
     real(dp) :: ramp                        ! its largest rate, 1/s3
-    real(dp) :: gain                        ! speed that torques may add, rad/s
-    real(dp) :: rate                        ! 1/s
-    real(dp) :: turned                      ! by the waves, rad
+    real(dp) :: gain                        ! omega that torques may add, rad/s
+    real(dp) :: rate                        ! rate of change, 1/s
+    real(dp) :: turned                      ! angle of the waves, rad
     integer :: n
 
     turned = 0.0_dp
@@ -55,14 +56,14 @@ contains
   end subroutine plan
 
   elemental subroutine steady_rates(coupling, scale, push, ramp, time, gain, rate)
-    !! What a body turns with, and the part of the torque that is no wave.
+    !! Compute the contributions of the free motion and of the constant and linear torque.
     real(dp), intent(in) :: coupling        !! largest of |A|, |B|, |C|
     real(dp), intent(in) :: scale           !! largest |omega|, rad/s
     real(dp), intent(in) :: push            !! 1/s2
     real(dp), intent(in) :: ramp            !! 1/s3
-    real(dp), intent(in) :: time            !! to go, s
-    real(dp), intent(out) :: gain           !! rad/s
-    real(dp), intent(out) :: rate           !! 1/s
+    real(dp), intent(in) :: time            !! time to go, s
+    real(dp), intent(out) :: gain           !! omega that the torque may add, rad/s
+    real(dp), intent(out) :: rate           !! rate of change, 1/s
 
     gain = 0.5_dp*push*abs(time)
     rate = coupling*scale + sqrt(coupling)*sqrt(push)
@@ -74,12 +75,13 @@ contains
 
   elemental subroutine tolerance_and_step(coupling, scale, gain, rate, turned, tolerance, time, &
                                           local_tolerance, h)
-    !! An error turns into one of phase and grows with it, and the phase of all later ones with
-    !! that; the weights are from random scenes. Waves ask for more steps, which may all err alike.
+    !! Compute the local tolerance and the first step. An error of omega becomes an error of phase,
+    !! which grows with time and affects all later phases. The weights come from random scenes.
+    !! Waves require more steps, whose errors may all have one sign.
     real(dp), intent(in) :: coupling, scale, gain, rate, turned, tolerance, time
-    real(dp), intent(out) :: local_tolerance !! part of the scale that the last terms may have
+    real(dp), intent(out) :: local_tolerance !! largest last terms over the scale
     real(dp), intent(out) :: h              !! the first step, s
-    real(dp) :: way                         ! about the body's, rad
+    real(dp) :: way                         ! weighted rotation of the body, rad
 
     h = time
     if (rate*abs(time) > 0.5_dp) h = sign(0.5_dp/rate, time)
@@ -89,18 +91,18 @@ contains
   end subroutine tolerance_and_step
 
   pure subroutine add_wave_rates(wave, is_sine, coupling, time, gain, rate, turned)
-    !! What a wave of torque adds to the speed that may be gained, and to the rate of change.
+    !! Add the contributions of one wave to the omega that may be added and to the rate of change.
     real(dp), intent(in) :: wave(4)         !! amplitude (3) in 1/s2, frequency in rad/s
     logical, intent(in) :: is_sine
     real(dp), intent(in) :: coupling
-    real(dp), intent(in) :: time            !! to go, s
+    real(dp), intent(in) :: time            !! time to go, s
     real(dp), intent(inout) :: gain         !! rad/s
     real(dp), intent(inout) :: rate         !! 1/s
     real(dp), intent(inout) :: turned       !! rad
     real(dp) :: push                        ! 1/s2
 
     push = max(abs(wave(1)), abs(wave(2)), abs(wave(3)))
-    ! A slow sine never comes to its amplitude.
+    ! A slow sine does not reach its amplitude.
     if (is_sine) push = push*min(1.0_dp, abs(wave(4)*time))
     if (push > 0.0_dp) then
       gain = gain + push*abs(time)/(1.0_dp + abs(wave(4)*time))
@@ -110,9 +112,9 @@ contains
   end subroutine add_wave_rates
 
   pure integer function order_for(local_tolerance)
-    !! Even order with the least work, a line through measured ones.
+    !! Return the even order with the least work, by a line through measured orders.
     real(dp), intent(in) :: local_tolerance
-    integer(int64) :: bits  ! of accuracy
+    integer(int64) :: bits  ! bits of accuracy
 
     bits = 1023 - ishft(transfer(local_tolerance, bits), -52)
     order_for = max(LEAST_ORDER, min(MOST_ORDER, 8 + 2*int((16*bits + 100)/100)))

@@ -1,6 +1,6 @@
 module taylor_rows
-  !! What a march of the Taylor series hands over: omega and attitude at the times asked for, their
-  !! error taken off.
+  !! The output of an integration by Taylor series: omega and attitude at the requested times, with
+  !! their error subtracted.
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
@@ -11,35 +11,35 @@ module taylor_rows
   implicit none(type, external)
   private
 
-  integer, parameter :: ROWS_BETWEEN_LOOKS = 2**19 ! at the user
-  ! Error, relative, beyond which its linear motion says little.
+  integer, parameter :: ROWS_BETWEEN_LOOKS = 2**19 ! between polls for an interrupt
+  ! Largest relative error for which the linearised equations hold.
   real(dp), parameter :: LINEAR = 0.1_dp
 
-  ! Where a run stands.
+  ! The state of an integration.
   type, public :: state_t
     real(dp) :: w(4)      ! omega, rad/s, and 0
-    real(dp) :: w_low(4)  ! what its rounding left out
+    real(dp) :: w_low(4)  ! rounding error of w
     real(dp) :: t         ! s
-    real(dp) :: t_low     ! what its rounding left out
+    real(dp) :: t_low     ! rounding error of t
     real(dp) :: scale     ! largest |omega| so far, rad/s
     real(dp) :: worst     ! largest error of a row so far, rad/s
     real(dp) :: peak      ! largest error so far, of a row or not, rad/s
-    integer :: since      ! steps since the waves' sines were made; 0: to be made
+    integer :: since      ! steps since the sines of waves were computed; 0: compute them
   end type state_t
 
-  ! What a march came to.
+  ! The outcome of an integration.
   type, public :: outcome_t
     integer :: status
     integer :: n_rows
     integer(int64) :: steps
-    real(dp) :: error    ! largest of a row, relative, before it was taken off
-    real(dp) :: least    ! what the error may be where it is estimated to be less, relative
-    real(dp) :: growth   ! of a perturbation until any time requested
-    real(dp) :: largest  ! of a perturbation until any time
-    real(dp) :: ahead    ! steps to the end, as far as known; where it gave up
-    real(dp) :: precise_steps ! to the end, at the least, of a march that is precise
-    logical :: finest    ! no step could err less
-    real(dp) :: way      ! how much more the attitude grows: an error of omega turns it all the way
+    real(dp) :: error    ! largest of a row, relative, before it was subtracted
+    real(dp) :: least    ! lower bound, for estimates that are too small, relative
+    real(dp) :: growth   ! error amplification until any requested time
+    real(dp) :: largest  ! error amplification until any time
+    real(dp) :: ahead    ! estimated steps to the end, if the work limit is exceeded
+    real(dp) :: precise_steps ! fewest steps to the end of a precise integration
+    logical :: finest    ! whether the local tolerance is the smallest
+    real(dp) :: way      ! further factor for the attitude, which an error of omega keeps rotating
     real(dp) :: scale = 0.0_dp ! largest |omega|, rad/s
   end type outcome_t
 
@@ -49,13 +49,14 @@ contains
 
   subroutine add_rows(s, order, h, at_end, before, left, times, tolerance, now, attitude, rows, &
                       n_attitudes, attitudes, found)
-    !! Rows within the step, but for the last of all, from its terms; the error by Hermite's cubic.
+    !! Compute the rows within the step, except the last of all, from its terms. The error between
+    !! the ends of the step follows Hermite's cubic.
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: h               !! s
     logical, intent(in) :: at_end
-    real(dp), intent(in) :: before(3)       !! the error at the step's beginning, rad/s
-    real(dp), intent(in) :: left(3)         !! what the step left out, rad/s
+    real(dp), intent(in) :: before(3)       !! error at the step's beginning, rad/s
+    real(dp), intent(in) :: left(3)         !! truncation error of the step, rad/s
     real(dp), intent(in) :: times(:)        !! s
     real(dp), intent(in) :: tolerance
     type(state_t), intent(inout) :: now
@@ -63,9 +64,9 @@ contains
     real(dp), intent(inout) :: rows(:, :)
     integer, intent(in) :: n_attitudes
     real(dp), intent(inout) :: attitudes(4, 0:n_attitudes)
-    type(outcome_t), intent(inout) :: found !! its rows and its status
-    real(dp) :: rises(3, 2)  ! of the error at either end, times the step
-    real(dp) :: carried(3)   ! the error at the end, but for what the step left out
+    type(outcome_t), intent(inout) :: found !! n_rows and status change
+    real(dp) :: rises(3, 2)  ! rate of the error at either end, times the step
+    real(dp) :: carried(3)   ! propagated error at the end, without truncation, rad/s
     real(dp) :: change(4)    ! of omega, rad/s
     real(dp) :: part, to_go
     integer :: last
@@ -107,7 +108,7 @@ contains
 
   pure subroutine add_last_row(error, order, tolerance, now, attitude, rows, n_attitudes, &
                                attitudes, found)
-    !! The row at the end of the last step, once omega and attitude are there.
+    !! Compute the row at the end of the last step, after omega and attitude have been advanced.
     real(dp), intent(in) :: error(3)        !! rad/s
     integer, intent(in) :: order
     real(dp), intent(in) :: tolerance
@@ -116,7 +117,7 @@ contains
     real(dp), intent(inout) :: rows(:, :)
     integer, intent(in) :: n_attitudes
     real(dp), intent(inout) :: attitudes(4, 0:n_attitudes)
-    type(outcome_t), intent(inout) :: found !! its rows
+    type(outcome_t), intent(inout) :: found !! n_rows changes
 
     found%n_rows = size(rows, 2)
     call add_row(now%w(:3), now%w_low(:3), error, tolerance, now, rows(:, found%n_rows))
@@ -127,9 +128,9 @@ contains
   end subroutine add_last_row
 
   pure subroutine add_row(w, small, error, tolerance, now, row)
-    !! A row, its error taken off where it is small enough to be known: an estimate that is wrong
-    !! costs no more than the tolerance.
-    real(dp), intent(in) :: w(3), small(3) !! whose sum is omega, rad/s
+    !! Compute a row. Its error is subtracted if it is small enough to be known: a wrong estimate
+    !! then costs no more than the tolerance.
+    real(dp), intent(in) :: w(3), small(3) !! their sum is omega, rad/s
     real(dp), intent(in) :: error(3)       !! rad/s
     real(dp), intent(in) :: tolerance
     type(state_t), intent(inout) :: now

@@ -1,6 +1,7 @@
 module taylor_series
-  !! The terms of one step by recurrence, and what they say of the next; unroll.py writes out the
-  !! marked loops. A term holds the power of the step in it, so that a step ends with a plain sum.
+  !! The terms of one step by recurrence, and the next step that follows from them. unroll.py writes
+  !! out the marked loops. A term includes its power of the step, so that a step ends with a plain
+  !! sum.
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
@@ -10,27 +11,28 @@ module taylor_series
 
   integer, parameter, public :: MORE_TURNS = 2
 
-  ! Columns of four numbers fill a register, the fourth idle. taylor_terms.c knows this layout.
+  ! A column of four numbers fills a register; the fourth is not used. The C that unroll.py writes
+  ! (taylor_terms_*.c) depends on this layout.
   type, bind(c), public :: series_t
     real(c_double) :: terms(4, 0:MOST_ORDER) !! coefficient times step**k, rad/s
     real(c_double) :: torque(4, MOST_ORDER)  !! what the torque adds to the terms, rad/s
-    real(c_double) :: factors(4)             !! step times A, B, C, s
+    real(c_double) :: factors(4)             !! A, B, C times the step, s
     real(c_double) :: change(4)              !! sum of the terms from 1, rad/s
-    real(c_double) :: lanes(4, 3)            !! small differences, a vector in each lane, rad/s
-    !! The same of an attitude, and two terms beyond the order without the next term of omega.
+    real(c_double) :: lanes(4, 3)            !! perturbations, a vector in each lane, rad/s
+    !! The terms of an attitude. The two beyond the order lack the next terms of omega.
     real(c_double) :: turns(4, 0:MOST_ORDER + MORE_TURNS)
-    real(c_double) :: half(4)                !! of the step, s
-    real(c_double) :: turn(4)                !! sum of its terms from 1
-    real(c_double) :: weight                 !! of its terms among those of omega, rad/s; 0: none
+    real(c_double) :: half(4)                !! half of the step, s
+    real(c_double) :: turn(4)                !! sum of the attitude's terms from 1
+    real(c_double) :: weight                 !! of these against the terms of omega, rad/s; 0: none
   end type series_t
 
-  integer, parameter :: ORDER_CARRIED = 7 ! of the exponential
-  real(dp), parameter :: EXPONENT = 3.0_dp ! norm up to which it is taken at once
+  integer, parameter :: ORDER_CARRIED = 7 ! order of the exponential
+  real(dp), parameter :: EXPONENT = 3.0_dp ! largest norm of an exponent that is taken at once
   real(dp), parameter :: MOST_PARTS = 1e3_dp
   integer, parameter :: ORDER_PRECISE = 10
-  integer, parameter :: MOST_MOMENTS = 8 ! terms that count in them
+  integer, parameter :: MOST_MOMENTS = 8 ! terms that count in means and moments
   integer :: k_
-  ! Of term k: its integral over the step, and that times the time from the middle.
+  ! Weights of term k: its integral over the step, and its integral times the time from the middle.
   real(dp), parameter :: MEANS(MOST_MOMENTS) = [(1.0_dp/real(k_ + 1, dp), k_=1, MOST_MOMENTS)]
   real(dp), parameter :: MOMENTS(MOST_MOMENTS) = &
                          [(real(k_, dp)/real(2*(k_ + 1)*(k_ + 2), dp), k_=1, MOST_MOMENTS)]
@@ -42,9 +44,9 @@ contains
 
   ! unroll: expand
   subroutine expand(order, s)
-    !! Terms 1 to `order`, even, of equations 13-15, and their sum.
+    !! Compute terms 1 to `order`, which is even, of equations 13-15, and their sum.
     integer(c_int), intent(in), value :: order
-    type(series_t), intent(inout) :: s !! terms(:, 0), torque and factors are given
+    type(series_t), intent(inout) :: s !! terms(:, 0), torque and factors are inputs
     real(dp) :: products(3)            ! of equations 13-15, (rad/s)**2
     integer :: j, k
 
@@ -61,13 +63,13 @@ contains
   ! end unroll
 
   pure subroutine propagate_variations(s)
-    !! Small differences over a step, by Magnus's series to fourth order: the exponential of the
-    !! mean of the Jacobian, less its commutator with the first moment about the middle.
+    !! Propagate perturbations over a step, by Magnus's series to fourth order: the exponential of
+    !! the mean of the Jacobian, minus its commutator with the first moment about the middle.
     type(series_t), intent(inout) :: s
     real(dp), dimension(4) :: mean, moment
-    real(dp) :: c(3)                   ! their cross product
+    real(dp) :: c(3)                   ! cross product of mean and moment
     real(dp) :: o(6)                   ! the matrix, by rows; its diagonal is 0
-    real(dp) :: size                   ! square of its norm
+    real(dp) :: size                   ! square of the matrix's norm
     integer :: i, k, parts
 
     do i = 1, 4
@@ -89,12 +91,12 @@ contains
     o(4) = s%factors(2)*(mean(1) + s%factors(1)*c(1))
     o(5) = s%factors(3)*(mean(2) + s%factors(2)*c(2))
     o(6) = s%factors(3)*(mean(1) - s%factors(1)*c(1))
-    ! In units in which the matrix of a body is symmetric but for signs.
+    ! In these units the matrix of a body is symmetric except for signs.
     size = abs(o(1)*o(3)) + abs(o(2)*o(5)) + abs(o(4)*o(6))
     if (size <= EXPONENT*EXPONENT) then
       call multiply(o, s%lanes)
     else
-      ! A spin about an axis, whose steps are long.
+      ! A spin about one axis, whose steps are long.
       parts = ceiling(min(MOST_PARTS, sqrt(size)))
       o = o*(1.0_dp/parts)
       do k = 1, parts
@@ -105,7 +107,7 @@ contains
 
   ! unroll: propagate_precisely
   pure subroutine propagate_precisely(s)
-    !! The same to higher order: by the linear part of the recurrence of the terms.
+    !! Propagate perturbations to higher order, by the linear part of the recurrence of the terms.
     type(series_t), intent(inout) :: s
     real(dp) :: d(4, 3, 0:ORDER_PRECISE)
     real(dp) :: x(4), y(4), z(4)
@@ -135,7 +137,7 @@ contains
 
   ! unroll: multiply
   pure subroutine multiply(o, lanes)
-    !! The exponential of a matrix without diagonal, times vectors side by side.
+    !! Multiply vectors side by side by the exponential of a matrix whose diagonal is 0.
     real(dp), intent(in) :: o(6)       !! the matrix, by rows
     real(dp), intent(inout) :: lanes(4, 3)
     real(dp) :: d(4, 3), rise(4, 3)
@@ -153,18 +155,19 @@ contains
   ! end unroll
 
   pure subroutine predict_step(h, s, order, part, allowed, decay, next)
-    !! The step with which the order would just do, from the terms before the last two and the
-    !! decay seen in the step before, so that the processor need not wait for the last terms.
-    !! The bits of a positive number, read as an integer, are its logarithm: 6 % suffice here.
+    !! Predict the step with which the last terms would be as large as allowed, from the terms
+    !! before the last two and from the decay in the previous step. The processor then need not wait
+    !! for the last terms. The bits of a positive number, read as an integer, are its logarithm to
+    !! 6 %, which suffices.
     real(dp), intent(in) :: h                !! s
     type(series_t), intent(in) :: s
     integer, intent(in) :: order
-    integer(int64), intent(in) :: part       !! 65536 over the order: a division would be waited for
+    integer(int64), intent(in) :: part       !! 65536 over the order, as a division would take long
     real(dp), intent(in) :: allowed          !! rad/s
-    integer(int64), intent(inout) :: decay   !! logarithm, over two orders
+    integer(int64), intent(inout) :: decay   !! logarithm of the decay over two orders
     real(dp), intent(out) :: next            !! s
-    integer(int64) :: before                 ! logarithm
-    integer(int64) :: change                 ! logarithm
+    integer(int64) :: before                 ! logarithm of the size of the earlier terms
+    integer(int64) :: change                 ! change of the logarithm of the step
 
     before = transfer(size_of(s, order - 2), before)
     change = transfer(allowed, change) - before - decay
@@ -174,7 +177,7 @@ contains
   end subroutine predict_step
 
   pure real(dp) function size_of(s, k)
-    !! Size of the terms k - 1 and k, rad/s.
+    !! Return the size of the terms k - 1 and k, rad/s.
     type(series_t), intent(in) :: s
     integer, intent(in) :: k
 
@@ -187,12 +190,12 @@ contains
   end function size_of
 
   pure real(dp) function fitting(h, last, order, allowed)
-    !! The step with which the last terms would just do.
+    !! Return the step with which the last terms would be as large as allowed.
     real(dp), intent(in) :: h        !! s
-    real(dp), intent(in) :: last     !! their size, rad/s
+    real(dp), intent(in) :: last     !! size of the last terms, rad/s
     integer, intent(in) :: order
     real(dp), intent(in) :: allowed  !! rad/s
-    integer(int64) :: change         ! of the logarithm
+    integer(int64) :: change         ! change of the logarithm of the step
 
     change = (transfer(allowed, change) - transfer(last, change))/order
     change = max(-ishft(40_int64, 52), min(ishft(40_int64, 52), change))
@@ -200,7 +203,7 @@ contains
   end function fitting
 
   pure subroutine rescale(s, order, ratio, with_attitude)
-    !! The terms of a step that is `ratio` times as long.
+    !! Rescale the terms to a step that is `ratio` times as long.
     type(series_t), intent(inout) :: s
     integer, intent(in) :: order
     real(dp), intent(in) :: ratio
@@ -236,7 +239,7 @@ contains
   end subroutine rescale_terms
 
   pure function evaluate(order, terms, part) result(change)
-    !! Change of omega, or of an attitude, at a part of the step.
+    !! Compute the change of omega, or of an attitude, at a fraction of the step.
     integer, intent(in) :: order
     real(dp), intent(in) :: terms(4, 0:order)
     real(dp), intent(in) :: part

@@ -1,6 +1,6 @@
 module theta_functions
-  !! Jacobi's cn, sn, dn of a phase, and beside them an integral of the third kind, by theta series:
-  !! far from the separatrix in sines of v = pi u/(2 K), near to it in exponentials of
+  !! Jacobi's cn, sn, dn of a phase, and an integral of the third kind, by theta series. Far from
+  !! the separatrix they are series in sines of v = pi u/(2 K), near it in exponentials of
   !! x = pi u/(4 K').
   use kinds, only: dp
   use two_words, only: scaled, sine_cosine, two_product, two_sum
@@ -9,25 +9,25 @@ module theta_functions
 
   integer, parameter :: TRIGONOMETRIC = 1
   integer, parameter, public :: HYPERBOLIC = 2
-  integer, parameter :: ENDLESS = 3          ! the separatrix: no period, and the phase is x
+  integer, parameter :: ENDLESS = 3          ! the separatrix: infinite period; the phase is x
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
-  real(dp), parameter :: FLAT = 4e-9_dp      ! a difference whose square no longer counts
-  real(dp), parameter :: BALANCED = 0.1085_dp ! the nome where K = 2**(1/2) K'
-  real(dp), parameter :: NEAR_BALANCED = 0.015_dp ! more than its square
+  real(dp), parameter :: FLAT = 4e-9_dp      ! difference whose square is negligible
+  real(dp), parameter :: BALANCED = 0.1085_dp ! nome at which K = 2**(1/2) K'
+  real(dp), parameter :: NEAR_BALANCED = 0.015_dp ! slightly above the square of BALANCED
   real(dp), parameter :: PI = 3.141592653589793_dp
   real(dp), parameter :: PI_LOW = 1.2246467991473532e-16_dp
-  real(dp), parameter :: FAR = 340.0_dp      ! from here on exponentials are nothing
+  real(dp), parameter :: FAR = 340.0_dp      ! larger arguments make exponentials negligible
 
   type, public :: theta_t
-    !! What the series need. The integral is a = arg(C + i S) + drift v, C > 0.
+    !! The constants of the series. The integral is a = arg(C + i S) + drift v, with C > 0.
     integer :: kind
-    real(dp) :: size(3)         !! of cn, sn, dn beside their series
-    real(dp) :: nome            !! q, or Q = exp(-pi K/(2 K'))
+    real(dp) :: size(3)         !! factors of the series of cn, sn, dn
+    real(dp) :: nome            !! nome q, or Q = exp(-pi K/(2 K'))
     real(dp) :: powers(4)       !! of q or Q
     real(dp) :: even(2), odd(2) !! weights of sn and cn
     real(dp) :: c(0:4), s(0:4)  !! weights of C and S
-    real(dp) :: ratio(2)        !! x over v in two words, where HYPERBOLIC; the caller's
+    real(dp) :: ratio(2)        !! x over v in double-double, if HYPERBOLIC; set by the caller
     real(dp) :: drift
   end type theta_t
 
@@ -36,13 +36,13 @@ module theta_functions
 contains
 
   pure subroutine theta_series(pole, k, comodulus, theta)
-    !! The weights of the series that falls faster, for k**2 = pole(1) pole(2) and k'.
-    real(dp), intent(in) :: pole(2)     !! the integral's is 1 + pole(1) sn**2
+    !! Compute the weights of the series that converges faster, for k**2 = pole(1) pole(2) and k'.
+    real(dp), intent(in) :: pole(2)     !! the integral has 1 + pole(1) sn**2 in its denominator
     real(dp), intent(in) :: k, comodulus
     type(theta_t), intent(out) :: theta
-    real(dp) :: next        ! comodulus after one step of Landen's
+    real(dp) :: next        ! comodulus after one of Landen's transformations
     real(dp) :: square      ! of the nome
-    real(dp) :: over_pole   ! the same over pole(1), which may be 0
+    real(dp) :: over_pole   ! square over pole(1), which may be 0
 
     theta%ratio = 0.0_dp
     theta%drift = 0.0_dp
@@ -72,15 +72,15 @@ contains
   end subroutine theta_series
 
   pure subroutine take_sines(pole, comodulus, square, over_pole, theta)
-    !! The weights of sines and cosines.
+    !! Compute the weights of sines and cosines.
     real(dp), intent(in) :: pole(2), comodulus
-    real(dp), intent(in) :: square      !! of the nome q
-    real(dp), intent(in) :: over_pole   !! the same over pole(1)
+    real(dp), intent(in) :: square      !! square of the nome q
+    real(dp), intent(in) :: over_pole   !! square over pole(1)
     type(theta_t), intent(inout) :: theta
     real(dp) :: q
-    real(dp) :: s, c, delta ! of the pole, which lies at an imaginary phase; s and c times a root
-    real(dp) :: up, down    ! square exp(2 eta), square exp(-2 eta), for the pole's phase i eta
-    real(dp) :: theta2, theta3, theta4 ! at 0
+    real(dp) :: s, c, delta ! at the pole, whose phase is imaginary; s and c times a root
+    real(dp) :: up, down    ! square exp(2 eta), square exp(-2 eta), if the pole's phase is i eta
+    real(dp) :: theta2, theta3, theta4 ! theta functions at 0
 
     q = sqrt(square)
     theta%nome = q
@@ -108,9 +108,9 @@ contains
   end subroutine take_sines
 
   pure subroutine take_exponentials(pole, k, square, theta)
-    !! The weights of exponentials.
+    !! Compute the weights of exponentials.
     real(dp), intent(in) :: pole(2), k
-    real(dp), intent(in) :: square      !! of the nome Q
+    real(dp), intent(in) :: square      !! square of the nome Q
     type(theta_t), intent(inout) :: theta
     real(dp) :: s, c, delta, e, power, step
     real(dp) :: theta2, theta3, theta4
@@ -141,12 +141,12 @@ contains
   end subroutine take_exponentials
 
   pure subroutine start_of_phase(theta, k, comodulus, slope, cn, sn, dn, phase, phase_low)
-    !! The phase that has these functions, by Landen's transformation, and what rounding took off
-    !! it, by the difference that the series then show: near the separatrix that counts.
+    !! Compute the phase that has these functions, by Landen's transformation, and its rounding
+    !! error, by the difference that the series then show; near the separatrix it counts.
     type(theta_t), intent(in) :: theta
     real(dp), intent(in) :: k, comodulus
     real(dp), intent(in) :: slope       !! v over u; x over u on the separatrix
-    real(dp), intent(in) :: cn, sn, dn  !! not below 0: cn, dn
+    real(dp), intent(in) :: cn, sn, dn  !! cn and dn are not negative
     real(dp), intent(out) :: phase, phase_low
     real(dp) :: s, c, delta, part, found(3)
 
@@ -164,10 +164,10 @@ contains
   end subroutine start_of_phase
 
   pure subroutine descend(comodulus, s, c, delta)
-    !! From sn, cn, dn of a phase to the sine and cosine that are left of them when Landen's
-    !! transformations have taken the modulus away. Every sum is one of positive terms.
+    !! Reduce sn, cn, dn of a phase to the sine and cosine that remain when Landen's transformations
+    !! have reduced the modulus to 0. Every sum has only positive terms.
     real(dp), intent(in) :: comodulus
-    real(dp), intent(inout) :: s, c     !! sn and cn, times any factor
+    real(dp), intent(inout) :: s, c     !! sn and cn, times any common factor
     real(dp), intent(inout) :: delta    !! dn
     real(dp) :: a, b, mean, double
     integer :: n
@@ -187,7 +187,7 @@ contains
   end subroutine descend
 
   pure subroutine elliptic_functions(theta, phase, phase_low, f, c, s, part)
-    !! cn, sn, dn times what their sizes were multiplied by, and what the integral is made of:
+    !! Evaluate cn, sn, dn, times the factors in theta%size, and the parts of the integral:
     !! a = arg(c + i s) + part.
     type(theta_t), intent(in) :: theta
     real(dp), intent(in) :: phase, phase_low
@@ -202,13 +202,13 @@ contains
   end subroutine elliptic_functions
 
   pure subroutine sum_sines(theta, phase, phase_low, f, c, s)
-    !! The series in sines and cosines of v.
+    !! Sum the series in sines and cosines of v.
     type(theta_t), intent(in) :: theta
     real(dp), intent(in) :: phase, phase_low
     real(dp), intent(out) :: f(3), c, s
     real(dp) :: sine, cosine
     real(dp) :: c2, c4, c6, c8, s2, s4, s6   ! of 2 v, 4 v and so on
-    real(dp) :: even, odd                    ! parts of a sum: of multiples of 4 v, and the others
+    real(dp) :: even, odd                    ! partial sums: multiples of 4 v, and the others
     real(dp) :: inverse
 
     call sine_cosine(phase, phase_low, sine, cosine)
@@ -232,13 +232,13 @@ contains
   end subroutine sum_sines
 
   pure subroutine sum_exponentials(theta, phase, phase_low, f, c, s, part)
-    !! The series in exponentials of x. Every term that grows with |x| comes with a power of the
-    !! nome that keeps it below 1.
+    !! Sum the series in exponentials of x. Every term that grows with |x| has a factor, a power of
+    !! the nome, that keeps it below 1.
     type(theta_t), intent(in) :: theta
     real(dp), intent(in) :: phase, phase_low
     real(dp), intent(out) :: f(3), c, s, part
     real(dp) :: x, x_low, turns, product, rest, v, v_low
-    real(dp) :: sense                    ! of sn and cn after so many half periods
+    real(dp) :: sense                    ! sign of sn and cn after this number of half periods
     real(dp) :: g, g2, g4                ! exp(-2 |x|), its square and so on
     real(dp) :: h, h2, h4                ! Q exp(2 |x|), which is 1 at the most
     real(dp) :: q, q2                    ! Q and its square
@@ -254,7 +254,7 @@ contains
       call two_sum(x - product, x_low - rest - turns*PI_LOW, v, v_low)
       if (modulo(turns, 2.0_dp) > 0.5_dp) sense = -1.0_dp
       part = v*theta%drift
-      ! Far from its middle a flip is as long as the logarithm of its distance.
+      ! Near the separatrix x is a large part of K, so that it must be double-double.
       call scaled(theta%ratio(1), theta%ratio(2), v, x, x_low)
       x_low = x_low + theta%ratio(1)*v_low
     end if
@@ -283,7 +283,7 @@ contains
     g2 = q*g2
     c = theta%c(0)*(1.0_dp + g) + (theta%c(1)*(h + g2) + (theta%c(2)*(h2 + g4) + c))
     s = theta%s(0)*(1.0_dp - g) + (theta%s(1)*(h - g2) + (theta%s(2)*(h2 - g4) + s))
-    ! So far all is that of |x|, and s its opposite.
+    ! So far everything is for |x|, and s has the opposite sign.
     if (x < 0.0_dp) then
       f(2) = -f(2)
     else

@@ -1,8 +1,8 @@
 module torque_free
-  !! Closed form of equations 13-15 without torque, by Jacobi's elliptic functions. Neither cost
-  !! nor error depends on the time.
-  !! A symmetric body under constant torque is left to the series: its form needs Fresnel
-  !! integrals of arguments that overflow as M3 -> 0, and is slower than a Taylor step.
+  !! The closed form of equations 13-15 without torque, by Jacobi's elliptic functions. Neither cost
+  !! nor error depends on the time. A symmetric body under constant torque is left to the series:
+  !! its closed form needs Fresnel integrals of arguments that overflow as M3 -> 0, and is slower
+  !! than a Taylor step.
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use nearness, only: bring_near_one, LARGE
@@ -11,27 +11,27 @@ module torque_free
   implicit none(type, external)
   private
 
-  integer, parameter :: STEADY = 0           ! rates do not change: linear in time
+  integer, parameter :: STEADY = 0           ! constant rates: omega is linear in time
   integer, parameter :: SEPARATRIX = 1       ! hyperbolic functions
   integer, parameter :: ELLIPTIC = 2
-  integer, parameter :: BETWEEN_LOOKS = 2**17 ! at the user; times
+  integer, parameter :: BETWEEN_LOOKS = 2**17 ! times between polls for an interrupt
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
-  real(dp), parameter :: FLAT = 4e-9_dp       ! a difference whose square no longer counts
-  real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
+  real(dp), parameter :: FLAT = 4e-9_dp       ! difference whose square is negligible
+  real(dp), parameter :: FAINT = 1e-240_dp    ! squares of smaller perturbations would underflow
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
 
   type :: orbit_t
-    !! One torque-free motion. Axis 2 of the orbit has the coefficient of the odd sign (the
-    !! middle moment), axis 3 is the one about which the motion does not change its direction.
+    !! One torque-free motion. Axis 2 of the orbit has the coefficient with the odd sign (the middle
+    !! moment), and omega about axis 3 does not change its sign.
     integer :: kind, levels
-    integer :: axes(3)               !! of the body, for each of the orbit
-    integer :: time_exponent         !! orbit's time is 2**this times the time, 0 for most
+    integer :: axes(3)               !! axis of the body for each axis of the orbit
+    integer :: time_exponent         !! the orbit's time is 2**this times the time; mostly 0
     integer :: omega_exponent        !! angular velocity is 2**this times the orbit's
     real(dp) :: omega(3)             !! at time 0
     real(dp) :: rates(3)             !! A omega2 omega3 and so on, at time 0
-    real(dp) :: frequency            !! phase over time
-    real(dp) :: frequency_low        !! its next 53 bits
+    real(dp) :: frequency            !! phase over time, rad/s in the orbit's units
+    real(dp) :: frequency_low        !! low-order part of the frequency (double-double)
     real(dp) :: amplitude(3)         !! |B C| omega1**2 and so on
     real(dp) :: modulus              !! of dn at time 0: amplitude(2) + amplitude(3)
     real(dp) :: half_gap             !! half of amplitude(1) + amplitude(2)
@@ -45,14 +45,14 @@ contains
 
   subroutine torque_free_rows(coefficients, coefficients_low, omega0, n_times, times, rows, &
                               n_rows, status)
-    !! Angular velocity of a torque-free body at each of `times`.
+    !! Compute the angular velocity of a torque-free body at each of `times`.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C; not all of one sign, finite
-    real(dp), intent(in) :: coefficients_low(3) !! what rounding took off them
+    real(dp), intent(in) :: coefficients_low(3) !! low-order parts of A, B, C (double-double)
     real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)   !! s, in any order, finite
     real(dp), intent(out) :: rows(3, n_times) !! rad/s
-    integer, intent(out) :: n_rows           !! rows that hold a result
+    integer, intent(out) :: n_rows           !! number of rows that hold a result
     integer, intent(out) :: status           !! any but STOPPED
     type(orbit_t) :: orbit
     integer :: i
@@ -74,18 +74,18 @@ contains
   end subroutine torque_free_rows
 
   pure subroutine prepare(coefficients, coefficients_low, omega0, orbit, status)
-    !! Everything about a motion that does not depend on the time.
+    !! Compute everything about a motion that does not depend on the time.
     real(dp), intent(in) :: coefficients(3), coefficients_low(3), omega0(3)
     type(orbit_t), intent(out) :: orbit
     integer, intent(out) :: status           !! COMPLETE or REFUSED
     real(dp) :: a(3)         ! coefficients along the axes of the orbit
     real(dp) :: w(3)         ! angular velocity along them
-    real(dp) :: s(3), s_low(3) ! |a|
-    real(dp) :: y(3), y_low(3) ! squares of w
+    real(dp) :: s(3), s_low(3) ! |a| in double-double
+    real(dp) :: y(3), y_low(3) ! squares of w in double-double
     real(dp) :: left, left_low, right, right_low ! parts of sums
-    real(dp) :: gap, gap_low ! |a1| w3**2 - |a3| w1**2: which axis keeps its direction
-    real(dp) :: modulus, modulus_low     ! square of the larger start of the mean
-    real(dp) :: comodulus, comodulus_low ! square of the smaller one
+    real(dp) :: gap, gap_low ! |a1| w3**2 - |a3| w1**2: its sign selects axis 3
+    real(dp) :: modulus, modulus_low     ! square of the larger initial value of the mean
+    real(dp) :: comodulus, comodulus_low ! square of the smaller initial value
     real(dp) :: largest
     integer :: i, j
 
@@ -94,7 +94,7 @@ contains
     w = omega0
     orbit%time_exponent = 0
     orbit%omega_exponent = 0
-    ! Looked at here too: a call would take a twentieth of it all.
+    ! The condition is repeated here, as a call would take a twentieth of the whole time.
     largest = max(abs(a(1)), abs(a(2)), abs(a(3)))
     if (.not. (largest <= LARGE .and. largest >= 1.0_dp/LARGE)) then
       call bring_near_one(a, orbit%time_exponent)
@@ -106,7 +106,7 @@ contains
       orbit%time_exponent = orbit%time_exponent + orbit%omega_exponent
     end if
 
-    ! Which coefficient has the odd sign? A zero goes with either.
+    ! Find the coefficient with the odd sign; a zero has either sign.
     status = COMPLETE
     if (a(1)*a(3) >= 0.0_dp .and. a(1)*a(2) <= 0.0_dp .and. a(2)*a(3) <= 0.0_dp) then
       orbit%axes = [1, 2, 3]
@@ -122,7 +122,7 @@ contains
     w = w(orbit%axes)
     s = abs(a)
     s_low = s_low(orbit%axes)
-    ! Growth without bound: the product of two equal signs, and nothing against it.
+    ! Growth without bound: two coefficients of one sign, and none of the other.
     if (.not. s(2) > 0.0_dp .and. s(1)*s(3) > 0.0_dp) then
       status = REFUSED
       return
@@ -168,7 +168,7 @@ contains
     if (.not. modulus > 0.0_dp) then
       orbit%kind = STEADY
     else if (orbit%amplitude(3) <= FAINT*modulus) then
-      ! About the middle axis, all but exactly.
+      ! About the middle axis, except for a negligible perturbation.
       orbit%kind = STEADY
       do j = 1, 3, 2
         if (abs(w(j)) > 0.0_dp) status = REFUSED
@@ -188,8 +188,8 @@ contains
   end subroutine prepare
 
   pure subroutine climb(a0, a0_low, b0, b0_low, orbit)
-    !! The arithmetic-geometric mean of a0 >= b0 > 0 to twice the working digits, and what the
-    !! way back needs of each level.
+    !! Compute the arithmetic-geometric mean of a0 >= b0 > 0 in double-double, and the products of
+    !! each level that `evaluate` needs.
     real(dp), intent(in) :: a0, a0_low, b0, b0_low
     type(orbit_t), intent(inout) :: orbit
     real(dp) :: a, a_low, b, b_low
@@ -217,27 +217,27 @@ contains
       call two_product(b, b, square, square_low)
       b_low = ((product - square) + (product_low - square_low))/(b + b)
     end do
-    ! What one more level would take off.
+    ! One more level would subtract the second term of frequency_low.
     orbit%frequency = mean
-    ! The low words count too: beyond 1e11 radians a square wrong by 1e-25 is seen.
+    ! The low parts count too: beyond 1e11 radians an error of 1e-25 in a square is visible.
     half_difference = half_difference + 0.5_dp*(a_low - b_low)
     orbit%frequency_low = 0.5_dp*((b - (total - a)) + (a_low + b_low)) &
                           - half_difference*half_difference/(4.0_dp*mean)
   end subroutine climb
 
   pure subroutine evaluate(orbit, time, omega, status)
-    !! The state at a time from that at 0 by the addition theorems of sn, cn, dn. With
+    !! Compute the state at a time from the state at 0, by the addition theorems of sn, cn, dn. With
     !! sn : cn = modulus**(1/2) sine : cosine, every sum in them keeps its digits.
     type(orbit_t), intent(in) :: orbit
     real(dp), intent(in) :: time
     real(dp), intent(out) :: omega(3)
     integer, intent(out) :: status
-    real(dp) :: t              ! in the orbit's unit
+    real(dp) :: t              ! time in the orbit's unit
     real(dp) :: phase, phase_low
     real(dp) :: sine, cosine
     real(dp) :: s2, c2         ! their squares
-    real(dp) :: dn             ! of this level
-    real(dp) :: dn_below       ! of the next one
+    real(dp) :: dn             ! dn of this level
+    real(dp) :: dn_below       ! dn of the next level
     real(dp) :: inverse
     real(dp) :: fallen         ! 1 - dn
     real(dp) :: turn
@@ -291,6 +291,7 @@ contains
       c2 = cosine*cosine
       inverse = 1.0_dp/(c2 + s2*orbit%amplitude(3))
       turn = sqrt(c2 + s2*orbit%modulus)*inverse
+      ! the addition theorems of sn, cn, dn
       w(1) = (cosine*orbit%omega(1) + (sine*dn)*orbit%rates(1))*turn
       w(2) = (cosine*dn*orbit%omega(2) + sine*orbit%rates(2))*turn
       w(3) = (s2*dn*orbit%amplitude(2)*orbit%omega(3) + sine*cosine*orbit%rates(3))*inverse

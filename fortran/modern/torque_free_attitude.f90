@@ -1,10 +1,10 @@
 module torque_free_attitude
-  !! Closed form of equations 13-15 without torque, from the moments, and of the attitude beside
-  !! it: omega by Jacobi's elliptic functions, the turn about the angular momentum by a theta
-  !! function of the same phase. Neither cost nor error depends on the time.
-  !! A unit quaternion q, scalar first, turns body into space: v_space = q v_body q*, and
-  !! q' = q (0, omega)/2. It is q0 D(0)* D(t), where D = (turn about axis 3) (turn of the angular
-  !! momentum to axis 3, the short way).
+  !! The closed form of equations 13-15 without torque, from the moments, and of the attitude.
+  !! Jacobi's elliptic functions give omega. A theta function of the same phase gives the rotation
+  !! about the angular momentum. Neither cost nor error depends on the time.
+  !! A unit quaternion q, scalar first, rotates body to space: v_space = q v_body q*, and
+  !! q' = q (0, omega)/2. It is q0 D(0)* D(t), where D = (rotation about axis 3) (shortest rotation
+  !! of the angular momentum to axis 3).
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use nearness, only: bring_near_one, LARGE
@@ -16,13 +16,13 @@ module torque_free_attitude
   implicit none(type, external)
   private
 
-  integer, parameter :: BETWEEN_LOOKS = 2**17 ! at the user; times
+  integer, parameter :: BETWEEN_LOOKS = 2**17 ! times between polls for an interrupt
   integer, parameter :: MOST_LEVELS = 16     ! of the arithmetic-geometric mean; 1e-120 needs 13
 
-  real(dp), parameter :: CANCELLED = 1e-4_dp  ! what is left where two words are too few
-  real(dp), parameter :: FLAT = 1e-10_dp      ! a difference whose square no longer counts
-  real(dp), parameter :: LAST = 1e-17_dp      ! a term after which the means differ by less
-  real(dp), parameter :: FAINT = 1e-240_dp    ! smaller squares of a disturbance would underflow
+  real(dp), parameter :: CANCELLED = 1e-4_dp  ! remainder for which double-double is too short
+  real(dp), parameter :: FLAT = 1e-10_dp      ! difference whose square is negligible
+  real(dp), parameter :: LAST = 1e-17_dp      ! last term; the means then differ by less
+  real(dp), parameter :: FAINT = 1e-240_dp    ! squares of smaller perturbations would underflow
 
   public :: torque_free_attitude_rows
 
@@ -30,16 +30,16 @@ contains
 
   subroutine torque_free_attitude_rows(moments, moments_low, omega0, attitude0, n_times, times, &
                                        rows, attitudes, n_rows, status)
-    !! Angular velocity and attitude of a torque-free body at each of `times`.
+    !! Compute angular velocity and attitude of a torque-free body at each of `times`.
     real(dp), intent(in) :: moments(3)       !! kg m2, or in any unit
-    real(dp), intent(in) :: moments_low(3)   !! what rounding took off them
+    real(dp), intent(in) :: moments_low(3)   !! low-order parts of the moments (double-double)
     real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s, finite
-    real(dp), intent(in) :: attitude0(4)     !! at time 0, of any length
+    real(dp), intent(in) :: attitude0(4)     !! at time 0, any norm
     integer, intent(in) :: n_times
     real(dp), intent(in) :: times(n_times)   !! s, in any order, finite
     real(dp), intent(out) :: rows(3, n_times) !! rad/s
     real(dp), intent(out) :: attitudes(4, n_times) !! unit quaternions
-    integer, intent(out) :: n_rows           !! rows that hold a result
+    integer, intent(out) :: n_rows           !! number of rows that hold a result
     integer, intent(out) :: status           !! any but STOPPED
     type(orbit_t) :: orbit
     integer :: i
@@ -61,13 +61,13 @@ contains
   end subroutine torque_free_attitude_rows
 
   pure subroutine prepare(moments, moments_low, omega0, attitude0, orbit, status)
-    !! Everything about a motion that does not depend on the time.
+    !! Compute everything about a motion that does not depend on the time.
     real(dp), intent(in) :: moments(3), moments_low(3), omega0(3), attitude0(4)
     type(orbit_t), intent(out) :: orbit
     integer, intent(out) :: status           !! COMPLETE or REFUSED
-    real(dp) :: moment(3)   ! along the axes of the orbit, brought near 1
+    real(dp) :: moment(3)   ! moments along the axes of the orbit, scaled to near 1
     real(dp) :: w(3)        ! angular velocity along them
-    type(pair_t) :: exact(3) ! the moments in two words
+    type(pair_t) :: exact(3) ! the moments in double-double
     type(pair_t) :: d12, d13, d23  ! differences of the moments, without sign
     type(pair_t) :: energies(3)    ! I omega**2
     type(pair_t) :: e1, e2, e3     ! d13 omega1**2 I1 + d23 omega2**2 I2 and so on
@@ -103,7 +103,7 @@ contains
       e2 = narrow_gap(exact, w, energies, d12, d23)
     end if
     if (e2%high < 0.0_dp) then
-      ! The other of the extreme axes keeps its direction.
+      ! Omega about the other extreme axis keeps its sign.
       orbit%axes = orbit%axes([3, 2, 1])
       exact = exact([3, 2, 1])
       w = w([3, 2, 1])
@@ -120,7 +120,7 @@ contains
     if (.not. d23%high*e3%high > 0.0_dp .or. .not. max(abs(w(1)), abs(w(3))) > 0.0_dp) then
       call prepare_steady(w, orbit)
     else if (energies(3)%high*d13%high <= FAINT*e3%high) then
-      ! About the middle axis, all but exactly.
+      ! About the middle axis, except for a negligible perturbation.
       status = REFUSED
     else
       call prepare_orbit(exact, w, energies, d12, d13, d23, e1, e2, e3, orbit)
@@ -128,8 +128,8 @@ contains
   end subroutine prepare
 
   pure type(pair_t) function narrow_gap(exact, w, energies, d12, d23) result(gap)
-    !! I3 omega3**2 d23 - I1 omega1**2 d12 beside the separatrix, where nearly all of it cancels:
-    !! from products of three words.
+    !! Compute I3 omega3**2 d23 - I1 omega1**2 d12 near the separatrix, where nearly all of it
+    !! cancels, from products in triple-double.
     type(pair_t), intent(in) :: exact(3)
     real(dp), intent(in) :: w(3)
     type(pair_t), intent(in) :: energies(3), d12, d23
@@ -162,7 +162,7 @@ contains
   end subroutine take_axes
 
   pure subroutine take_signs(w, orbit)
-    !! Point axes 3 and 1 where omega does, and axis 2 so that they are right-handed.
+    !! Point axes 3 and 1 along omega, and axis 2 so that they are right-handed.
     real(dp), intent(inout) :: w(3)
     type(orbit_t), intent(inout) :: orbit
 
@@ -173,7 +173,7 @@ contains
   end subroutine take_signs
 
   pure subroutine prepare_steady(w, orbit)
-    !! A turn about an axis that does not change.
+    !! Prepare a rotation about an axis that does not change.
     real(dp), intent(in) :: w(3)
     type(orbit_t), intent(inout) :: orbit
     type(pair_t) :: speed
@@ -190,18 +190,18 @@ contains
   end subroutine prepare_steady
 
   pure subroutine prepare_orbit(exact, w, energies, d12, d13, d23, e1, e2, e3, orbit)
-    !! Rates, phase and theta series of a motion that is not steady.
+    !! Compute rates, phase and theta series of a motion that is not steady.
     type(pair_t), intent(in) :: exact(3) !! moments
     real(dp), intent(in) :: w(3)
     type(pair_t), intent(in) :: energies(3), d12, d13, d23, e1, e2, e3
     type(orbit_t), intent(inout) :: orbit
-    real(dp) :: moment(3)   ! in one word
-    real(dp) :: largest(3)  ! of omega on the way
+    real(dp) :: moment(3)   ! in double precision
+    real(dp) :: largest(3)  ! largest omega during the motion
     real(dp) :: pole(2)     ! (I2 - I1) I3/((I3 - I2) I1) and I1 E1/(I3 E3), whose product is k**2
     real(dp) :: k, comodulus, slope
     type(pair_t) :: momentum         ! |L|
     type(pair_t) :: scales(2)        ! lambda, lambda k' times `inertia`; u' = lambda
-    type(pair_t) :: inertia          ! root of the product of the moments
+    type(pair_t) :: inertia          ! square root of the product of the moments
 
     orbit%is_steady = .false.
     moment = exact%high
@@ -234,7 +234,7 @@ contains
                           orbit%sense*w(2)/largest(2), w(3)/largest(3), orbit%start%high, &
                           orbit%start%low)
     else
-      ! About axis 3, all but exactly.
+      ! About axis 3, except for a negligible perturbation.
       largest(1:2) = 0.0_dp
     end if
     orbit%theta%size = orbit%theta%size*[largest(1), orbit%sense*largest(2), largest(3)]
@@ -242,14 +242,15 @@ contains
   end subroutine prepare_orbit
 
   pure subroutine take_rates(exact, momentum, inertia, scales, d12, d13, d23, e1, e3, pole, orbit)
-    !! The mean rates: of the phase by the arithmetic-geometric mean, of the turn about the angular
-    !! momentum by the sum that goes with it, of an integral of the third kind (Gauss).
+    !! Compute the mean rates. The rate of the phase comes from the arithmetic-geometric mean. The
+    !! rate of the rotation about the angular momentum is an integral of the third kind, by the sum
+    !! that accompanies the mean (Gauss).
     type(pair_t), intent(in) :: exact(3) !! moments
     real(dp), intent(in) :: pole(2)
     type(pair_t), intent(in) :: momentum, inertia, scales(2), d12, d13, d23, e1, e3
     type(orbit_t), intent(inout) :: orbit
     type(pair_t) :: a, g, p, total, share, part, mean
-    logical :: by_moments ! the first of the poles, else the second: the one nearer to 0
+    logical :: by_moments ! use the first pole, else the second: the one nearer to 0
     real(dp) :: half
     integer :: n
 
@@ -275,7 +276,7 @@ contains
       a = mean
       g = root(part)
     end do
-    ! What one more level would take off.
+    ! One more level would subtract the following term.
     half = (mean%high - g%high) + (mean%low - g%low)
     mean%low = mean%low - half*half/(4.0_dp*mean%high)
     orbit%frequency = mean/inertia
@@ -290,7 +291,8 @@ contains
   end subroutine take_rates
 
   pure subroutine take_ratio(larger, smaller, other, ratio)
-    !! K/(2 K') by the arithmetic-geometric mean of 1 and k, over `other`, that of 1 and k'.
+    !! Compute K/(2 K'): half the arithmetic-geometric mean of 1 and k, over `other`, the mean of 1
+    !! and k'.
     type(pair_t), intent(in) :: larger, smaller, other
     real(dp), intent(out) :: ratio(2)
     type(pair_t) :: a, g, mean
@@ -309,7 +311,7 @@ contains
   end subroutine take_ratio
 
   pure subroutine take_before(orbit)
-    !! So that q is the given one at time 0.
+    !! Set `before` so that q at time 0 is the specified attitude.
     type(orbit_t), intent(inout) :: orbit
     real(dp) :: omega(3), turn(4)
     logical :: has_phase
@@ -320,7 +322,7 @@ contains
   end subroutine take_before
 
   pure type(pair_t) function unsigned(x)
-    !! |x|.
+    !! Return |x|.
     type(pair_t), intent(in) :: x
 
     unsigned = x

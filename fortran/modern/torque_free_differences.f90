@@ -1,24 +1,25 @@
 module torque_free_differences
-  !! How much a torque-free motion makes of a small difference, by differences of its closed form.
+  !! Error amplification in a torque-free motion, by finite differences of its closed form.
   use kinds, only: dp
   use statuses, only: COMPLETE
   use torque_free, only: torque_free_rows
   implicit none(type, external)
   private
 
-  ! Half of the digits of a difference are then its own, where it does not grow; and one that grows
-  ! is small to the end as long as any digit is left.
+  ! Relative size of a perturbation. One that does not grow keeps some bits of its own. One that
+  ! grows remains small to the end as long as any digit of the result is left.
   real(dp), parameter :: SMALL = 2.0_dp**(-48)
   integer, parameter :: INSTANTS = 64
-  ! Where one asks only for more or less than a limit, a few instants tell, if by such a factor; but
-  ! not where the motion passes the middle axis so closely that one instant counts above all.
+  ! If only a comparison with a limit is needed, every APART-th instant suffices when the
+  ! amplification is below the limit by a factor CLEARLY. It does not if the motion passes so close
+  ! to the middle axis that one instant dominates.
   integer, parameter :: APART = 16
   real(dp), parameter :: CLEARLY = 10.0_dp
   real(dp), parameter :: PLAIN = 32.0_dp
-  real(dp), parameter :: EXACTLY(3) = 0.0_dp ! rounding of the coefficients makes no difference
-  real(dp), parameter :: GOLDEN = 0.6180339887498949_dp ! so that no period hides between instants
+  real(dp), parameter :: EXACTLY(3) = 0.0_dp ! rounding of the coefficients has no effect here
+  real(dp), parameter :: GOLDEN = 0.6180339887498949_dp ! spacing; no period hides between instants
 
-  ! Largest quotient of the growth and its estimate, of random bodies and times, with a margin.
+  ! Largest ratio of the amplification to its estimate, for random bodies and times, with a margin.
   real(dp), parameter :: ABOVE_ESTIMATE = 1.5_dp
 
   integer, parameter :: LEVELS = 8 ! of the arithmetic-geometric mean
@@ -28,22 +29,22 @@ module torque_free_differences
 contains
 
   subroutine torque_free_growth_bound(coefficients, omega0, t_end, bound, amplified)
-    !! An upper bound of the growth, by a formula with a measured margin; huge where there is none.
-    !! A perturbation changes the amplitudes and the frequency of a motion. The change of frequency
-    !! becomes a shift of time, in proportion to the time.
+    !! Compute an upper bound of the amplification, by a formula with a measured margin; `bound` is
+    !! huge if there is none. A perturbation changes the amplitudes and the frequency of a motion.
+    !! The change of frequency becomes a shift of time that grows in proportion to the time.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C
     real(dp), intent(in) :: omega0(3)        !! rad/s
     real(dp), intent(in) :: t_end            !! s
     real(dp), intent(out) :: bound
     real(dp), intent(out) :: amplified       !! the part that does not grow with the time
-    real(dp) :: s(3), y(3)       ! |coefficients| and squares of omega0; 2 is the axis of odd sign
-    real(dp) :: near, far        ! s(1) y(3) and s(3) y(1), the larger one first
+    real(dp) :: s(3), y(3)       ! |coefficients| and squares of omega0; axis 2 has the odd sign
+    real(dp) :: near, far        ! s(1) y(3) and s(3) y(1), with the axes as found
     real(dp) :: gap, first, third ! integrals of the motion
-    real(dp) :: most(3)          ! largest |omega| along axes 1 and 3
+    real(dp) :: most(3)          ! largest |omega| along axes 1 and 3, rad/s
     real(dp) :: row(3, 1)        ! omega at t_end
-    real(dp) :: speed            ! largest component of the rate of omega, there
-    real(dp) :: relative         ! derivative of the frequency's logarithm
-    real(dp) :: share            ! of `gap` in the frequency
+    real(dp) :: speed            ! largest component of the rate of omega at t_end
+    real(dp) :: relative         ! derivative of the logarithm of the frequency
+    real(dp) :: share            ! contribution of `gap` to the frequency
     integer :: odd, axes(3), n, status
 
     bound = huge(bound)
@@ -79,9 +80,10 @@ contains
   end subroutine torque_free_growth_bound
 
   pure function share_of_smaller(larger, smaller) result(share)
-    !! The derivative of the logarithm of the arithmetic-geometric mean of two roots, by that of the
-    !! smaller root; with that of the larger one it adds up to 1.
-    real(dp), intent(in) :: larger, smaller !! squares
+    !! Return the derivative of the logarithm of the arithmetic-geometric mean of two roots by the
+    !! logarithm of the smaller root. With the derivative by that of the larger root it adds up to
+    !! 1.
+    real(dp), intent(in) :: larger, smaller !! squares of the roots
     real(dp) :: share
     real(dp) :: a, b, mean, total, weight
     integer :: level
@@ -103,23 +105,23 @@ contains
   end function share_of_smaller
 
   function torque_free_growth_of(coefficients, omega0, t_end, enough) result(growth)
-    !! The largest derivative of omega at `t_end` by omega at any of 64 instants before, 0 among
-    !! them: in the norm of the largest component, and at least 1; below 0 where there is no
-    !! closed form.
+    !! Return the largest norm of the state-transition matrix of omega to `t_end` from any of 64
+    !! earlier instants, which include 0. The norm is that of the largest component. The result is
+    !! at least 1, or negative if there is no closed form.
     real(dp), intent(in) :: coefficients(3)  !! A, B, C
     real(dp), intent(in) :: omega0(3)        !! at time 0, rad/s
     real(dp), intent(in) :: t_end            !! s, where the closed form has a result
-    real(dp), intent(in), optional :: enough !! whether it is larger is all that is asked
+    real(dp), intent(in), optional :: enough !! only whether the result is larger matters
     real(dp) :: growth
     real(dp) :: start(3)      ! omega0 in units that bring it near 1
-    real(dp) :: time          ! t_end in the same
+    real(dp) :: time          ! t_end in these units
     real(dp) :: instants_at(INSTANTS)
     real(dp) :: rows(3, INSTANTS)
     real(dp) :: bound, amplified
     integer :: power, n, status, i
 
     growth = 1.0_dp
-    ! At rest it stays, and so does what is beside it, to first order.
+    ! A body at rest stays at rest, and to first order a perturbed one keeps its omega.
     if (.not. any(abs(omega0) > 0.0_dp)) return
     power = exponent(max(abs(omega0(1)), abs(omega0(2)), abs(omega0(3))))
     start = scale(omega0, -power)
@@ -151,14 +153,14 @@ contains
   end function torque_free_growth_of
 
   function growth_from(coefficients, omega, time) result(growth)
-    !! The norm of the derivative of omega after a time by omega; 0 where it is not known.
+    !! Return the norm of the derivative of omega after a time by omega; 0 if it is unknown.
     real(dp), intent(in) :: coefficients(3), omega(3)
     real(dp), intent(in) :: time
     real(dp) :: growth
-    real(dp) :: beside(3)     ! a state beside omega
-    real(dp) :: ends(3, 0:3)  ! of omega itself, and of one beside it along each axis
-    real(dp) :: step          ! from omega to the state beside it
-    real(dp) :: total(3)      ! sums of the derivative's rows
+    real(dp) :: beside(3)     ! a perturbed omega
+    real(dp) :: ends(3, 0:3)  ! omega after the time, unperturbed and perturbed along each axis
+    real(dp) :: step          ! size of the perturbation
+    real(dp) :: total(3)      ! row sums of the derivative
     integer :: n_rows, status, axis
 
     growth = 0.0_dp
@@ -170,7 +172,7 @@ contains
         step = beside(axis) - omega(axis)
       end if
       call torque_free_rows(coefficients, EXACTLY, beside, 1, [time], ends(:, axis), n_rows, status)
-      ! Beside the middle axis a state may be one that the closed form refuses.
+      ! Near the middle axis the closed form may refuse a perturbed state.
       if (status /= COMPLETE) return
       if (axis > 0) total = total + abs(ends(:, axis) - ends(:, 0))/step
     end do

@@ -1,5 +1,5 @@
 module torque_free_turn
-  !! A torque-free motion whose constants are known, at a time: angular velocity and attitude.
+  !! The state of a torque-free motion at a time, from its constants: angular velocity and attitude.
   use kinds, only: dp
   use statuses, only: COMPLETE, GAVE_UP, OVERFLOW
   use theta_functions, only: elliptic_functions, theta_t
@@ -11,21 +11,21 @@ module torque_free_turn
   real(dp), parameter :: LARGE_PHASE = 1e15_dp
 
   type, public :: orbit_t
-    !! One torque-free motion, in axes of its own: 2 has the middle moment, 3 is the one about
-    !! which the motion does not change its direction, and 1, 2, 3 are right-handed.
+    !! One torque-free motion, in axes of its own. Axis 2 has the middle moment, omega about axis 3
+    !! does not change its sign, and axes 1, 2, 3 are right-handed.
     logical :: is_steady
-    integer :: axes(3)          !! of the body, for each of the orbit
+    integer :: axes(3)          !! axis of the body for each axis of the orbit
     real(dp) :: signs(3)        !! a component of the orbit is this times that of the body
     integer :: omega_exponent   !! angular velocity is 2**this times the orbit's
-    real(dp) :: omega(3)        !! at time 0, body axes, as given
-    real(dp) :: attitude(4)     !! at time 0, body axes
-    real(dp) :: before(4)       !! q = before D, vector in axes of the orbit
-    type(pair_t) :: half_rate   !! of the turn about axis 3 beside what the theta function adds
-    type(pair_t) :: frequency   !! of the phase
+    real(dp) :: omega(3)        !! at time 0, about the body's axes, as specified
+    real(dp) :: attitude(4)     !! at time 0, about the body's axes
+    real(dp) :: before(4)       !! q = before D, with the vector part in axes of the orbit
+    type(pair_t) :: half_rate   !! of the rotation about axis 3, without the theta function's part
+    type(pair_t) :: frequency   !! frequency of the phase
     type(pair_t) :: start       !! the phase at time 0
-    type(theta_t) :: theta      !! its sizes are those of omega
-    real(dp) :: direction(3)    !! omega times it is L/|L|; of a steady omega, omega/|omega|
-    real(dp) :: sense           !! of the phase: the sign of I3 - I1
+    type(theta_t) :: theta      !! its sizes contain the amplitudes of omega
+    real(dp) :: direction(3)    !! times omega it is L/|L|; for a steady omega, omega/|omega|
+    real(dp) :: sense           !! sign of the phase: that of I3 - I1
   end type orbit_t
 
   public :: evaluate, into_orbit, product_of_quaternions, turned
@@ -33,12 +33,12 @@ module torque_free_turn
 contains
 
   pure subroutine evaluate(orbit, time, omega, attitude, status)
-    !! The state at a time.
+    !! Compute the state at a time.
     type(orbit_t), intent(in) :: orbit
     real(dp), intent(in) :: time
     real(dp), intent(out) :: omega(3), attitude(4)
     integer, intent(out) :: status
-    real(dp) :: t              ! in the orbit's unit
+    real(dp) :: t              ! time in the orbit's unit
     real(dp) :: w(3), turn(4)
     logical :: has_phase
     integer :: i
@@ -76,14 +76,14 @@ contains
   end subroutine evaluate
 
   pure subroutine turned(orbit, t, w, turn, has_phase)
-    !! Angular velocity and the turn D, in axes of the orbit.
+    !! Compute angular velocity and the rotation D, in axes of the orbit.
     type(orbit_t), intent(in) :: orbit
     real(dp), intent(in) :: t
     real(dp), intent(out) :: w(3), turn(4)
     logical, intent(out) :: has_phase ! whether the phase has a digit left
     real(dp) :: angle, angle_low, rest, sine, cosine
-    real(dp) :: c, s           ! theta function of the turn: its real and its imaginary part
-    real(dp) :: part           ! of the angle that the theta function adds
+    real(dp) :: c, s           ! theta function of the rotation: real and imaginary part
+    real(dp) :: part           ! angle that the theta function adds
     real(dp) :: m(3)           ! direction of the angular momentum
     real(dp) :: along, across, inverse
     type(pair_t) :: phase
@@ -118,7 +118,7 @@ contains
   end subroutine turned
 
   pure function into_orbit(orbit, attitude) result(found)
-    !! A quaternion with its vector in axes of the orbit.
+    !! Return a quaternion with its vector part in axes of the orbit.
     type(orbit_t), intent(in) :: orbit
     real(dp), intent(in) :: attitude(4)
     real(dp) :: found(4)

@@ -11,10 +11,10 @@ module torque_law
 contains
 
   pure subroutine torque_at(problem, time, time_low, m)
-    !! Torque at time + time_low.
+    !! Compute the torque over moment at time + time_low.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: time      !! s
-    real(dp), intent(in) :: time_low  !! what its rounding left out, s
+    real(dp), intent(in) :: time_low  !! rounding error of time, s
     real(dp), intent(out) :: m(3)     !! 1/s2
 
     m = problem%constant + problem%rate*time
@@ -25,7 +25,7 @@ contains
   end subroutine torque_at
 
   pure subroutine add_waves(n, waves, are_sines, time, time_low, m)
-    !! Add sines or cosines.
+    !! Add the sines or the cosines.
     integer, intent(in) :: n
     real(dp), intent(in) :: waves(4, n) !! amplitude (3), 1/s2; frequency, rad/s
     logical, intent(in) :: are_sines
@@ -42,7 +42,7 @@ contains
   end subroutine add_waves
 
   pure subroutine torque_rate_at(problem, time, rate)
-    !! Derivative of the torque by time.
+    !! Compute the derivative of the torque over moment by time.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: time      !! s
     real(dp), intent(out) :: rate(3)  !! 1/s3

@@ -1,34 +1,36 @@
 module torque_noise
-  !! Rounding of a torque whose terms nearly cancel. Each term, divided by a moment, is rounded by
-  !! itself, by some 2**-53 of its own size; where the sum of the terms is much smaller than each,
-  !! that is much of the sum, and no method can know the solution any better.
+  !! Rounding error of a torque whose terms nearly cancel. Each term, divided by a moment, is
+  !! rounded separately, with an error of some 2**-53 of its own size. If the sum of the terms is
+  !! much smaller than each, this is a large part of the sum, and no method can determine the
+  !! solution more accurately.
   use kinds, only: dp
   use problem, only: problem_t
   implicit none(type, external)
   private
 
-  integer, parameter :: SAMPLES = 8          ! of the angular velocity that the sum has given
-  real(dp), parameter :: LOOSE = 4.0_dp      ! terms that make so many times their sum don't cancel
-  real(dp), parameter :: QUIET = 2.0_dp      ! terms that give so little of omega don't matter
-  real(dp), parameter :: SMALL = 1e-4_dp     ! rad; an angle whose square hardly counts
+  integer, parameter :: SAMPLES = 8          ! times at which the omega from the sum is evaluated
+  real(dp), parameter :: LOOSE = 4.0_dp      ! terms up to this multiple of their sum do not cancel
+  real(dp), parameter :: QUIET = 2.0_dp      ! terms up to this multiple of omega do not matter
+  real(dp), parameter :: SMALL = 1e-4_dp     ! rad; the square of a smaller angle hardly counts
 
   public :: torque_noise_of, wave_rounding_of
 
 contains
 
   pure real(dp) function torque_noise_of(problem, t, steps, scale) result(noise)
-    !! What the terms of the torque give one by one until `t`, over the largest angular velocity:
-    !! times the rounding of a number it is an error, relative. 0 where the terms do not cancel.
+    !! Return the angular velocity that the terms of the torque add one by one until `t`, over the
+    !! largest angular velocity. Times the unit roundoff this is a relative error. The result is 0
+    !! if the terms do not cancel.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: t      !! s
-    real(dp), intent(in) :: steps  !! in each of which terms are rounded; huge: none
-    real(dp), intent(in) :: scale  !! largest |omega|, rad/s; not above 0: its opposite is that of
-    !! the start, and the sum of the terms may give more
-    real(dp) :: alone(3)     ! angular velocity that the terms give one by one, rad/s
-    real(dp) :: walked(3)    ! the same of the roundings in all steps
-    real(dp) :: together(3)  ! and the largest that their sum gives
-    real(dp) :: push(3)      ! of a wave all the time, rad/s
-    real(dp) :: angle        ! of a wave at the end, rad
+    real(dp), intent(in) :: steps  !! number of steps; terms are rounded in each; huge: not rounded
+    real(dp), intent(in) :: scale  !! largest |omega|, rad/s; if not above 0, minus the initial
+    !! |omega|, to which the sum of the terms may add
+    real(dp) :: alone(3)     ! angular velocity that the terms add one by one, rad/s
+    real(dp) :: walked(3)    ! the same for the rounding errors in all steps
+    real(dp) :: together(3)  ! the largest that their sum adds
+    real(dp) :: push(3)      ! amplitude of a wave times the whole time, rad/s
+    real(dp) :: angle        ! angle of a wave at the end, rad
     real(dp) :: most, part
     integer :: n
 
@@ -63,8 +65,8 @@ contains
   end function torque_noise_of
 
   pure real(dp) function wave_rounding_of(problem, t, steps, scale) result(noise)
-    !! What the rounding of the waves in every step adds up to until `t`, as a random walk, over the
-    !! largest angular velocity: times the rounding of a number it is an error, relative.
+    !! Return the sum of the rounding errors of the waves in every step until `t`, as a random walk,
+    !! over the largest angular velocity. Times the unit roundoff this is a relative error.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: t      !! s
     real(dp), intent(in) :: steps
@@ -84,7 +86,7 @@ contains
   end function wave_rounding_of
 
   pure real(dp) function share_of_sine(angle)
-    !! Largest integral of a sine until an angle, over the angle.
+    !! Return the largest integral of a sine up to an angle, over that angle.
     real(dp), intent(in) :: angle !! at least 0, rad
 
     share_of_sine = min(0.5_dp*angle, 1.0_dp)
@@ -92,7 +94,7 @@ contains
   end function share_of_sine
 
   pure function sum_until(problem, t)
-    !! Angular velocity that the torque alone gives until `t`, rad/s.
+    !! Compute the angular velocity that the torque alone adds until `t`, rad/s.
     type(problem_t), intent(in) :: problem
     real(dp), intent(in) :: t
     real(dp) :: sum_until(3)
@@ -111,7 +113,7 @@ contains
   end function sum_until
 
   pure real(dp) function quotient(angle)
-    !! Sine over angle.
+    !! Return the sine over the angle.
     real(dp), intent(in) :: angle
 
     quotient = 1.0_dp

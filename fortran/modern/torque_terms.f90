@@ -1,5 +1,6 @@
 module torque_terms
-  !! Torque over moment, constant + rate t + sines + cosines, in the Taylor terms of omega.
+  !! The part of omega's Taylor terms that the torque adds, by the law of torque over moment:
+  !! constant + rate t + sines + cosines.
   use kinds, only: dp
   use problem, only: problem_t
   use series, only: MOST_ORDER
@@ -7,7 +8,8 @@ module torque_terms
   implicit none(type, external)
   private
 
-  ! Weights in fours: eight orders more than the series has, for sine and cosine of the turn.
+  ! Weights in groups of four, for eight orders more than the series: sine and cosine of the angle
+  ! need them.
   integer, parameter :: MOST_FOURS = MOST_ORDER/4 + 2
   integer :: order_
   real(dp), parameter :: FACTORIALS(4*MOST_FOURS + 1) = &
@@ -16,30 +18,31 @@ module torque_terms
   real(dp), parameter :: WEIGHTS(4, MOST_FOURS) = &
                          reshape([(SIGNS(mod(order_ - 1, 4))/gamma(real(order_ + 1, dp)), &
                                    order_=1, 4*MOST_FOURS)], [4, MOST_FOURS])
-  ! Lanes of powers are put together without a store, for which the next load would wait.
+  ! Each column selects a lane. Powers are put together without a store, for which a load would
+  ! wait.
   real(dp), parameter :: LANES(4, 0:3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, &
                                                   0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, &
                                                   0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, &
                                                   0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [4, 4])
-  real(dp), parameter :: SMALL_TURN = 1e-8_dp ! rad; its square no longer counts
-  real(dp), parameter :: PHASE = 0.01_dp      ! of the error that a step may make in an angle
+  real(dp), parameter :: SMALL_TURN = 1e-8_dp ! rad; the square of a smaller angle is negligible
+  real(dp), parameter :: PHASE = 0.01_dp      ! part of a step's error that an angle may cause
 
-  ! A column of `wave_t` is what a step needs of a wave, side by side.
+  ! All that a step needs of a wave, side by side.
   type, public :: wave_t
     real(dp) :: amplitude(4)  !! 1/s2, the fourth 0
     real(dp) :: frequency     !! rad/s
-    real(dp) :: value         !! of the wave, a sine or a cosine, at the step's beginning
+    real(dp) :: value         !! of the sine or cosine at the step's beginning
     real(dp) :: slope         !! its derivative by the angle
-    real(dp) :: sine          !! of the turn in the step
-    real(dp) :: versine       !! 1 - cosine
+    real(dp) :: sine          !! sine of the angle of the step
+    real(dp) :: versine       !! 1 - cosine of that angle
     real(dp) :: even(4)       !! amplitude times value and step, rad/s
     real(dp) :: odd(4)        !! amplitude times slope and step, rad/s
-    real(dp) :: parts(4, MOST_FOURS) !! of even and odd, in turn, in the terms
+    real(dp) :: parts(4, MOST_FOURS) !! weights of `even` and `odd`, in turn, in the terms
     logical :: is_sine
   end type wave_t
 
-  integer, parameter :: AFRESH = 16         ! steps until sine and cosine are made anew
-  ! Share of a step's error below which they are in each step: turns of equal steps err alike.
+  integer, parameter :: AFRESH = 16         ! steps until sine and cosine are recomputed
+  ! Below this local tolerance they are recomputed in each step, as equal steps have equal errors.
   real(dp), parameter :: FINE = 1e-16_dp
 
   public :: longest_turn, steps_by_turns, torque_terms_at, turn_waves, waves_of
@@ -47,7 +50,7 @@ module torque_terms
 contains
 
   pure subroutine waves_of(problem, waves)
-    !! Sines, then cosines.
+    !! Copy the waves of a problem, sines before cosines.
     type(problem_t), intent(in) :: problem
     type(wave_t), intent(inout) :: waves(problem%n_sines + problem%n_cosines)
     integer :: n
@@ -65,7 +68,7 @@ contains
   end subroutine waves_of
 
   pure real(dp) function longest_turn(order, local_tolerance)
-    !! Turn of a wave up to which its weights give its sine and cosine, rad.
+    !! Return the largest angle, rad, for which the weights of a wave give its sine and cosine.
     integer, intent(in) :: order    !! of the series
     real(dp), intent(in) :: local_tolerance !! largest relative error of a step
     integer :: n
@@ -75,7 +78,7 @@ contains
   end function longest_turn
 
   pure integer function steps_by_turns(local_tolerance)
-    !! Steps after which the sines and cosines of waves are made anew.
+    !! Return the number of steps after which the sines and cosines of waves are recomputed.
     real(dp), intent(in) :: local_tolerance !! largest relative error of a step
 
     steps_by_turns = merge(1, AFRESH, local_tolerance < FINE)
@@ -88,24 +91,24 @@ contains
   end function fours_of
 
   pure subroutine torque_terms_at(constant, rate, t, t_low, h, order, longest, fresh, waves, torque)
-    !! What the torque adds to the terms of omega around t, rad/s.
+    !! Compute the terms of omega around t that the torque adds, rad/s.
     real(dp), intent(in) :: constant(4) !! 1/s2, the fourth 0
     real(dp), intent(in) :: rate(4)    !! 1/s3
     real(dp), intent(in) :: t          !! s
-    real(dp), intent(in) :: t_low      !! rounding of t, s
+    real(dp), intent(in) :: t_low      !! rounding error of t, s
     real(dp), intent(in) :: h          !! step, s
     integer, intent(in) :: order
-    real(dp), intent(in) :: longest    !! turn that needs no sine and cosine, rad
-    logical, intent(in) :: fresh       !! sine and cosine of t, not by the turns so far
+    real(dp), intent(in) :: longest    !! largest angle that needs no call of sine and cosine, rad
+    logical, intent(in) :: fresh       !! recompute sine and cosine at t instead of advancing them
     type(wave_t), intent(inout) :: waves(:)
-    real(dp), intent(inout) :: torque(4, MOST_ORDER) !! from the third order 0 without waves
+    real(dp), intent(inout) :: torque(4, MOST_ORDER) !! 0 from order 3 on if there are no waves
     real(dp), dimension(4) :: p, q, r, u
     integer :: i, j, n
 
     do n = 1, size(waves)
       call weigh(t, t_low, h, order, longest, fresh, waves(n))
     end do
-    ! What the rest of the torque adds begins two of the sums.
+    ! The constant and the linear torque start two of the sums.
     do i = 1, 4
       p(i) = h*(constant(i) + rate(i)*t + rate(i)*t_low)
       q(i) = (0.5_dp*h)*(h*rate(i))
@@ -133,15 +136,16 @@ contains
   end subroutine torque_terms_at
 
   pure subroutine weigh(t, t_low, h, order, longest, fresh, wave)
-    !! The derivatives of a wave run value, slope, -value, -slope; term k has turn**(k - 1)/k! of
-    !! them. Those weights know no phase: their sums are the sine and the versine of the turn.
+    !! Compute the weights of a wave. Its derivatives are value, slope, -value and -slope in turn,
+    !! and term k contains turn**(k - 1)/k! of them. The weights do not depend on the phase, and
+    !! their sums are the sine and the versine of the angle of the step.
     real(dp), intent(in) :: t, t_low, h, longest
     integer, intent(in) :: order
     logical, intent(in) :: fresh
     type(wave_t), intent(inout) :: wave
     real(dp) :: powers(4), totals(4)
-    real(dp) :: turn                   ! rad
-    real(dp) :: square, fourth         ! powers of the turn
+    real(dp) :: turn                   ! angle of the step, rad
+    real(dp) :: square, fourth         ! powers of that angle
     real(dp) :: sine, cosine
     integer :: i, j
 
@@ -153,7 +157,7 @@ contains
     turn = wave%frequency*h
     square = turn*turn
     fourth = square*square
-    ! Smaller numbers than that cost the processor time, and count for nothing.
+    ! Smaller numbers take the processor longer, and are negligible.
     if (abs(turn) < SMALL_TURN) fourth = 0.0_dp
     do i = 1, 4
       powers(i) = (LANES(i, 0) + turn*LANES(i, 1)) + square*(LANES(i, 2) + turn*LANES(i, 3))
@@ -181,7 +185,7 @@ contains
   end subroutine weigh
 
   pure subroutine turn_waves(waves)
-    !! To the end of the step.
+    !! Advance the waves to the end of the step.
     type(wave_t), intent(inout) :: waves(:)
     real(dp) :: value
     integer :: n

@@ -1,19 +1,19 @@
 module two_words
-  !! Numbers of two words: what rounding takes off the first is in the second.
+  !! Double-double arithmetic: a second number holds the rounding error of the first.
   use kinds, only: dp
   implicit none(type, external)
   private
 
   integer, parameter :: i8 = selected_int_kind(18)
   integer(i8), parameter :: UPPER_BITS = -134217728_i8 ! all but the last 27 bits
-  real(dp), parameter :: SMALL_PHASE = 1e6_dp ! up to it one term corrects sine and cosine
+  real(dp), parameter :: SMALL_PHASE = 1e6_dp ! rad; up to it one term corrects sine and cosine
 
   public :: scaled, sine_cosine, sine_cosine_of, square_root, two_product, two_sum
 
 contains
 
   pure subroutine sine_cosine(angle, angle_low, sine, cosine)
-    !! Sine and cosine of angle + angle_low.
+    !! Compute sine and cosine of angle + angle_low.
     real(dp), intent(in) :: angle, angle_low
     real(dp), intent(out) :: sine, cosine
     real(dp) :: s, c
@@ -30,8 +30,8 @@ contains
   end subroutine sine_cosine
 
   pure subroutine sine_cosine_of(frequency, t, t_low, sine, cosine)
-    !! Sine and cosine of frequency (t + t_low), with what the rounding of the product leaves out:
-    !! after 1e5 radians that is worth 1e-11.
+    !! Compute sine and cosine of frequency (t + t_low), with the rounding error of the product,
+    !! which is 1e-11 after 1e5 radians.
     real(dp), intent(in) :: frequency      !! rad/s
     real(dp), intent(in) :: t, t_low       !! s
     real(dp), intent(out) :: sine, cosine
@@ -42,7 +42,7 @@ contains
   end subroutine sine_cosine_of
 
   pure subroutine square_root(x, x_low, root, root_low)
-    !! Square root of x + x_low to twice the working digits.
+    !! Compute the square root of x + x_low in double-double.
     real(dp), intent(in) :: x, x_low
     real(dp), intent(out) :: root, root_low
     real(dp) :: square, square_low
@@ -53,7 +53,7 @@ contains
   end subroutine square_root
 
   pure subroutine scaled(x, x_low, factor, y, y_low)
-    !! (x + x_low) factor to twice the working digits.
+    !! Compute (x + x_low) factor in double-double.
     real(dp), intent(in) :: x, x_low, factor
     real(dp), intent(out) :: y, y_low
 
@@ -62,7 +62,7 @@ contains
   end subroutine scaled
 
   pure subroutine two_sum(x, y, total, rest)
-    !! x + y = total + rest, exactly (Knuth).
+    !! Compute total and rest with x + y = total + rest, exactly (Knuth).
     real(dp), intent(in) :: x, y
     real(dp), intent(out) :: total, rest
     real(dp) :: s, part
@@ -74,7 +74,8 @@ contains
   end subroutine two_sum
 
   pure subroutine two_product(x, y, product, rest)
-    !! x y = product + rest up to 2**-106 of it (Dekker, halves cut off by their bits).
+    !! Compute product and rest with x y = product + rest to 2**-106 of it (Dekker, with truncated
+    !! halves).
     real(dp), intent(in) :: x, y
     real(dp), intent(out) :: product, rest
     real(dp) :: xh, xl, yh, yl, p

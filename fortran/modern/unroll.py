@@ -1,9 +1,10 @@
-"""Write the hot modules for one instruction set: other names, and the marked loops written out.
+"""Write the performance-critical modules for one instruction set, with the marked loops unrolled.
 
-In one file: within it the compiler may put a procedure where it is called.
+The names of modules and entry points get suffixes. All modules go into one file, because a compiler
+inlines procedures within a file.
 
-The recurrence is C with a register for all three axes where there is one: no Fortran compiler makes
-the turns of its lanes that this needs. A processor without gets Fortran, axis by axis.
+If a processor has registers for all three axes, the recurrence is written in C: no Fortran compiler
+generates the permutations of their lanes that it needs. Other processors get Fortran, axis by axis.
 """
 
 import re
@@ -42,32 +43,33 @@ LEAST_ORDER, MOST_ORDER = 12, 24
 ORDERS = range(LEAST_ORDER, MOST_ORDER + 1, 2)
 ORDER_CARRIED = 7
 ORDER_PRECISE = 10
-# The two factors of the products in equations 13-15, and where the plain code has each unknown.
+# The two factors of the products in equations 13-15, and the arrays in which the plain code stores
+# each unknown.
 FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
 PLACES = {
     "x": ("left(2", "left(3"),
     "y": ("left(1", "right(3"),
     "z": ("right(1", "right(2"),
 }
-WIDE, LAG = 10, 2  # from this order on; the newest terms that are left out
-# Where series_t has them, from its beginning.
+WIDE, LAG = 10, 2  # order from which sums are over all axes at once; newest terms not in them
+# Offsets of the members of series_t, in numbers.
 TORQUE = 4 * (MOST_ORDER + 1)
 RATES = TORQUE + 4 * MOST_ORDER
 CHANGE = RATES + 4
 TURNS = CHANGE + 4 + 12
-MORE_TURNS = 2  # terms of the attitude beyond the order: what a step leaves out begins with them
+MORE_TURNS = 2  # terms of the attitude beyond the order: the first of the truncation error
 HALF = TURNS + 4 * (MOST_ORDER + MORE_TURNS + 1)
 TURN = HALF + 4
-# Of the parts of q (0, x, y, z), axis by axis.
+# Signs of the parts of q (0, x, y, z), axis by axis.
 SIGNS = ("-1.0, 1.0, 1.0, -1.0", "-1.0, -1.0, 1.0, 1.0", "-1.0, 1.0, -1.0, 1.0")
 
 
 def main(level: str, target: str, *sources: str) -> None:
-    """Write `target`, Fortran from `sources` or C, for an instruction set."""
+    """Write `target`, Fortran from `sources` or C, for the instruction set `level`."""
     if target.endswith(".c"):
         written = "\n".join(c_source(level)) + "\n"
     else:
-        # So that a module may stand in more than one file.
+        # The name of the file makes those of modules unique: a module may be in several files.
         file = Path(target).stem
         texts = (Path(source).read_text() for source in sources)
         written = "".join(fortran_source(text, level, file) for text in texts)
@@ -78,17 +80,17 @@ def main(level: str, target: str, *sources: str) -> None:
 
 
 def recurrence(order: int) -> Iterator[str]:
-    """Yield the terms up to `order`, each statement of three unknowns at once.
+    """Yield the statements for the terms up to `order`, each for three unknowns at once.
 
-    Term k is t, turned by one axis a and by two axes b; m is what the torque adds to it, f the step
-    times A, B, C, i one over k. Products of older terms are summed ahead, those of the newest come
-    last: from one term to the next there is a turn and two sums.
+    Term k is t; a and b are t rotated by one and by two axes. m is the torque's part of it, f the
+    step times A, B, C, and i one over k. Products of older terms are summed first and products of
+    the newest term last, so that there is one rotation and two sums from one term to the next.
     """
     yield from ("g = f*a0", "h = f*b0", "t1 = g*b0 + m1")
     for k in range(2, order + 1):
         n = k - 1
         pairs = sorted(((j, n - j) for j in range(1, n)), key=max)
-        # Two sums, so that one need not wait for itself.
+        # Two sums, so that no sum has to wait for itself.
         sums = ("q", "r") if len(pairs) > 3 else ("q",)
         for m, (j, i) in enumerate(pairs):
             place = f"{sums[m % len(sums)]}{k}"
@@ -110,7 +112,7 @@ def recurrence(order: int) -> Iterator[str]:
 
 
 def fortran_source(text: str, level: str, file: str) -> str:
-    """Return a module for one instruction set; its name ends in the file's."""
+    """Return a module for one instruction set; its name ends in the name of the file."""
     for module in MODULES:
         text = re.sub(rf"\b(module|use) {module}\b", rf"\1 {module}_{file}", text)
     text = re.sub(r'(bind\(c, name="\w+_)level"', rf'\1{level}"', text)
@@ -134,7 +136,7 @@ def fortran_source(text: str, level: str, file: str) -> str:
 
 
 def fortran_door(name: str, entry: str, level: str) -> Iterator[str]:
-    """Yield the call of the C that does it for this instruction set."""
+    """Yield a procedure that calls the C function for this instruction set."""
     yield from f"""subroutine {name}(order, s)
   integer(c_int), intent(in), value :: order
   type(series_t), intent(inout) :: s
@@ -151,11 +153,11 @@ end subroutine {name}""".splitlines()
 
 
 def fortran_terms() -> Iterator[str]:
-    """Yield the recurrence for a processor that has no register of four.
+    """Yield the recurrence for a processor that has no register of four numbers.
 
-    An unknown by itself at low orders, then the older products of all three side by side. Numbers
-    just stored one by one can't be loaded together without a wait: the newest two terms of each
-    factor stay out of those sums.
+    Low orders treat each unknown by itself. Higher orders sum the older products of all three side
+    by side. Numbers just stored one by one cannot be loaded together without a wait, so the newest
+    two terms of each factor are not in those sums.
     """
     yield "subroutine expand(order, s)"
     yield "  integer(c_int), intent(in), value :: order"
@@ -185,10 +187,11 @@ def fortran_terms() -> Iterator[str]:
 
 
 def known(n: int) -> Iterator[str]:
-    """Yield p1 ... p3 and q1 ... q3: of the Cauchy products n and n + 1, what is known by now.
+    """Yield p1 ... p3 and q1 ... q3: the parts of the Cauchy products n and n + 1 known so far.
 
-    From the middle outwards, so that the newest terms come last; two orders at once, so that a
-    term that is loaded serves twice; two sums for each, so that one need not wait for itself.
+    The products are added from the middle outwards, so that the newest terms come last. Two orders
+    are computed at once, so that each loaded term is used twice. Each has two sums, so that no sum
+    has to wait for itself.
     """
     begun = set()
     for j in range((n + 1) // 2, 0, -1):
@@ -239,14 +242,14 @@ def term(k: int, total: str) -> Iterator[str]:
 
 
 def end_of_terms() -> Iterator[str]:
-    """Yield the largest terms' part in the sum."""
+    """Yield the sum of the terms, to which the largest terms are added last."""
     for axis, name in enumerate("xyz", 1):
         yield f"s%change({axis}) = ((tail{axis} + {name}3) + {name}2) + {name}1"
     yield "s%change(4) = 0.0_dp"
 
 
 def fortran_multiply() -> Iterator[str]:
-    """Yield the exponential of a matrix without diagonal, times vectors side by side."""
+    """Yield the product of several vectors with the exponential of a matrix of zero diagonal."""
     yield "pure subroutine multiply(o, lanes)"
     yield "  real(dp), intent(in) :: o(6)"
     yield "  real(dp), intent(inout) :: lanes(4, 3)"
@@ -267,7 +270,7 @@ def fortran_multiply() -> Iterator[str]:
 
 
 def fortran_precise() -> Iterator[str]:
-    """Yield the linear part of the recurrence, for vectors side by side."""
+    """Yield the linear part of the recurrence for vectors side by side."""
     names = [f"{name}{k}" for k in range(ORDER_PRECISE + 1) for name in "xyz"]
     yield "pure subroutine propagate_precisely(s)"
     yield "  type(series_t), intent(inout) :: s"
@@ -296,7 +299,7 @@ def fortran_precise() -> Iterator[str]:
 
 
 def c_source(level: str) -> Iterator[str]:
-    """Yield a function for each order, and one that chooses."""
+    """Yield a C function for each order, and one that calls them by order."""
     yield from """/* Written by unroll.py: the Taylor terms of a step, one register a term. */
 #include <immintrin.h>
 
@@ -327,7 +330,7 @@ def c_source(level: str) -> Iterator[str]:
 
 
 def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
-    """Yield the statements for omega, and among them those for the attitude, which wait less."""
+    """Yield the statements for omega, mixed with those for the attitude, which wait less."""
     yield f"const __m256d f = {load(RATES)}, t0 = {load(0)};"
     yield "const __m256d a0 = TURNED_ONCE(t0), b0 = TURNED_TWICE(t0);"
     if with_attitude:
@@ -362,7 +365,7 @@ def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
     if with_attitude:
         k = order + 1
         yield from attitude_term(k, wide)
-        # Of omega there is no such term.
+        # Omega has no term of this order.
         yield f"const __m256d t{k} = _mm256_setzero_pd();"
         yield from ready_for_products(k, wide)
         yield from attitude_term(k + 1, wide)
@@ -371,9 +374,9 @@ def c_terms(order: int, with_attitude: bool, wide: bool) -> Iterator[str]:
 
 
 def ready_for_products(k: int, wide: bool) -> Iterator[str]:
-    """Yield the factors of term k of omega, and those of term k of the attitude.
+    """Yield the factors that term k of omega and term k of the attitude contribute to products.
 
-    A wide register has two terms, of the attitude k - 1 and k, of omega k and k - 1.
+    A wide register has two terms: k - 1 and k of the attitude, or k and k - 1 of omega.
     """
     for axis in (1, 2, 3):
         yield f"const __m256d o{axis}_{k} = _mm256_mul_pd(AXIS(t{k}, {axis}), h{axis});"
@@ -387,11 +390,11 @@ def ready_for_products(k: int, wide: bool) -> Iterator[str]:
 
 
 def attitude_term(k: int, wide: bool) -> Iterator[str]:
-    """Yield term k of the attitude: a kth of its products with omega, the newest term's last."""
+    """Yield term k of the attitude: products with omega over k, those of the newest term last."""
     older = range(k - 1)
     if wide:
         pairs = [i for i in older if i % 2 and i < k - 1]
-        # What is there before the others first, so that the sums need not wait for the newest.
+        # Products whose factors are known earlier come first: sums then wait only for the newest.
         for n, i in enumerate(sorted(pairs, key=lambda i: max(i, k - i))):
             for axis in (1, 2, 3):
                 given = f"pp{axis}_{i}, oo{axis}_{k - i}"
@@ -434,7 +437,7 @@ def attitude_term(k: int, wide: bool) -> Iterator[str]:
 
 
 def c(line: str, known: set[str]) -> str:
-    """Return a statement for a register, declaring what it names first."""
+    """Return a C statement for a register, which the statement declares if it is new."""
     target, value = line.split(" = ")
     value = re.sub(r"\bi(\d+)", r"_mm256_set1_pd(1.0 / \1)", value)
     value = re.sub(r"\bm(\d+)", lambda found: load(TORQUE + 4 * int(found[1]) - 4), value)
@@ -451,7 +454,7 @@ def c(line: str, known: set[str]) -> str:
 
 
 def load(place: int) -> str:
-    """Return what stands at a place of series_t."""
+    """Return the C expression that loads four numbers at an offset of series_t."""
     return f"_mm256_load_pd(s + {place})"
 
 

@@ -1,11 +1,11 @@
-"""Write out the step of many series side by side: one loop over the lanes for each order."""
+"""Write out the step of many series side by side, with one loop over the lanes for each order."""
 
 import itertools
 import re
 from collections.abc import Iterator
 
 ORDERS = (8, 12, 20, 24)
-CARRIED = 7  # order of the exponential that carries differences
+CARRIED = 7  # order of the exponential that propagates perturbations
 MOMENTS = 8  # terms that count in the mean of omega over a step
 FACTORS = (("x", "y", "z", "fa"), ("y", "x", "z", "fb"), ("z", "x", "y", "fc"))
 BEGINNING = """h = s%h(i)
@@ -26,7 +26,7 @@ if (abs(rest) < 2.0_dp*abs(next)) r = 0.5_dp*rest
 if (abs(rest) <= abs(next)) r = rest
 next = r
 r = next/h"""
-# Of the terms left out, as estimate_truncation of taylor_error.f90 has them.
+# Poles of the truncation error, as in estimate_truncation of taylor_error.f90.
 POLES = """uu = RIDGE*((ux*ux + uy*uy + uz*uz) + (vx*vx + vy*vy + vz*vz))
 vv = RIDGE*((vx*vx + vy*vy + vz*vz) + (wx*wx + wy*wy + wz*wz))
 uv = (ux*vx + uy*vy + uz*vz) + (vx*wx + vy*wy + vz*wz)
@@ -59,9 +59,9 @@ s%going(i) = next"""
 
 
 def paired(text: str) -> Iterator[str]:
-    """Yield a procedure whose loop over m lanes does two halves in turn, three statements each.
+    """Yield a procedure whose loop over m lanes alternates two halves, by three statements each.
 
-    What one half waits for, the other does meanwhile: the processor looks ahead less far than that.
+    While one half waits, the other one computes. The processor itself does not look so far ahead.
     """
     head, rest = text.split("do i = 1, m\n")
     body, end = rest.split("end do\n", 1)
@@ -86,7 +86,7 @@ def _of_other_half(line: str, names: set[str]) -> str:
 
 
 def many_steps() -> Iterator[str]:
-    """Yield a procedure for each order, and the one that chooses."""
+    """Yield a procedure for each order, and the one that calls them by order."""
     yield "pure subroutine step(order, waves, m, s)"
     yield "  integer, intent(in) :: order, m"
     yield "  logical, intent(in) :: waves"
@@ -134,7 +134,7 @@ def one_step(order: int, waves: bool) -> Iterator[str]:
         yield f"part = total - {x}0"
         yield f"s%low(i, {axis}) = ({x}0 - (total - part)) + (change - part)"
         yield f"s%w(i, {axis}) = total"
-    # The last four terms of the step, over what they may come to.
+    # The last four terms of the step, over their allowed size.
     yield f"power = {' * '.join(['r'] * (order - 3))}".replace(" * ", "*")
     yield "power = power/max(allowed, LEAST)"
     for k, name in zip(range(order - 3, order + 1), "wvul", strict=True):
@@ -166,7 +166,7 @@ def one_step(order: int, waves: bool) -> Iterator[str]:
             yield f"ez = (ozx*ex + ozy*ey)*(1.0_dp/{k}.0_dp) + dz"
             yield from ("ex = gx", "ey = gy")
         for place, x in zip(places, "xyz", strict=True):
-            # What it leaves out, the step takes away.
+            # The truncation error of the step is subtracted.
             if column == 0:
                 yield f"e{x} = e{x} - (p*l{x} - q*u{x})"
             else:
@@ -174,13 +174,13 @@ def one_step(order: int, waves: bool) -> Iterator[str]:
             yield f"s%{place} = e{x}"
         if column == 0:
             yield "s%worst(i) = max(s%worst(i), abs(ex) + abs(ey) + abs(ez))"
-    # A sum, as a NaN may be lost in a maximum.
+    # A sum, because a maximum may lose a NaN.
     yield "s%growth(i) = max(s%growth(i), sx, sy, sz) + 0.0_dp*((sx + sy) + sz)"
     yield from END.splitlines()
 
 
 def term(k: int, waves: bool) -> Iterator[str]:
-    """Yield term k of the three unknowns: two sums, so that one need not wait for itself."""
+    """Yield term k of the three unknowns, from two sums, so that no sum has to wait for itself."""
     steady = {
         1: "h*(s%constant(i, {axis}) + s%rate(i, {axis})*s%t(i))",
         2: "(0.5_dp*h)*(h*s%rate(i, {axis}))",
@@ -200,10 +200,10 @@ def term(k: int, waves: bool) -> Iterator[str]:
 
 
 def mean_weight(k: int) -> str:
-    """Return the integral of term k over the step."""
+    """Return the weight of term k in the mean of omega: its integral over the step."""
     return f"(1.0_dp/{k + 1}.0_dp)"
 
 
 def moment_weight(k: int) -> str:
-    """Return the same times the time from the middle."""
+    """Return the weight of term k in the moment: its integral times the time from the middle."""
     return f"({k}.0_dp/{2 * (k + 1) * (k + 2)}.0_dp)"

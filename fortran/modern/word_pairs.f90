@@ -1,6 +1,6 @@
 module word_pairs
-  !! Arithmetic with numbers of two words, to some 1e-31: what rounding takes off the first is in
-  !! the second.
+  !! The operators of double-double arithmetic, accurate to some 1e-31: a second number holds the
+  !! rounding error of the first.
   use kinds, only: dp
   use two_words, only: scaled, square_root, two_product, two_sum
   implicit none(type, external)
@@ -34,21 +34,22 @@ module word_pairs
 contains
 
   pure type(pair_t) function product_of(x, y) result(found)
-    !! x y, up to 2**-106 of it.
+    !! Compute x y with an error of at most 2**-106 of it.
     real(dp), intent(in) :: x, y
 
     call two_product(x, y, found%high, found%low)
   end function product_of
 
   pure type(pair_t) function difference_of(x, y) result(found)
-    !! x - y, exactly.
+    !! Compute x - y, exactly.
     real(dp), intent(in) :: x, y
 
     call two_sum(x, -y, found%high, found%low)
   end function difference_of
 
   pure function longer_product(x, y) result(found)
-    !! (x(1) + x(2) + x(3)) y in three words, each of them what the one before leaves out.
+    !! Compute (x(1) + x(2) + x(3)) y in triple-double: each number is the rounding error of the one
+    !! before.
     real(dp), intent(in) :: x(3), y
     real(dp) :: found(3)
     real(dp) :: first, middle, rest, left
@@ -60,7 +61,8 @@ contains
   end function longer_product
 
   pure subroutine exact_product(x, y, product, rest)
-    !! x y = product + rest, where 2**-106 of it counts too (Dekker, rounded halves).
+    !! Compute product and rest with x y = product + rest where 2**-106 of it counts (Dekker, with
+    !! halves rounded to nearest).
     real(dp), intent(in) :: x, y
     real(dp), intent(out) :: product, rest
     real(dp) :: xh, xl, yh, yl, part
@@ -81,7 +83,7 @@ contains
 
     call two_sum(x%high, y%high, total, rest)
     rest = rest + (x%low + y%low)
-    ! The first words may have cancelled.
+    ! The high parts may have cancelled.
     found%high = total + rest
     found%low = rest - (found%high - total)
   end function sum_of_pairs
@@ -117,7 +119,7 @@ contains
   end function quotient_of_pairs
 
   pure type(pair_t) function root(x) result(found)
-    !! Square root.
+    !! Compute the square root.
     type(pair_t), intent(in) :: x !! above 0
 
     call square_root(x%high, x%low, found%high, found%low)

@@ -1,6 +1,6 @@
 module listing_flags
-  !! Which defects, readings and conjectures of the appendix are active, one bit each.
-  !! The bits are those of `flag` in pyharness/data/apparatus.toml.
+  !! Flags of the defects, readings and conjectures of the appendix that are active, one bit each.
+  !! The numbers of the bits are those of `flag` in pyharness/data/apparatus.toml.
   implicit none(type, external)
   private
 

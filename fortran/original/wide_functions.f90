@@ -1,8 +1,9 @@
 module wide_functions
-  !! Square root, sine and cosine in binary128, of + - * / alone: a compiler's own need its library
-  !! at run time. The root is correctly rounded. Sine and cosine carry twice the bits before they
-  !! are rounded, so that they are the nearest number wherever the next 80 bits do not decide; the
-  !! twin has them from mpmath, by the same definition.
+  !! Square root, sine and cosine in binary128, computed with + - * / alone, because the compiler's
+  !! own functions need its library at run time. The root is correctly rounded. Sine and cosine are
+  !! computed with twice the bits and then rounded, so that they are the nearest number wherever the
+  !! next 80 bits decide the rounding. The Python twin computes them with mpmath, by the same
+  !! definition.
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: binary64, wp => binary128
   use waves, only: ANGLE_BITS
@@ -11,20 +12,21 @@ module wide_functions
 
   type :: pair_t
     real(wp) :: high
-    real(wp) :: low  !! at most half a unit of the last place of high
+    real(wp) :: low  !! at most half a unit in the last place of high
   end type pair_t
 
   integer :: i_power
   real(wp), parameter :: POWERS(0:13) = [(2.0_wp**(2**i_power), i_power=0, 13)]
-  real(wp), parameter :: UNIT = epsilon(1.0_wp)              ! of a root from 1 to 2
+  real(wp), parameter :: UNIT = epsilon(1.0_wp)              ! last place of a root from 1 to 2
   real(wp), parameter :: SPLITTER = 2.0_wp**57 + 1.0_wp
-  real(wp), parameter :: QUARTERS = 0.6366197723675813430755350534900574739022_wp  ! 2 over pi
+  real(wp), parameter :: QUARTERS = 0.6366197723675813430755350534900574739022_wp  ! 2/pi
+  ! pi/2 is the sum of these three numbers.
   real(wp), parameter :: HALF_PI(3) = [1.57079632679489661923132169163975139873953405_wp, &
                                        4.33590506506189051239852201302167612705270725e-35_wp, &
                                        -1.42671545571947929048415935735977663232251099e-69_wp]
-  integer, parameter :: N_TERMS = 25  ! up to a quarter of pi, the next is below 2**-240
-  real(wp), parameter :: LEAST = 2.0_wp**(-60) ! an angle below is its own sine
-  real(wp), parameter :: MOST = 2.0_wp**ANGLE_BITS ! its quarters are counted
+  integer, parameter :: N_TERMS = 25  ! up to pi/4 the next term is below 2**-240
+  real(wp), parameter :: LEAST = 2.0_wp**(-60) ! rad; a smaller angle is its own sine
+  real(wp), parameter :: MOST = 2.0_wp**ANGLE_BITS ! rad; quarters of smaller angles can be counted
 
   interface sqrt
     module procedure square_root
@@ -45,9 +47,9 @@ contains
   elemental function square_root(x) result(root)
     real(wp), intent(in) :: x
     real(wp) :: root
-    real(wp) :: y         ! x over a power of 4, from 1 to 4
-    real(wp) :: scale     ! the root of that power
-    real(wp) :: rest      ! y less the square of the root, exact
+    real(wp) :: y         ! x divided by a power of 4, from 1 to 4
+    real(wp) :: scale     ! square root of that power of 4
+    real(wp) :: rest      ! y minus the square of the root, exact
     type(pair_t) :: square
     integer :: i
     intrinsic :: sqrt
@@ -76,8 +78,8 @@ contains
       square = product_of(root, root)
       root = root + ((y - square%high) - square%low)/(2.0_wp*root)
     end do
-    ! Less than a unit away now. In squares of the unit, rest and root are whole numbers, and the
-    ! root lies beyond half a unit where rest is more than root.
+    ! The root is now less than a unit in the last place away. As multiples of UNIT**2, `rest` and
+    ! `root*UNIT` are integers. The error of the root exceeds half a unit if rest > root*UNIT.
     square = product_of(root, root)
     rest = (y - square%high) - square%low
     if (rest > root*UNIT) then
@@ -89,7 +91,7 @@ contains
   end function square_root
 
   elemental function sine(angle)
-    real(wp), intent(in) :: angle !! rad; NaN comes of one beyond MOST
+    real(wp), intent(in) :: angle !! rad; the sine is NaN unless |angle| < MOST
     real(wp) :: sine
 
     if (abs(angle) < LEAST) then
@@ -100,22 +102,23 @@ contains
   end function sine
 
   elemental function cosine(angle)
-    real(wp), intent(in) :: angle !! rad; NaN comes of one beyond MOST
+    real(wp), intent(in) :: angle !! rad; the cosine is NaN unless |angle| < MOST
     real(wp) :: cosine
 
     cosine = sine_later(angle, 1)
   end function cosine
 
   elemental function sine_later(angle, quarters_later) result(wave)
-    !! The sine of an angle and so many right angles, from its series about the nearest of them.
+    !! Return the sine of the angle plus `quarters_later` right angles, by the Taylor series about
+    !! the multiple of a right angle that is nearest to the angle.
     real(wp), intent(in) :: angle
     integer, intent(in) :: quarters_later
     real(wp) :: wave
-    type(pair_t) :: rest    ! of the angle, to the nearest right angle
+    type(pair_t) :: rest    ! angle minus the nearest multiple of a right angle
     type(pair_t) :: square
     type(pair_t) :: series
     integer(int64) :: quarter
-    integer :: odd          ! 1: the sine, 0: the cosine of the rest
+    integer :: odd          ! 1: the sine of the rest, 0: its cosine
     integer :: k
 
     if (.not. abs(angle) < MOST) then
@@ -139,7 +142,7 @@ contains
   end function sine_later
 
   elemental function less_quarters(angle, quarters) result(rest)
-    !! An angle less so many right angles, whose digits are in three numbers.
+    !! Return the angle minus `quarters` right angles; the digits of pi/2 are in three numbers.
     real(wp), intent(in) :: angle
     real(wp), intent(in) :: quarters
     type(pair_t) :: rest
@@ -154,7 +157,7 @@ contains
   end function less_quarters
 
   elemental function sum_of(a, b) result(pair)
-    !! The sum with what its rounding took off.
+    !! Return the sum and its rounding error (Knuth, as two_sum of two_words.f90).
     real(wp), intent(in) :: a
     real(wp), intent(in) :: b
     type(pair_t) :: pair
@@ -166,7 +169,8 @@ contains
   end function sum_of
 
   elemental function product_of(a, b) result(pair)
-    !! The product with what its rounding took off: factors are split, as there is no FMA.
+    !! Return the product and its rounding error. The factors are split, as there is no FMA (Dekker,
+    !! as exact_product of word_pairs.f90).
     real(wp), intent(in) :: a
     real(wp), intent(in) :: b
     type(pair_t) :: pair

@@ -1,20 +1,20 @@
-// Two charts by uPlot, a classic script that the page loads before this one.
+// Two charts drawn by uPlot, a classic script that the page loads before this one.
 //
-// Colours are the page's own: drawn anew when it turns dark or light. What has a legend, and which
-// components are shown, is the page's too, for who has no mouse.
+// The charts have the page's colours and are redrawn when its colour scheme changes. The legend and
+// the choice of components are elements of the page, so that they can be used without a mouse.
 
 const COMPONENTS = ["U1", "U2", "U3"];
-// In pixels, where a chart is narrow and where it is wide.
+// Heights in pixels, for a narrow and for a wide chart.
 const HEIGHTS = { omega: [280, 360], error: [200, 250] };
 const WIDE = 600;
-// A run that leaves the solution is shown as far beyond it as the solution's own size; its error as
-// far as this many times that.
+// A run that leaves the solution is shown as far beyond the solution as the solution's own size.
+// Its error is shown up to this multiple of that size.
 const FARTHEST_ERROR = 100;
 const MOST_LABELS = 6;
 
 export class Charts {
-  // `omega` and `error` are the elements that the charts go into, `readout` that of the numbers at
-  // the pointer; `isShown` tells of a component, from 0, whether it is to be drawn.
+  // `omega` and `error` are the elements that contain the charts, `readout` is the element for the
+  // numbers at the pointer. `isShown` says whether a component, counted from 0, is to be drawn.
   constructor(omega, error, readout, isShown) {
     this.places = { omega, error };
     this.readout = readout;
@@ -34,7 +34,7 @@ export class Charts {
     }
   }
 
-  // Draw the components that are to be drawn now.
+  // Redraw with the components that are selected now.
   choose() {
     for (const chart of Object.values(this.drawn)) {
       chart.batch(() => {
@@ -45,7 +45,7 @@ export class Charts {
     }
   }
 
-  // Draw with the colours that hold now.
+  // Redraw with the colours that apply now.
   recolour() {
     for (const name of Object.keys(this.drawn)) this.drawn[name].destroy();
     this.drawn = {};
@@ -89,7 +89,7 @@ export class Charts {
     return [...run, ...COMPONENTS.map((_, axis) => line(axis, { width: 1.25, dash: [6, 4] }))];
   }
 
-  // The numbers at the pointer.
+  // Show the numbers at the pointer.
   tell(chart) {
     const n = chart.cursor.idx;
     const [time, ...columns] = this.data.omega;
@@ -109,7 +109,7 @@ export class Charts {
     return { distr: name === "error" ? 3 : 1, range: (_, low, high) => this[range](low, high) };
   }
 
-  // The least and the greatest of the solution.
+  // Return the least and the greatest value of the solution.
   extent() {
     const values = [...this.shown.truth.flat(), ...this.shown.scene.initial.omega];
     const least = values.reduce((x, y) => Math.min(x, y), Infinity);
@@ -125,7 +125,7 @@ export class Charts {
     return [from - margin, to + margin];
   }
 
-  // From one power of ten to another.
+  // Return a range from one power of ten to another.
   errorRange(low, high) {
     if (!(low > 0)) return [1e-17, 1];
     const from = Math.max(Math.floor(Math.log10(low)), -300);
@@ -134,7 +134,7 @@ export class Charts {
     return [10 ** from, 10 ** Math.max(to, from + 1)];
   }
 
-  // A line where the run ended before all steps were done.
+  // Draw a line where the run ended before all steps were done.
   markEnd(chart) {
     const { run } = this.shown;
     if (run.ended === "complete") return;
@@ -165,7 +165,8 @@ export class Charts {
   }
 }
 
-// What a colour of the style is now; it may hang on the scheme, which only an element's own tells.
+// Return the current value of a colour of the style. It may depend on the colour scheme, which only
+// the computed style of an element shows.
 function colour(name) {
   const probe = document.createElement("span");
   probe.style.color = `var(${name})`;
@@ -184,7 +185,7 @@ function axis() {
   return { stroke: colour("--muted"), grid: line, ticks: line, font: "12px sans-serif" };
 }
 
-// Powers of ten alone, and not too many.
+// Label powers of ten only, and not too many of them.
 function logarithmic(plain) {
   const all = (_, ticks) => ticks;
   const splits = (chart, _, low, high) => {
@@ -203,7 +204,7 @@ function logarithmic(plain) {
   };
 }
 
-// Numbers of few letters.
+// Format numbers in few characters.
 function labels(_, ticks) {
   return ticks.map((tick) => {
     const size = Math.abs(tick);
@@ -212,7 +213,7 @@ function labels(_, ticks) {
   });
 }
 
-// Times with the start before them; rows and solution where there are any.
+// Return the times with 0 before them, and the rows and the solution where they exist.
 function omegaData({ scene, run, times, truth }) {
   const start = scene.initial.omega;
   const column = (rows, first, at) => [
@@ -226,7 +227,7 @@ function omegaData({ scene, run, times, truth }) {
   ];
 }
 
-// No error at all has no place on a scale of powers of ten.
+// An error of zero has no place on a logarithmic scale.
 function errorData({ times, errors }) {
   const column = (axis) => times.map((_, n) => errors[n]?.[axis] || null);
   return [[0, ...times], ...COMPONENTS.map((_, axis) => [null, ...column(axis)])];

@@ -1,9 +1,9 @@
-// A state in, a run and what there is to say of it out. No page is needed.
+// The experiment: from a state to a run and to the statements about it. It needs no page.
 import { PROGRAMS } from "../programs/programs.js";
 import { reference } from "./reference.js";
 import { sceneOfCase } from "./state.js";
 
-// The scene of a state, as a port of the programs reads it.
+// Return the scene of a state in the form that a port of the programs reads.
 export function sceneOf(data, state) {
   const scene = sceneOfCase(data, state.case);
   return {
@@ -13,9 +13,9 @@ export function sceneOf(data, state) {
   };
 }
 
-// Of a state: `scene`, what the program returned (`run`), the true `times` of all steps (s), the
-// solution there (`truth`, rad/s) and the `errors` of each row, component by component; null where
-// there is no truth.
+// Return the experiment of a state: its `scene`, the result of the program (`run`), the true
+// `times` of all steps (s) and the solution at these times (`truth`, rad/s). `errors` has the error
+// of each row by component, or null where there is no solution.
 export function experiment(data, state) {
   const scene = sceneOf(data, state);
   const active = new Set(state.active);
@@ -28,13 +28,13 @@ export function experiment(data, state) {
   return { state, scene, run, times, truth, errors };
 }
 
-// The largest error of any component so far (rad/s); null where nothing is known.
+// Return the largest error of any component so far (rad/s), or null if no error is known.
 export function largestError({ errors }) {
   const known = errors.flatMap((row) => row ?? []);
   return known.length > 0 ? known.reduce((most, each) => Math.max(most, each), 0) : null;
 }
 
-// How far the run came, and why no farther, in a sentence.
+// Return a sentence that says how far the run came, and why it ended there.
 export function ending({ state, scene, run }) {
   const { steps } = scene.run;
   if (run.ended === "overflow") {
@@ -62,7 +62,7 @@ export function counted(number, what) {
   return `${number} ${what}${number === 1 ? "" : "s"}`;
 }
 
-// A number to three digits, for reading.
+// Format a number with three digits, for reading.
 export function brief(value) {
   return String(Number(value.toPrecision(3)));
 }

@@ -1,6 +1,6 @@
-// The page: controls and address in, charts, table, printer page and words out.
+// The page: from controls and address to charts, table, printer page and sentences.
 //
-// Every change makes a whole new state, and every state is shown whole.
+// Every change makes a complete new state, and every state is shown completely.
 import { Charts } from "./charts.js";
 import { brief, ending, experiment, largestError } from "./experiment.js";
 import { printerPage } from "./printer-page.js";
@@ -30,10 +30,10 @@ const charts = new Charts(
 );
 let state = defaultState(data);
 let found = null;
-// By field: what is wrong with what stands there, until it is mended.
+// By field: what is wrong with its content, until it is corrected.
 const wrong = new Map();
 
-// Compute a state and show it, with what was wrong with what asked for it.
+// Compute a state and show it, together with the problems of the input that requested it.
 function show(next, problems = []) {
   state = next;
   tell(problems);
@@ -93,7 +93,7 @@ function showControls() {
   element("lipschitz").disabled = !state.stops;
 }
 
-// The table takes longer than all else, and is made when it is looked at.
+// The table takes longer than all else, so it is made only when it is open.
 function showRows() {
   if (!element("numbers").open || found === null) return;
   const { run, times, errors } = found;
@@ -105,13 +105,14 @@ function showRows() {
   element("rows").innerHTML = rows.join("");
 }
 
-// Show a state that a control made, and name it in the address.
+// Show a state that a control made, and write it into the address.
 function change(next) {
   show(next);
   history.replaceState(null, "", `#${fragmentOf(data, state)}`);
 }
 
-// Of a field of numbers: what it says is taken, or told to be wrong and left to be mended.
+// Read a field of numbers when it changes. A valid value is used. Otherwise the problem is shown,
+// and the field stays as it is until it is corrected.
 function onNumber(id, read, taken) {
   element(id).addEventListener("change", () => {
     try {
@@ -181,7 +182,7 @@ element("reset").addEventListener("click", () => {
 element("numbers").addEventListener("toggle", showRows);
 window.addEventListener("hashchange", fromAddress);
 document.addEventListener("themechange", () => charts.recolour());
-// Ink on paper, whatever the screen had.
+// A page is printed in the colours for paper, whatever the colours of the screen.
 matchMedia("print").addEventListener("change", () => charts.recolour());
 
 for (const block of [...all(".controls"), element("charts")]) block.hidden = false;

@@ -1,12 +1,12 @@
-// The page that a line printer did, by the FORMATs of the deck: the same text as
+// The page of the line printer, by the FORMATs of the deck: the same text as
 // `pyharness run --format printer`.
 //
-// The first character of each record, the carriage control, is taken off.
+// The first character of each record, the carriage control, is removed.
 
-// `formats` has header, heads and rows of the program; `run` is what it returned.
+// `formats` has the FORMATs header, heads and rows of the program; `run` is the program's result.
 export function printerPage(formats, scene, run) {
-  // A law of time stands on no card: the torques of the cards are the constant ones, or those that
-  // Table 1 gives initially.
+  // No card contains a torque that depends on time. The torques of the cards are the constant ones,
+  // or the initial ones of Table 1.
   const cards = scene.initial_torque ?? scene.torque.constant;
   const head = scene.body.moments.flatMap((moment, axis) => [moment, cards[axis]]);
   const row = parsed(formats.rows);
@@ -18,7 +18,7 @@ export function printerPage(formats, scene, run) {
   return records.map((record) => `${record.slice(1).trimEnd()}\n`).join("");
 }
 
-// The descriptors of a FORMAT: nX, nH, Fw.d, Iw and the slash.
+// Return the descriptors of a FORMAT: nX, nH, Fw.d, Iw and the slash.
 function parsed(format) {
   const descriptors = [];
   let rest = format.slice(1, -1);
@@ -43,8 +43,8 @@ function parsed(format) {
   return descriptors;
 }
 
-// The records of one WRITE. A FORMAT with values left begins again in a new record; one without
-// goes on to the next place for a value.
+// Return the records of one WRITE. If values are left at its end, a FORMAT begins again in a new
+// record. If no values are left, output ends at the next descriptor of a value.
 function write(descriptors, values) {
   const records = [""];
   const left = [...values];
@@ -60,12 +60,12 @@ function write(descriptors, values) {
   }
 }
 
-// A number in its field; halves go away from zero, which has no sign, and what does not fit, or is
-// not finite, is asterisks.
+// Return a number as its field shows it. Halves are rounded away from zero, zero has no sign, and a
+// number that does not fit or is not finite becomes asterisks.
 function edited(value, width, places) {
   const size = Math.abs(value);
   const digits = size.toFixed(places);
   const text = value < 0 && Number(digits) !== 0 ? `-${digits}` : digits;
-  // A billion has more digits than any field; what toFixed writes beyond 1e21 is no digits.
+  // A billion has more digits than any field, and from 1e21 on toFixed does not write digits.
   return size < 1e9 && text.length <= width ? text.padStart(width) : "*".repeat(width);
 }

@@ -1,25 +1,26 @@
-// The solution to hold a run against: the Taylor series of equations 13 to 15, in binary64.
+// The reference solution for a run: the Taylor series of equations 13 to 15, in binary64.
 //
-// Its error over the largest |omega| on the way is below 1e-15 times what the motion makes of a small
-// difference: 2e-16 in 300 steps of the seven cases (docs/laboratory.md; tests/edition holds it
-// against 40-digit arithmetic). It shares torque's sines and A, B, C with the programs, no more.
+// Its error over the largest |omega| of the trajectory is below 1e-15 times the error
+// amplification. It is 2e-16 in 300 steps of the seven cases (docs/laboratory.md; tests/edition
+// compares it with 40-digit arithmetic). The reference shares only the sines of the torque and A,
+// B, C with the programs.
 import { cosine, sine } from "../programs/circular.js";
 import { eulerCoefficients } from "../programs/equations.js";
 
 const ORDER = 25;
-// What the last terms may be, over omega: far below a rounding.
+// Largest size of the last terms over omega, far below a rounding error.
 const LAST_TERM = 1e-18;
-// Series that are computed before giving up: a spin of 1e5 turns a step would take minutes.
+// Work limit: the number of series. A spin of 1e5 turns per step would take minutes.
 const MOST_SERIES = 20_000;
 
-// omega (rad/s) at every one of `times` (s), which rise from 0; where the solution leaves every
-// bound or takes too many series the rows end before.
+// Return omega (rad/s) at each of `times` (s), which increase from 0. The rows end early if the
+// solution grows without bound or takes too many series.
 export function reference(scene, times) {
   const coefficients = eulerCoefficients(scene);
   const terms = [0, 1, 2].map(() => new Float64Array(ORDER + 1));
   const torque = [0, 1, 2].map(() => new Float64Array(ORDER));
   let omega = [...scene.initial.omega];
-  let rest = [0, 0, 0]; // what rounding took from omega
+  let rest = [0, 0, 0]; // rounding error of omega
   let begin = 0;
   const rows = [];
 
@@ -47,7 +48,7 @@ export function reference(scene, times) {
   return rows;
 }
 
-// Coefficients of torque over moment in powers of the time from `begin`, into `torque`.
+// Compute the coefficients of torque over moment in powers of the time from `begin`, into `torque`.
 function torqueTerms(scene, begin, torque) {
   const { constant, rate, sines, cosines } = scene.torque;
   for (let axis = 0; axis < 3; axis++) {
@@ -59,7 +60,7 @@ function torqueTerms(scene, begin, torque) {
   for (const [{ amplitude, frequency }, quarters] of waves) {
     const s = sine(frequency * begin);
     const c = cosine(frequency * begin);
-    const turns = [s, c, -s, -c]; // every derivative is a quarter turn on
+    const turns = [s, c, -s, -c]; // a derivative advances the phase by a quarter turn
     let factor = 1; // frequency^n / n!
     for (let n = 0; n < ORDER; n++) {
       const value = factor * turns[(n + quarters) % 4];
@@ -74,8 +75,9 @@ function torqueTerms(scene, begin, torque) {
   });
 }
 
-// The coefficients of omega in powers of time, into `terms`: n + 1 times the next one is that of
-// the torque and of the product of the other two.
+// Compute the coefficients of omega in powers of time, into `terms`. By equations 13 to 15, n + 1
+// times coefficient n + 1 is coefficient n of the torque plus that of the product of the other two
+// components.
 function series([a, b, c], omega, torque, terms) {
   const [x, y, z] = terms;
   omega.forEach((value, axis) => {
@@ -96,8 +98,9 @@ function series([a, b, c], omega, torque, terms) {
   }
 }
 
-// How far (s) the last three terms stay small; some are zero by symmetry, not by being small. A
-// motion from rest is measured by what its first terms make of it.
+// Return the time (s) over which the last three terms stay small. A term that is zero by symmetry
+// does not count as small. For a motion from rest they are compared with term 1, otherwise with
+// term 0.
 function reachOf(terms) {
   const sizes = Array.from({ length: ORDER + 1 }, (_, n) =>
     Math.max(...terms.map((values) => Math.abs(values[n]))),
@@ -115,7 +118,7 @@ function reachOf(terms) {
   return reach;
 }
 
-// Omega at `time` from the beginning of the series, and what rounding took from it.
+// Return omega at `time` from the beginning of the series, and its rounding error.
 function valuesAt(terms, rest, time) {
   const omega = [];
   const lost = [];

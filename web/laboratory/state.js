@@ -1,14 +1,16 @@
-// The state of the laboratory, and its words: those of the command line, in the page's address.
+// The state of the laboratory, and its words in the page's address, which are options of the
+// command line.
 //
-// A state is { case, program, base, active, omega0, stepSize, steps, lipschitz, stops }: `base` is
-// the listing that was chosen, `active` the names of what is switched on, for whichever program has
-// them, `omega0` null where it is that of the case. `data` is what the page brings along: cases, programs, flags, limits.
+// A state is { case, program, base, active, omega0, stepSize, steps, lipschitz, stops }. `base` is
+// the listing that was chosen. `active` has the names of all active switches, for every program
+// that has them. `omega0` is null if it is that of the case. `data` comes with the page: cases,
+// programs, flags, limits.
 
 const LISTINGS = ["original", "corrected"];
 const KINDS = ["defect", "reading", "conjecture"];
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
-// What a page shows whose address says nothing.
+// Return the state of a page whose address specifies nothing.
 export function defaultState(data) {
   const { case: number, program, listing } = data.defaults;
   return stateOf(data, number, program, listing);
@@ -32,20 +34,20 @@ export function sceneOfCase(data, number) {
   return data.scenes.find((scene) => scene.case === number);
 }
 
-// The names of a kind (defect, reading, conjecture) that a program has.
+// Return the names of a kind (defect, reading, conjecture) that a program has.
 export function namesOf(data, program, kind) {
   return data.flags
     .filter((flag) => flag.kind === kind && flag.programs.includes(program))
     .map((flag) => flag.id);
 }
 
-// What is active in the listing `base`, of all programs.
+// Return the names that are active in the listing `base`, for all programs.
 export function activeIn(data, base) {
   return data.flags.filter((flag) => flag.in_original && base !== "corrected").map((flag) => flag.id);
 }
 
-// The words of a state, a name and its value each; a switch has the value null. Only what differs
-// from the defaults, but for case, program and listing.
+// Return the words of a state, each as a name and its value; a switch has the value null. Case,
+// program and listing are always included, other words only if they differ from the defaults.
 export function wordsOf(data, state) {
   const { program, base, active, stops } = state;
   const usual = stateOf(data, state.case, program, base);
@@ -54,7 +56,7 @@ export function wordsOf(data, state) {
   const add = (word, names) => names.length > 0 && words.push([word, names.join(",")]);
 
   if (base === "corrected") {
-    // No reading or conjecture changes a corrected statement: one that is active is kept.
+    // A reading or conjecture does not change a corrected statement, so one that is active is kept.
     add("keep", KINDS.flatMap(chosen));
   } else {
     const defects = namesOf(data, program, "defect");
@@ -76,7 +78,7 @@ export function wordsOf(data, state) {
   return words;
 }
 
-// The shortest text that gives a number back, the sign of zero too.
+// Return the shortest text that is read as the same number, with the sign of zero.
 export function written(value) {
   return Object.is(value, -0) ? "-0" : String(value);
 }
@@ -98,8 +100,8 @@ export function commandOf(data, state) {
   return ["pyharness run", ...options].join(" ");
 }
 
-// The state that an address tells, and a line for each word of it that can't be taken; there the
-// default stands.
+// Return the state that an address specifies, and a message for each of its words that is invalid;
+// the default replaces such a word.
 export function stateFrom(data, fragment) {
   const problems = [];
   const given = wordsIn(fragment, problems);
@@ -128,7 +130,7 @@ export function stateFrom(data, fragment) {
     problems.push(`'${both[0]}' is given to both fix and keep; give it to one`);
     keep = [];
   }
-  // As the command line has it: `keep` alone corrects all others.
+  // As on the command line, `keep` alone corrects all others.
   const unsaid = keep.length > 0 && fix.length === 0 ? "corrected" : data.defaults.listing;
   const base = read("listing", (text) => oneOf("listing", text, LISTINGS), unsaid);
   const state = stateOf(data, chosen, program, base);
@@ -167,7 +169,7 @@ export function stateFrom(data, fragment) {
 const WORDS =
   "case program listing fix keep reading conjecture omega0 step-size steps lipschitz no-stop";
 
-// What is wrong with a value, in a line.
+// An error whose message says in a line what is wrong with a value.
 export class StateError extends Error {}
 
 function wordsIn(fragment, problems) {
@@ -180,7 +182,7 @@ function wordsIn(fragment, problems) {
   return given;
 }
 
-// A percent sign that begins no character stands for itself.
+// Decode an address. A text with a percent sign that begins no character is returned unchanged.
 function decoded(text) {
   try {
     return decodeURIComponent(text);
@@ -189,7 +191,7 @@ function decoded(text) {
   }
 }
 
-// No more of what was typed than a line has room for.
+// Return no more of a typed text than a line has room for.
 function shown(text) {
   return [...(text ?? "")].slice(0, 40).join("");
 }
@@ -210,7 +212,7 @@ function namesIn(text, word, kind, allowed) {
   return names;
 }
 
-// A finite number, as the command line takes it.
+// Read a finite number, as the command line does.
 function numberFrom(text, word) {
   const trimmed = (text ?? "").trim();
   if (!NUMBER.test(trimmed)) throw new StateError(`${word}: '${shown(text)}' where a number belongs`);
@@ -233,7 +235,7 @@ export function positiveFrom(text, word) {
   throw new StateError(`${word}: ${shown(text)}; allowed: a number above 0`);
 }
 
-// A reader of numbers of steps: as many as a page draws at once.
+// Return a reader of numbers of steps, up to the number that a page draws at once.
 export function stepsFrom(data) {
   return (text, word) => {
     const value = /^[-+]?\d+$/.test((text ?? "").trim()) ? Number(text) : NaN;

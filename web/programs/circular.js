@@ -1,20 +1,20 @@
-// Sine and cosine (rad), correctly rounded in practice, in sums of two floats (hi + lo).
+// Sine and cosine (rad), correctly rounded in practice, by sums of two floats (hi + lo).
 //
-// An engine's own differ from the C library's in some 3 % of arguments. Correctly rounded ones
-// differ in some 0.14 %, by one unit in the last place: those that the C library does not round to
-// the nearest float.
+// The functions of an engine differ from those of the C library in some 3 % of arguments. Correctly
+// rounded functions differ from those of the C library in some 0.14 %, by one unit in the last
+// place. There the C library does not round to the nearest float.
 
 const SPLITTER = 134217729; // 2^27 + 1
-// pi/2 in three floats, to 160 bits.
+// pi/2 as the sum of three floats, to 160 bits.
 const QUARTER_TURN = [1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33];
 const TWO_OVER_PI = 0.6366197723675814;
-// Beyond, turns are taken off by too few bits of pi/2; the engine's own function answers.
+// Above it, pi/2 has too few bits for the reduction, so that the engine's own function is used.
 const LARGEST = 2 ** 30;
-// Below, x is the float nearest to sin(x), and 1 to cos(x).
+// Below it, x is the float nearest to sin(x), and 1 is the float nearest to cos(x).
 const SMALLEST = 2 ** -27;
 
-// A function whose result is two floats returns the first and leaves the second here: a sine takes
-// some 500 such operations, and an array for each took half of its time.
+// A function whose result is two floats returns the first and leaves the second here. A sine takes
+// some 500 such operations, and half of its time was spent on an array for each.
 const low = new Float64Array(1);
 
 function sum(x, y) {
@@ -56,7 +56,8 @@ function divide(x, xl, y) {
   return sum(first, (x - p - low[0] + xl) / y);
 }
 
-// 1, -1/(2 3), 1/(2 3 4 5), ... and 1, -1/2, 1/(2 3 4), ...; the last first, as they are added.
+// Return 1, -1/(2 3), 1/(2 3 4 5), ... or 1, -1/2, 1/(2 3 4), ...; the last is first, as it is
+// added first.
 function alternating(first) {
   const terms = [[1, 0]];
   for (let n = first; terms.length < 15; n += 2) {

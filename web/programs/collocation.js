@@ -1,13 +1,13 @@
-// Collocation as in IV.2: an interval, and the march of the two programs.
+// Collocation as in IV.2: the loop over the steps of the two programs, and one interval.
 //
-// Every unknown is a polynomial x(0) + c1 t + c2 t^2 + ... (eq. 34) whose derivative meets the
-// right-hand side at as many points as there are terms (eq. 36). The right-hand side needs the
-// unknowns themselves: a first estimate takes it constant, one correction takes it at the points.
+// Every unknown is a polynomial x(0) + c1 t + c2 t^2 + ... (eq. 34) whose derivative equals the
+// right-hand side at as many points as there are terms (eq. 36). The right-hand side depends on the
+// unknowns: a first estimate takes it as constant, and one correction evaluates it at the points.
 import { Record, allFinite, initialTorque, normalizedTorque } from "./equations.js";
 import { leqt1f } from "./linear-solver.js";
 
-// Run a program whose points lie in a step as `pointsOf` says. `rates` gets the torques at the
-// beginning and at the points, k, and the unknowns there.
+// Run a program whose collocation points in a step are `pointsOf(dt)`. `rates` gets the torques at
+// the beginning and at the points, the index k of one of them, and the unknowns there.
 export function march(scene, listing, pointsOf, rates) {
   const { step_size: h, steps } = scene.run;
   let dt = h;
@@ -38,7 +38,7 @@ export function march(scene, listing, pointsOf, rates) {
   return record.trajectory();
 }
 
-// All unknowns at `end`, and IER of the second solution. The points of collocation and the end
+// Return all unknowns at `end`, and IER of the second solution. The collocation points and the end
 // are in s from the interval's beginning.
 function interval(start, points, end, rates) {
   const constant = rates(0, start);
@@ -48,20 +48,21 @@ function interval(start, points, end, rates) {
   return [values(start, corrected, end), ier];
 }
 
-// The coefficients c1, c2, ... of every unknown whose derivative meets `rates`, and IER.
+// Return the coefficients c1, c2, ... of every unknown whose derivative equals `rates` (eq. 36),
+// and IER.
 function fit(points, rates) {
   const byUnknown = rates[0].map((_, unknown) => rates.map((at) => at[unknown]));
   return leqt1f(collocationMatrix(points), byUnknown);
 }
 
-// The derivatives of t, t^2, ... at every point, a row for each (eq. 36).
+// Return the derivatives of t, t^2, ... at every point, a row for each point (eq. 36).
 function collocationMatrix(points) {
   return points.map((t) =>
     [1, 2 * t, 3 * (t * t), 4 * (t * t * t)].slice(0, points.length),
   );
 }
 
-// x(0) + c1 t + c2 t^2 + ... for every unknown, added in this order.
+// Return x(0) + c1 t + c2 t^2 + ... for every unknown (eq. 34), added in this order.
 function values(start, coefficients, t) {
   const t2 = t * t;
   const powers = [t, t2, t2 * t, t2 * t2];

@@ -1,6 +1,6 @@
 // Four-term collocation: the second program of the appendix, Jacobs 1982, IV.2.
 //
-// Residual zero at .2, .4, .6 and .8 of the interval. It has no stop test.
+// The residual is zero at .2, .4, .6 and .8 of the interval. There is no stop test.
 import { march } from "./collocation.js";
 import { accelerations, eulerCoefficients, omegaRate, velocityRate } from "./equations.js";
 

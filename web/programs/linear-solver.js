@@ -1,11 +1,11 @@
-// Stands for LEQT1F of the IMSL library: A X = B for several right-hand sides.
+// Stand-in for LEQT1F of the IMSL library, which solves A X = B for several right-hand sides.
 //
-// LU factors in Crout's order with implicit row scaling and partial pivoting.
+// A is factored into L and U in Crout's order, with implicit row scaling and partial pivoting.
 
 const SINGULAR = 129;
 
-// [x of A x = b for every b, IER]; neither A nor any b is changed. Where A is algorithmically
-// singular each b comes back as it was, with SINGULAR; else 0.
+// Return [x of A x = b for every b, IER]; neither A nor any b is changed. If A is algorithmically
+// singular, each b is returned unchanged, with IER = SINGULAR; otherwise IER is 0.
 export function leqt1f(matrix, rightHandSides) {
   const factors = matrix.map((row) => [...row]);
   const pivots = factor(factors);
@@ -13,7 +13,8 @@ export function leqt1f(matrix, rightHandSides) {
   return [rightHandSides.map((b) => substitute(factors, pivots, b)), 0];
 }
 
-// Overwrite `a` by its factors; the row exchanged at each column, null if singular.
+// Overwrite `a` by its factors. Return the row exchanged at each column, or null if `a` is
+// singular.
 function factor(a) {
   const n = a.length;
   const pivots = [];
@@ -35,7 +36,7 @@ function factor(a) {
       row[j] = total;
     }
 
-    // On and below the diagonal these are candidates for the pivot; the first maximum wins.
+    // On and below the diagonal these are the candidates for the pivot; the first maximum is taken.
     let biggest = 0;
     let pivot = j;
     for (let i = j; i < n; i++) {
@@ -57,7 +58,7 @@ function factor(a) {
   return pivots;
 }
 
-// Forward through L, then backward through U.
+// Substitute forward through L, then backward through U.
 function substitute(a, pivots, b) {
   const n = a.length;
   const x = [...b];

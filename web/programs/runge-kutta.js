@@ -1,6 +1,6 @@
 // Runge-Kutta: the third program of the appendix, Jacobs 1982, eq. 31 and IV.3.
 //
-// The stop test is the thesis's use of the Lipschitz condition (eq. 19): a run ends when the
+// The stop test applies the Lipschitz condition (eq. 19) as the thesis does: a run ends when the
 // right-hand sides change by more than the constant times the change of the unknowns.
 import {
   Record,
@@ -14,7 +14,7 @@ import {
 
 const STOP_VARIABLES = ["U1", "U2", "U3", "V1", "V2", "V3"];
 
-// `lipschitz` in 1/s; without `mayStop` the test is passed over.
+// `lipschitz` is in 1/s; without `mayStop` there is no stop test.
 export function run(scene, listing, lipschitz = 500, mayStop = true) {
   const [a, b, c] = eulerCoefficients(scene);
   const acceleration = accelerations(scene, listing);
@@ -68,6 +68,7 @@ export function run(scene, listing, lipschitz = 500, mayStop = true) {
     evaluate(third, 2);
     store(third, 2, dt);
     evaluate(4, 3);
+    // eq. 31
     const result = base.map(
       (x, i) =>
         x + (dt / 6) * (slope[1][i] + 2 * (slope[2][i] + slope[3][i]) + slope[4][i]),
@@ -93,7 +94,7 @@ export function run(scene, listing, lipschitz = 500, mayStop = true) {
   return record.trajectory("complete", null, false);
 }
 
-// The variable that breaks the condition of eq. 19 and its quotient, or null.
+// Return the variable that violates the condition of eq. 19 and its quotient, or null.
 function lipschitzTest(listing, changeK, changeU, lipschitz) {
   const velocityCounts = listing.has("lipschitz-tests-velocity");
   const last = velocityCounts ? 6 : 3;

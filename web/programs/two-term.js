@@ -1,6 +1,6 @@
 // Two-term collocation: the first program of the appendix, Jacobs 1982, IV.2.
 //
-// Residual zero at one third and two thirds of the interval. It has no stop test.
+// The residual is zero at one third and two thirds of the interval. There is no stop test.
 import { march } from "./collocation.js";
 import { accelerations, eulerCoefficients, omegaRate, velocityRate } from "./equations.js";
 

@@ -164,15 +164,12 @@ def solve_many(
             given = from_scene(scene)
     else:
         scene = list(scene)
-        for name in ("omega0", "moments", "inertia", "attitude0"):
-            if name in own or name == kind:
-                raise InputError(f"{name} is given beside many scenes; allowed: one scene, or none")
+        for name in filter(None, (*own, kind)):
+            raise InputError(
+                f"{name} is given beside many scenes; allowed: arrays with one scene, or many "
+                "scenes without arrays"
+            )
         if any(_is_special(each) for each in scene):
-            if own or kind:
-                raise InputError(
-                    "arrays are given beside scenes with a full inertia matrix, or a torque about "
-                    "the axes of space; allowed: one scene and arrays, or scenes alone"
-                )
             if (len(scene) > 1 and not all(each.inertia is not None for each in scene)) or any(
                 each.torque.in_space for each in scene
             ):

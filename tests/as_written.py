@@ -1,4 +1,4 @@
-"""Kernels from their sources as they stand, or with a part of one replaced."""
+"""Fortran kernels compiled with loops as written, or with a passage of the source replaced."""
 
 import ctypes
 import os
@@ -31,12 +31,12 @@ _BODIES = (
 
 
 class Found(NamedTuple):
-    """What a run came to."""
+    """The result of one integration by the series."""
 
-    omega: Array  # a row for each time
+    omega: Array  # one row for each time
     status: int
-    steps: int  # of the last march
-    error: float  # estimate, relative
+    steps: int  # of the last integration
+    error: float  # estimated relative error
     growth: float
 
 
@@ -44,14 +44,14 @@ Solve = Callable[[Scene, Sequence[float], float], Found]
 
 
 def compiler_here() -> bool:
-    """Whether there is a Fortran compiler."""
+    """Return whether a Fortran compiler is on the PATH."""
     return shutil.which(COMPILER) is not None
 
 
 def as_written(folder: Path, changes: Mapping[str, tuple[str, str]] | None = None) -> Solve:
-    """Compile the loops as they are written, not written out; return what solves by them.
+    """Compile the loops as written, not unrolled; return a function that solves by them.
 
-    `changes` has by module a piece that stands in it once, and what is put in its place.
+    `changes` maps a module's name to a passage that occurs once in it and to its replacement.
     """
     sources = [f"modern/{name}.f90" for name in _TAYLOR]
     sources += ["../tests/taylor_as_written.f90"]
@@ -74,9 +74,9 @@ def as_written(folder: Path, changes: Mapping[str, tuple[str, str]] | None = Non
 
 
 def many_as_written(folder: Path) -> Callable[..., tuple[Array, NDArray[np.int8]]]:
-    """Compile the loops over bodies as they are written; return what solves by them."""
+    """Compile the loops over bodies as written, not unrolled; return a function that uses them."""
     sources = [f"modern/{name}.f90" for name in _MANY]
-    # `bodies` needs `problem`, and the rest both.
+    # Order of compilation: `bodies` uses `problem`, and the other modules use both.
     sources += [f"many/{name}.f90" for name in _BODIES] + ["../tests/many_as_written.f90"]
     loops = _compiled(folder, sources, {}).many_as_written
     loops.argtypes = [ctypes.c_int] * 3 + [ctypes.c_double] * 2 + [ctypes.c_void_p] * 6 + [

@@ -1,6 +1,7 @@
 """`python -m tests.attitude_errors N [SEED]`: the largest errors of the attitude by kind of body.
 
-N random bodies, starts and times up to 1e6 s of each kind, against the series in whole numbers.
+It draws N random bodies of each kind, with initial conditions and times up to 1e6 s. The results
+are compared with the series in integer arithmetic of `tests.exact_attitude`.
 """
 
 import math
@@ -31,7 +32,7 @@ KINDS = (
 
 
 def draw(source: random.Random, kind: str, longest: float = 6.0) -> Motion:
-    """Return moments, omega, attitude and a time of up to 10**`longest` s, axes in any order."""
+    """Return moments, omega, attitude and a time up to 10**`longest` s, with axes in any order."""
     moments = [10 ** source.uniform(-0.5, 0.5) for _ in range(3)]
     omega = [source.choice((-1, 1)) * 10 ** source.uniform(-1, 1) for _ in range(3)]
     low, middle, high = sorted(range(3), key=lambda axis: moments[axis])
@@ -63,7 +64,7 @@ def draw(source: random.Random, kind: str, longest: float = 6.0) -> Motion:
 
 
 def errors(motion: Motion) -> tuple[float, float]:
-    """Return the largest error of the attitude, and that of omega over the largest there is."""
+    """Return the largest error of the attitude, and of omega relative to its largest component."""
     moments, omega, attitude, time = motion
     rows, attitudes, n_rows, status = extension().torque_free_attitude_solution(
         moments, omega, attitude, [time]
@@ -85,7 +86,7 @@ def largest_error(found: Array, wanted: list[mpmath.mpf]) -> float:
 
 
 def main(count: int, seed: str = "1") -> None:
-    """Print a row for each kind."""
+    """Print a row of statistics for each kind."""
     print("kind               n  attitude: median      99 %   largest    omega: 99 %   largest")
     for kind in KINDS:
         source = random.Random(f"{kind} {seed}")

@@ -1,7 +1,8 @@
-"""`python -m tests.attitude_series 3000`: whether the joint series keeps its tolerance.
+"""`python -m tests.attitude_series 3000`: check that the joint series meets its tolerance.
 
-Random scenes of `verify`, plain and nasty, with torque or not, to a tolerance of each; the truth is
-the same series at 1e-14, which `tests/methods/test_attitude.py` holds to seven unknowns of SciPy.
+The series integrates omega and attitude of random scenes of `verify`, plain and nasty, with torque
+or not, each to a tolerance from `TOLERANCES`. The truth is the same series at 1e-14, which
+`tests/methods/test_attitude.py` compares with SciPy's solution of all seven unknowns.
 """
 
 import sys
@@ -16,11 +17,11 @@ from pyharness.scenes.random_scenes import draw
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 _MOST_GROWTH = 1e6
-_ROUNDING = 1e-15  # for each factor of growth
+_ROUNDING = 1e-15  # rounding error for each unit of error amplification
 
 
 def main(count: int, seed: str) -> int:
-    """Print what became of `count` scenes; 1 where one exceeds its tolerance."""
+    """Print the outcomes of `count` scenes; return exit status 1 if one exceeds its tolerance."""
     said: Counter[str] = Counter()
     shares: list[float] = []
     for number in range(count):

@@ -1,4 +1,4 @@
-"""Fixtures of more than one file."""
+"""Fixtures that several files use."""
 
 import os
 import shlex
@@ -11,7 +11,7 @@ from pyharness.model.extension import extension
 from tests.instruction_sets import BEST, LEVELS, level_here
 from tests.traps import guard
 
-# `make cross-check` asks for this; each call of a kernel takes some microseconds longer.
+# `make cross-check` sets this variable; each call of a kernel then takes some microseconds longer.
 if os.environ.get("PYHARNESS_TRAPS"):
     assert guard(extension()) > 0
 
@@ -20,7 +20,7 @@ Printed = Callable[[str], str]
 
 @pytest.fixture
 def printed(capsys: pytest.CaptureFixture[str]) -> Printed:
-    """Return what runs a command line that ends well, and returns what it prints."""
+    """Return a function that runs a command line, expects exit status 0, and returns the output."""
 
     def run(command: str) -> str:
         assert main(shlex.split(command)) == 0
@@ -39,7 +39,7 @@ def built_site() -> dict[str, bytes]:
 
 @pytest.fixture(params=range(len(LEVELS)), ids=LEVELS)
 def level(request: pytest.FixtureRequest) -> Iterator[int]:
-    """Run the kernels of one instruction set, where this machine has it."""
+    """Run the test with the kernels of one instruction set, if this machine has it."""
     wanted: int = request.param
     if wanted > level_here():
         pytest.skip(f"no {LEVELS[wanted]} in this build, or in this processor")

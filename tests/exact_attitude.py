@@ -1,9 +1,10 @@
-"""Attitude of a torque-free body to some 45 digits, twice, by Taylor series in whole numbers.
+"""Attitude of a torque-free body to some 45 digits by two Taylor series in integer arithmetic.
 
-`joint` marches omega and the quaternion by q' = q (0, omega)/2 and knows nothing else. `exact`
-marches omega and the angle psi of the turn about the angular momentum (psi' is elementary) over a
-half period at the most, and takes whole ones at once: 1e6 s cost no more than one turn. Neither
-has an elliptic or a theta function but for the length of the period, which is checked on the way.
+`joint` integrates omega and the quaternion by q' = q (0, omega)/2 and uses no other theory. `exact`
+integrates omega and the angle psi of the rotation about the angular momentum (psi' is elementary)
+over half a period at most. It adds whole periods at once, so that 1e6 s take no longer than one
+revolution. Neither uses an elliptic or a theta function, except for the length of the period, which
+the integration checks.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,7 +36,7 @@ def times(p: Sequence[mpmath.mpf], q: Sequence[mpmath.mpf]) -> Quaternion:
 def joint(
     moments: Sequence[float], omega: Sequence[float], attitude: Sequence[float], time: float
 ) -> tuple[list[mpmath.mpf], Quaternion]:
-    """Return omega and attitude at `time` (s) by the series of both; for short times."""
+    """Return omega and attitude at `time` (s) by integrating both; for short times."""
     factors = _factors(moments)
 
     def grow(series: Series, h: int) -> None:
@@ -47,7 +48,7 @@ def joint(
         def conv(i: int, w: list[int]) -> int:
             return sum(map(mul, q[i], w))
 
-        # All from the older terms, before any is appended.
+        # Compute all terms from the older ones before appending any.
         found = (
             -conv(1, x) - conv(2, y) - conv(3, z),
             conv(0, x) + conv(2, z) - conv(3, y),
@@ -67,7 +68,7 @@ def joint(
 def exact(
     moments: Sequence[float], omega: Sequence[float], attitude: Sequence[float], time: float
 ) -> tuple[list[mpmath.mpf], Quaternion]:
-    """Return omega and attitude at `time` (s), however far."""
+    """Return omega and attitude at any `time` (s)."""
     with mpmath.workdps(DIGITS):
         i = [mpmath.mpf(x) for x in moments]
         w = [mpmath.mpf(x) for x in omega]
@@ -86,7 +87,7 @@ def exact(
         hand = 1 if (first + 1) % 3 == second else -1
         momentum = mpmath.sqrt(sum((a * b) ** 2 for a, b in zip(i, w, strict=True)))
         energy = sum(a * b * b for a, b in zip(i, w, strict=True))
-        # psi' = constant + numerator/(1 + share omega3), in this the size of omega3.
+        # psi' = constant + numerator/(1 + share omega3), where share omega3 is positive.
         constant = momentum / i[third]
         numerator = (energy - momentum**2 / i[third]) / momentum
         share = sign * i[third] / momentum
@@ -134,7 +135,7 @@ def exact(
             found = [x if axis == third else -x for axis, x in enumerate(found)]
 
         def to_axis(w: list[mpmath.mpf]) -> Quaternion:
-            # The short way from the momentum to the third axis.
+            # The shortest rotation from the momentum to the third axis.
             m = [a * b / momentum for a, b in zip(i, w, strict=True)]
             p = [mpmath.mpf(0)] * 4
             p[0] = 1 + sign * m[third]
@@ -157,7 +158,7 @@ def _steady(moments: Sequence[float], omega: Sequence[float]) -> bool:
 def _orbit(
     moments: Sequence[float], omega: Sequence[float]
 ) -> tuple[int, int, int, mpmath.mpf | None]:
-    """Return the axes of the orbit, and half a period of omega; None on the separatrix."""
+    """Return the axes of the orbit, and half a period of omega or None on the separatrix."""
     i, w = [Fraction(x) for x in moments], [Fraction(x) for x in omega]
     low, second, high = sorted(range(3), key=lambda axis: i[axis])
     gap = i[low] * w[low] ** 2 * (i[second] - i[low])
@@ -210,7 +211,7 @@ def _march(
     span: int,
     renew: Callable[[list[int]], list[int]] = lambda state: state,
 ) -> list[int]:
-    """Return the state after `span`; the powers of the step are in the terms."""
+    """Integrate the state over `span`; the terms include the powers of the step."""
     sign, rest = (1 if span >= 0 else -1), abs(span)
     h = 1 << (_BITS - 2)
     for _ in range(MOST_STEPS):

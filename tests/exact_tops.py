@@ -1,4 +1,4 @@
-"""The torque-free top in mpmath's arithmetic: initial phase by the integral of the first kind."""
+"""The torque-free top by mpmath; the initial phase is an elliptic integral of the first kind."""
 
 from collections.abc import Sequence
 
@@ -10,17 +10,17 @@ DIGITS = 60
 def exact_top(
     coefficients: Sequence[object], omega: Sequence[float], time: float
 ) -> list[mpmath.mpf]:
-    """Return omega at `time` for coefficients of two signs, none zero, off the separatrix.
+    """Return omega at `time` for non-zero coefficients of both signs, off the separatrix.
 
-    Not the formulas of the kernel: the phase at 0 is computed and the time added to it, the
-    functions are mpmath's.
+    The formulas are not the kernel's: the phase at 0 is computed and the time added to it, and the
+    elliptic functions are mpmath's.
     """
     with mpmath.workdps(DIGITS):
         a = [mpmath.mpf(x) for x in coefficients]
         w = [mpmath.mpf(x) for x in omega]
         (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0 and a[i] * a[i - 2] < 0)
         first, last = (odd + 1) % 3, (odd + 2) % 3
-        # x1' = -+ x2 x3 and so on, the sign of `odd` opposite to the other two.
+        # x1' = -+ x2 x3 and so on; the sign for `odd` is opposite to the other two.
         scale = [mpmath.sqrt(abs(a[i - 1] * a[i - 2])) for i in range(3)]
         x = [w[i] * scale[i] for i in range(3)]
         if abs(x[first]) > abs(x[last]):
@@ -37,7 +37,7 @@ def exact_top(
 
 
 def exact_coefficients(moments: Sequence[float]) -> list[mpmath.mpf]:
-    """Return A, B, C of equations 13-15 to all the digits."""
+    """Return A, B, C of equations 13-15 to all `DIGITS`."""
     with mpmath.workdps(DIGITS):
         i1, i2, i3 = (mpmath.mpf(x) for x in moments)
         return [(i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3]

@@ -1,4 +1,4 @@
-"""The instruction sets that the kernels are compiled for, and which of them this processor has."""
+"""Instruction sets that the kernels are compiled for, and those that this processor has."""
 
 import platform
 
@@ -8,12 +8,12 @@ from pyharness import _build  # noqa: PLC2701
 
 LEVELS = ("plain", "avx2", "avx512")
 BEST = len(LEVELS) - 1
-# NumPy's names for them, new and old.
+# NumPy's new and old names for them.
 _NAMES = ({"X86_V3", "AVX2"}, {"X86_V4", "AVX512_SKX"})
 
 
 def level_here() -> int:
-    """Return the highest level due, by NumPy's word on the processor and not by levels.c's."""
+    """Return the highest level that is due here, according to NumPy and not to levels.c."""
     if _build.COMPILER != "gcc" or platform.machine().lower() not in ("x86_64", "amd64"):
         return 0
     simd = np.show_config(mode="dicts")["SIMD Extensions"]
@@ -22,5 +22,5 @@ def level_here() -> int:
 
 
 def fuses_here() -> bool:
-    """Whether this processor multiplies and adds in one operation."""
+    """Whether this processor has a fused multiply-add."""
     return level_here() > 0 or platform.machine().lower() in ("arm64", "aarch64")

@@ -1,12 +1,12 @@
 """`python -m tests.issue_limit`: how near the loop of RK4 on many bodies is to its issue limit.
 
-The kernels of many bodies are compiled to assembly as the build does it, and once more with the
-loop of RK4 so changed that none of its arithmetic waits for another: it reads one register, set to
-0 before the loop and not written in it. The instructions stay as many and of the same kinds; loads,
-stores and counting stay as they are. What a fused multiply-add writes it also reads: there the
-target goes round a number of registers, so that it was written long before. Both solve a block of
-bodies, in the nearest cache, in turn, and the shortest run of each counts; the time without
-dependencies over the time with them is the part of the limit that is reached.
+The kernels of many bodies are compiled to assembly as in the build, and once more with a changed
+loop of RK4. In the changed loop no arithmetic instruction waits for another: each reads one
+register, which is set to 0 before the loop and not written in it. The number and the kinds of the
+instructions do not change, nor do loads, stores and counting. A fused multiply-add also reads the
+register that it writes; these registers rotate, so that each was written long before. Both versions
+solve in turn a block of bodies in the nearest cache, and the shortest run of each counts. The time
+without dependencies over the time with them is the fraction of the limit that is reached.
 """
 
 import os
@@ -22,8 +22,8 @@ from tests.instruction_sets import LEVELS, level_here
 
 ROOT = Path(__file__).parent.parent
 FORTRAN = ROOT / "fortran"
-IDLE = 15  # the register that is read
-FUSED = 36  # of two bodies a step: four times three products, and twice three at the end
+IDLE = 15  # the register that the changed loop reads
+FUSED = 36  # for two bodies and one step: four times three products, and twice three at the end
 BODIES, STEPS = 64, 400_000
 ROUNDS = 41
 SOURCES = (
@@ -87,7 +87,7 @@ end program driver
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print steps of bodies a second as it is, at the limit, and the part reached."""
+    """Print the steps of bodies per second as built, at the limit, and the fraction reached."""
     levels = [name for name in LEVELS[level_here() : 0 : -1] if not arguments or name in arguments]
     if not levels:
         print("no AVX2 or AVX-512 here, in this build or among the names given")
@@ -122,7 +122,7 @@ def report(level: str, folder: Path) -> None:
 
 
 def flags(level: str) -> list[str]:
-    """Return those of the build, from its record of what it compiled."""
+    """Return the compiler flags of the build, from its record."""
     (built,) = (ROOT / "build").glob("cp*/build.ninja")
     text = built.read_text()
     rule = re.search(rf"^build libbodies_{level}\.a\.p/\S*\.o: fortran.*?ARGS = (.*?)$",
@@ -132,7 +132,7 @@ def flags(level: str) -> list[str]:
 
 
 def compiled(level: str, folder: Path) -> str:
-    """Return the assembly of the kernels of many bodies, what they stand on compiled beside it."""
+    """Return the assembly of the kernels of many bodies; compile the modules that they use."""
     given = [str(FORTRAN / f"{name}.f90") for name in SOURCES]
     target = f"bodies_{level}.f90"
     unroll = [sys.executable, str(FORTRAN / "modern/unroll.py"), level, target]
@@ -146,7 +146,7 @@ def compiled(level: str, folder: Path) -> str:
 
 
 def without_dependencies(assembly: str, level: str) -> tuple[str, list[str]]:
-    """Return the assembly with the loops of RK4 changed, and the first of them as it was."""
+    """Return the assembly with changed loops of RK4, and the first of these loops unchanged."""
     wide = "zmm" if level == "avx512" else "ymm"
     lines = assembly.splitlines()
     begin = next(i for i, line in enumerate(lines) if line == f"solve_many_fixed_{level}:")
@@ -161,7 +161,8 @@ def without_dependencies(assembly: str, level: str) -> tuple[str, list[str]]:
             fused = [line for line in loop if kind_of(line) == "fused" and wide in line]
             if len(fused) == FUSED:
                 lines[first : i + 1] = independent(loop, wide)
-                # Where all registers are written, one is set before the loop and left alone.
+                # All registers are written, so that one is set to 0 before the loop and left alone
+                # in it.
                 zero = f"%{wide}{IDLE}"
                 lines[first - 1] = f"\tvxorpd\t{zero}, {zero}, {zero}\n{lines[first - 1]}"
                 found = found or loop
@@ -170,11 +171,11 @@ def without_dependencies(assembly: str, level: str) -> tuple[str, list[str]]:
 
 
 def independent(loop: Sequence[str], wide: str) -> list[str]:
-    """Return a loop whose vector instructions wait for no other: as many, of the same kinds."""
+    """Return a loop of the same kinds of vector instructions, none of which waits for another."""
     count = 32 if wide == "zmm" else 16
     register = re.compile(rf"%{wide}(\d+)")
     free = [each for each in range(count) if each != IDLE]
-    # What is only written takes another register inside the processor each time.
+    # A register that is only written is renamed inside the processor each time.
     plain_ones, round_ones = free[:2], free[2:]
     used: Counter[str] = Counter()
     result = []
@@ -196,7 +197,7 @@ def independent(loop: Sequence[str], wide: str) -> list[str]:
 
 
 def kind_of(line: str) -> str:
-    """Return what an instruction is for."""
+    """Return the kind of an instruction."""
     name = line.split()[0]
     return next((kind for kind, text in KINDS.items() if re.fullmatch(text, name)), "counting")
 
@@ -212,12 +213,12 @@ def linked(text: str, name: str, level: str, folder: Path) -> str:
 
 
 def objects() -> list[str]:
-    """Return what the kernels stand on, compiled."""
+    """Return the object files of the modules that the kernels use."""
     return ["codes.o", *(f"{Path(name).name}.o" for name in COMMON)]
 
 
 def gfortran(folder: Path, *arguments: str) -> None:
-    """Call the compiler; CalledProcessError where it complains."""
+    """Call the compiler; raise CalledProcessError if it fails."""
     subprocess.run([os.environ.get("FC", "gfortran"), *arguments], cwd=folder, check=True)
 
 

@@ -1,4 +1,4 @@
-"""`python -m tests.many_alone 100000 SEED`: whether a body's result depends on that body alone.
+"""`python -m tests.many_alone 100000 SEED`: check that a body's result depends on that body alone.
 
 Batches of every kind of body, start, torque and time are solved whole, permuted, in chunks, in 1 to
 4 threads and one body at a time. Every bit and every status must be the same.
@@ -15,15 +15,15 @@ from pyharness import Ensemble, Scene, prepare, solve_many
 from pyharness.model.trajectory import Array
 
 BASE = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), step_size=0.05)
-# Methods with the finest tolerance that is drawn for each.
+# Methods, each with the finest tolerance that is drawn for it (10 to minus this power).
 METHODS = {
     "auto": 15, "taylor": 15, "rk4": 3, "taylor-3": 3, "improved-euler": 3, "gauss-2": 12,
     "quick": 11,
 }  # fmt: skip
 _BATCH = 2000
-_ALONE = 40  # bodies of a batch that are solved alone as well
+_ALONE = 40  # bodies of a batch that are also solved alone
 _WAVES = 3  # sines and as many cosines; one batch in eight has more than lanes can take
-_LITTLE_WORK = 1e-4  # seconds are spent on many bodies, not on a few that give up
+_LITTLE_WORK = 1e-4  # few bodies exceed this work limit, or take long before they do
 
 
 def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> di
     one = np.eye(3)[rng.integers(3, size=n)] * rng.choice([-1.0, 1.0], (n, 1))
     tilt = 10.0 ** rng.uniform(-15.0, -1.0, (n, 1)) * rng.standard_normal((n, 3))
     omega0 = np.where(kind[:, None] == 0, one, omega0)  # steady rotations
-    omega0 = np.where(np.isin(kind, (1, 2))[:, None], one + tilt, omega0)  # beside them
+    omega0 = np.where(np.isin(kind, (1, 2))[:, None], one + tilt, omega0)  # near them
     omega0[kind == 3] = _beside_separatrix(body, omega0, tilt[:, 0], by_moments)[kind == 3]
     omega0[kind == 4] *= 10.0 ** rng.choice([-150.0, -70.0, 70.0, 150.0], (np.sum(kind == 4), 1))
     omega0[kind == 5] = 0.0
@@ -76,7 +76,7 @@ def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> di
             # A wave without amplitude may have any frequency.
             drawn[name][:, wave, 3] = (rate * rng.uniform(0.0, 3.0, (n, 1)))[:, 0]
             drawn[name][rng.random(n) < 0.01, wave, 3] = 1e10
-    for array in drawn.values():  # rows that are none
+    for array in drawn.values():  # rows with invalid numbers
         rows = rng.integers(n, size=max(1, n // 300))
         array.reshape(n, -1)[rows, rng.integers(array[0].size)] = rng.choice(
             [np.nan, np.inf, -1.0, 1e300, 1e-300], len(rows)
@@ -85,20 +85,20 @@ def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> di
 
 
 def _beside_separatrix(body: Array, omega0: Array, tilt: Array, by_moments: bool) -> Array:
-    """Return starts whose distance from the separatrix is `tilt`, relative."""
+    """Return starts whose relative distance from the separatrix is `tilt`."""
     found = omega0.copy()
     with np.errstate(all="ignore"):
         low, middle, high = np.argsort(body, axis=1).T
         rows = np.arange(len(body))
         least, mean, most = body[rows, low], body[rows, middle], body[rows, high]
-        # 2 E I2 = L**2
+        # the separatrix: 2 E I2 = L**2
         ratio = np.sqrt(most * (most - mean) / (least * (mean - least)))
         found[rows, low] = found[rows, high] * ratio * (1.0 + tilt)
     return np.nan_to_num(found) if by_moments else omega0
 
 
 def same_bits(one: Ensemble, other: Ensemble, rows: Any = slice(None)) -> NDArray[np.bool_]:
-    """Return which of the rows of `one` are those of `other`: status, and every bit."""
+    """Return for each row whether `one` and `other` have the same status and the same bits."""
     same: NDArray[np.bool_] = one.status[rows] == other.status
     for found, beside in ((one.omega, other.omega), (one.attitude, other.attitude)):
         assert (found is None) == (beside is None)
@@ -109,16 +109,16 @@ def same_bits(one: Ensemble, other: Ensemble, rows: Any = slice(None)) -> NDArra
 
 
 def parts_of(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
-    """Return some of the bodies."""
+    """Return the arrays of some of the bodies."""
     return {name: values[rows] for name, values in drawn.items()}
 
 
 def regroupings(
     drawn: dict[str, Any], rng: np.random.Generator, alone: int
 ) -> Iterator[tuple[str, Any, int]]:
-    """Yield ways to deal out bodies: a name, rows, threads."""
+    """Yield ways to group the bodies: a name, the rows, the number of threads."""
     n = len(drawn["omega0"])
-    # Bodies alike, so that a call has no other kind.
+    # Bodies of one kind, so that a call has no other kind.
     pushed, ramped, waved = (
         (drawn[name].reshape(n, -1) != 0.0).any(axis=1) if name in drawn else np.zeros(n, bool)
         for name in ("torque_constant", "torque_rate", "sines")
@@ -146,7 +146,7 @@ def regroupings(
 def differing(
     drawn: dict[str, Any], seed: int, alone: int = _ALONE, **settings: Any
 ) -> dict[str, set[int]]:
-    """Return by the way they were dealt out the bodies whose result changed."""
+    """Return by the name of a grouping the bodies whose result changed."""
     rng = np.random.default_rng(seed)
     n = len(drawn["omega0"])
     whole = solve_many(BASE, **drawn, **settings)
@@ -160,7 +160,7 @@ def differing(
 
 
 def differing_starts(scene: Scene, omega0: Array, t_end: Array, seed: int, **settings: Any) -> int:
-    """Return how many starts of a prepared scene change with their place, chunk or threads."""
+    """Return how many starts change with their place, chunk or threads, for a prepared scene."""
     rng = np.random.default_rng(seed)
     many = prepare(scene, **settings).many
     whole = Ensemble(*many(omega0, t_end))
@@ -179,7 +179,7 @@ def settings_of(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def main(count: int, seed: int) -> int:
-    """Print which bodies changed; 1 where one did."""
+    """Print which bodies changed; return exit status 1 if one did."""
     generator = np.random.default_rng(seed)
     n_changed = n_alone = done = batch = 0
     ends: dict[str, int] = {}

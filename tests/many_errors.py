@@ -1,8 +1,8 @@
-"""`python -m tests.many_errors 1000000 SEED`: whether many bodies keep the tolerance of one.
+"""`python -m tests.many_errors 1000000 SEED`: check that many bodies keep the tolerance of one.
 
-Bodies over four decades, without torque and under constant torque, ramps and waves, to tolerances
-of 1e-3 to 1e-12. The truth is the single kernel at 1e-15, to which `solve_many` leaves all of
-them; what is left of a body's tolerance then is the rounding of its own motion.
+Bodies over four decades, without torque and under constant torque, ramps and waves, are solved to
+tolerances of 1e-3 to 1e-12. The truth is `solve_many` at 1e-15, where it leaves all bodies to the
+single kernel. The only error of this truth is rounding in the body's own motion.
 """
 
 import sys
@@ -15,12 +15,12 @@ from pyharness.model.trajectory import Array
 
 _BATCH = 20_000
 KINDS = ("free", "constant", "ramp", "waves")
-_ROUNDING = 8e-15  # for each factor of growth
+_ROUNDING = 8e-15  # rounding error for each unit of error amplification
 _BODY = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0))
 
 
 def bodies(kind: str, n: int, seed: int, decades: float = 3.0) -> dict[str, Any]:
-    """Draw bodies, starts, times and torques that matter."""
+    """Draw bodies, starts, times and torques of noticeable size."""
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     moments = 10.0 ** (decades * rng.uniform(-0.5, 0.5, (n, 3)))
     omega0 = rng.standard_normal((n, 3)) * 10.0 ** rng.uniform(-2, 2, (n, 1))
@@ -40,7 +40,7 @@ def bodies(kind: str, n: int, seed: int, decades: float = 3.0) -> dict[str, Any]
 
 
 def scene_of(drawn: dict[str, Any], row: int) -> Scene:
-    """Return one of them."""
+    """Return the scene of one body."""
     waves = {
         name: [(tuple(wave[:3]), wave[3]) for wave in drawn[name][row]] if name in drawn else ()
         for name in ("sines", "cosines")
@@ -60,14 +60,15 @@ def exceeding(
 ) -> tuple[list[int], list[int], Array]:
     """Return bodies beyond their tolerance, those whose single solution is too, and all errors.
 
-    Errors are over the tolerance; NaN where a body has none.
+    Errors are relative to the tolerance; NaN for a body without result.
     """
     done = (found.status == 0) & np.isin(truth.status, (0, 6))
     ends = np.maximum(np.abs(truth.omega), np.abs(drawn["omega0"])).max(axis=1)
     error = np.where(done, np.abs(found.omega - truth.omega).max(axis=1) / ends, np.nan)
     beyond, alike = [], []
     for body in np.flatnonzero(error > tolerance).tolist():
-        # The promise is of the largest omega on the way, and of what rounding may grow to.
+        # The tolerance is relative to the largest omega of the trajectory, and amplified rounding
+        # is allowed in addition.
         scene, end = scene_of(drawn, body), float(drawn["t_end"][body])
         way = solve(scene, np.linspace(0.0, end, 401)[1:], "taylor", 1e-15)
         largest = max(float(np.abs(way.omega).max()), float(ends[body]))
@@ -82,7 +83,7 @@ def exceeding(
 
 
 def main(count: int, seed: int) -> int:
-    """Print what became of `count` bodies; 1 where one exceeds what its single solution keeps."""
+    """Print the outcomes of `count` bodies; return 1 if one is worse than its single solution."""
     generator = np.random.default_rng(seed)
     most: dict[str, float] = {}
     solved = n_beyond = n_alike = 0

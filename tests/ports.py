@@ -31,7 +31,7 @@ def sample(names: Sequence[str] = SAMPLE) -> list[Cell]:
 
 def documented() -> str:
     """Return the port that the documentation shows."""
-    (text,) = re.findall(r"```py\n(.*?)```", (ROOT / "docs/ports.md").read_text(), re.DOTALL)
+    (text,) = re.findall(r"```py\n(.*?)```", (ROOT / "docs/how-to/ports.md").read_text(), re.DOTALL)
     return str(text)
 
 

@@ -1,20 +1,26 @@
 """README and reports: commands print what stands there, examples run, every link is whole."""
 
+import json
 import re
 import shlex
+import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pyharness import read_scene
 from pyharness.cli.main import VERBS, main
 from pyharness.history import figures
+from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.views.csv import csv_text
 from tests.conftest import Printed
 
 ROOT = Path(__file__).parent.parent
 DOCS = sorted((ROOT / "docs").rglob("*.md"))
 README = ROOT / "README.md"
+CONTRIBUTING = ROOT / "CONTRIBUTING.md"
+SCENES = ROOT / "docs/reference/scene-files.md"
 
 
 def _blocks() -> list[tuple[Path, str, str]]:
@@ -32,6 +38,7 @@ def test_output_is_current(
 ) -> None:
     """`python -m tests.test_docs` writes the blocks anew."""
     monkeypatch.chdir(ROOT)
+    monkeypatch.setenv("COLUMNS", "100")
     assert printed(command.removeprefix("pyharness ")) == output, f"{path.name}: {command}"
 
 
@@ -48,7 +55,7 @@ def test_scene_files_are_as_shown() -> None:
 
 
 def test_links_and_pictures_are_there() -> None:
-    for path in [*DOCS, README]:
+    for path in [*DOCS, README, CONTRIBUTING]:
         for target in re.findall(r"\]\(([^)#:]+)\)", path.read_text()):
             # Above the checkout are the pages of its host.
             beyond = path == README and target.startswith("../../")
@@ -70,10 +77,10 @@ def test_pictures_of_the_report_are_current() -> None:
 
 @pytest.mark.parametrize("path", [*DOCS, README], ids=lambda path: path.name)
 def test_examples_in_the_documents_run(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {}
     for block in re.findall(r"```python\n(.*?)```", path.read_text(), re.DOTALL):
-        exec(compile(block, path.name, "exec"), {})
-    printed = capsys.readouterr().out
-    assert path != README or (printed.startswith("stopped Stop(") and printed.count("23.12") == 2)
+        exec(compile(block, path.name, "exec"), names)
+    assert path != README or "[0.60277385 0.17636085 1.31402916] 2." in capsys.readouterr().out
 
 
 def _without_times(text: str) -> list[str]:
@@ -83,26 +90,69 @@ def _without_times(text: str) -> list[str]:
     return [re.sub(r" +\d+\.\d\d$", "", line) for line in lines[:start] + lines[start + 5 :]]
 
 
-def test_readme_is_current(printed: Printed, tmp_path: Path) -> None:
+def test_readme_is_current_and_short(printed: Printed) -> None:
     text = README.read_text()
-    output, scene_file = (
-        re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)[0] for language in ("text", "toml")
-    )
+    (output,) = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
     assert _without_times(printed("compare --case 3")) == _without_times(output)
+    for verb, about in VERBS.items():
+        assert f"| `{verb}` | {about} |" in text, verb
+    assert len(text.splitlines()) <= 120
+    assert len(text.split()) <= 900
+
+
+def test_scene_file_in_the_reference_is_one(tmp_path: Path) -> None:
+    (text,) = re.findall(r"```toml\n(.*?)```", SCENES.read_text(), re.DOTALL)
     path = tmp_path / "brick.toml"
-    path.write_text(scene_file)
+    path.write_text(text)
     scene = read_scene(path)
     assert scene.name == "spinning brick"
     assert scene.torque.is_zero
-    for verb in VERBS:
-        assert f"| `{verb}" in text, verb
+    every = tomllib.loads(text)
+    keys = {f"{name}.{key}" for name, table in every.items() if name != "name" for key in table}
+    named = set(re.findall(r"`(\w+\.\w+)`", SCENES.read_text()))
+    assert keys <= named
+
+
+def test_reference_lists_every_method_with_its_tolerances() -> None:
+    text = (ROOT / "docs/reference/methods.md").read_text()
+    for name, method in METHODS.items():
+        (row,) = re.findall(rf"^\| `{name}` \| (.*) \|$", text, re.MULTILINE)
+        title, _, default, finest = row.split(" | ")
+        assert title == method.title
+        wanted = "none" if method.is_fixed_step else f"{method.default:.0e}"
+        assert default == wanted, name
+        own = "none" if method.is_fixed_step else f"{method.finest:.0e}"
+        assert finest == ("by the scene" if name in SCIPY_METHODS else own), name
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "run --case 3 --program two-term", "run --case 3 --program two-term --word cdc48",
+        "compare --case 3", "compare --case 3 --program two-term --ablate", "plan --case 5",
+        "claims --assignments", "defects", "defects stage-base", "defects 1660", "cards 1040",
+        "cards --classes", "cards --collate", "deck --program two-term", "limits --case 5",
+        "family --case 5 --terms 1 --weighting galerkin", "rotations --case 4", "doctor",
+        "verify --only orders", "stress --only matrices",
+    ],
+)  # fmt: skip
+def test_reference_lists_every_field_of_json(command: str, printed: Printed) -> None:
+    """The fields are those that the row of the verb names, all of them in one of its parts."""
+    text = (ROOT / "docs/reference/output.md").read_text()
+    verb = command.split()[0]
+    (row,) = re.findall(rf"^\| `{verb}` \| (.*) \|$", text, re.MULTILINE)
+    parts = [set(re.findall(r"`(\w+)`", part)) for part in row.split("; ")]
+    found = set(json.loads(printed(f"{command} --format json"))) - {"schema"}
+    assert any(found | {"word"} == part | {"word"} for part in parts), found
 
 
 def write_anew() -> None:
     """Replace the output of every block by what the command prints today."""
     import contextlib
     import io
+    import os
 
+    os.environ["COLUMNS"] = "100"
     for path in DOCS:
 
         def anew(match: re.Match[str]) -> str:
@@ -113,7 +163,7 @@ def write_anew() -> None:
             return f"```text\n$ {command}\n{buffer.getvalue()}```"
 
         text = path.read_text()
-        path.write_text(re.sub(r"```text\n\$ (.*?)\n.*?```", anew, text, flags=re.DOTALL))
+        path.write_text(re.sub(r"```text\n\$ ([^\n]*)\n.*?```", anew, text, flags=re.DOTALL))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 // The programs as a port: each input line is a scene with its listing, each output line a run
-// (docs/ports.md).
+// (docs/how-to/ports.md).
 import { createInterface } from "node:readline";
 import { PROGRAMS } from "./programs/programs.js";
 

@@ -31,7 +31,7 @@ def collocation_picture(store: Store) -> Picture:
     figure = Figure(figsize=(3.5 * columns + 3.8, 7.2), dpi=80, layout="constrained")
     plots = figure.subplots(2, columns + 1, squeeze=False)
     seconds = float(steps[0] * values_of(store, "steps")[0])
-    foretold = tenfold(sweep.scene.euler_coefficients, sweep.scene.omega, sizes, seconds)
+    predicted = tenfold(sweep.scene.euler_coefficients, sweep.scene.omega, sizes, seconds)
     rows: list[list[Any]] = []
     drawn: list[Any] = [None, None]
     for number in range(columns):
@@ -49,7 +49,7 @@ def collocation_picture(store: Store) -> Picture:
                 sizes[across], steps[down], values[np.ix_(down, across)], cmap=cmap,
                 vmin=limits[0], vmax=limits[1], shading="nearest", rasterized=True,
             )  # fmt: skip
-            plot.plot(sizes, foretold, color="#c02020", linestyle="dashed", linewidth=1.2)
+            plot.plot(sizes, predicted, color="#c02020", linestyle="dashed", linewidth=1.2)
             _finish(plot, steps, sizes, float(np.linalg.norm(sweep.scene.omega)))
         over = 100.0 * np.isfinite(times).mean()
         plots[0, number].set_title(

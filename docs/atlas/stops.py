@@ -33,7 +33,7 @@ _FEW = 21
 
 
 def stops_picture(store: Store) -> Picture:
-    """Draw for each listing and case the variable that ends it, with what is foretold."""
+    """Draw for each listing and case the variable that ends it, with what is predicted."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
@@ -79,7 +79,7 @@ def stops_picture(store: Store) -> Picture:
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8,
                   frameon=False, title="ended by", title_fontsize=8)  # fmt: skip
     seconds = scenes[0].step_size * scenes[0].steps
-    told = f"{seconds:g} s; cross: the deck; dashed: foretold, by the motion and the linear region"
+    told = f"{seconds:g} s; cross: the deck; dashed: predicted, by the motion and the linear region"
     title = [store.sweep.name, told]
     return Picture(figure, numbers("listing case step_size lipschitz ended", rows), title)
 
@@ -101,7 +101,7 @@ def case_scenes(sweep: Sweep) -> list[Scene]:
     return found
 
 
-def foretold(scene: Scene, t_end: float) -> tuple[float, float]:
+def predicted(scene: Scene, t_end: float) -> tuple[float, float]:
     """Return where the corrected program stops: below which constant, and above which step.
 
     In short steps its quotient nears |omega''| / |omega'|, whose largest value on the way is the
@@ -143,7 +143,7 @@ def _share(values: Array) -> str:
 
 
 def _foretell(plot: "Axes", scene: Scene, steps: Array) -> None:
-    constant, step = foretold(scene, scene.step_size * scene.steps)
+    constant, step = predicted(scene, scene.step_size * scene.steps)
     style: dict[str, Any] = {"color": "#c02020", "linestyle": "dashed", "linewidth": 1.2}
     plot.axhline(constant, **style)
     if step < steps[-1]:

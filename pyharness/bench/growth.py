@@ -40,7 +40,7 @@ def growth(
     Raise InputError if the scene has no closed form.
     """
     if closed_form(scene) is None:
-        raise InputError("growth: the scene has no closed form to be held against")
+        raise InputError("growth: the scene has no closed form to compare with")
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()

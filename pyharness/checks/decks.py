@@ -91,4 +91,4 @@ def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
     if not overflowed:
         return [f"{len(rest)} records more"] if len(rest) else []
     fine = len(rest) > 0 and not np.isfinite(rest[:, 1:4]).all(axis=1).any()
-    return [] if fine else ["it goes on with finite numbers where the port has none"]
+    return [] if fine else ["it continues with finite numbers where the port has none"]

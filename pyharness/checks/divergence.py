@@ -21,13 +21,13 @@ class Divergence:
     """The smallest steps that diverge (s): found by running, and predicted by linear stability.
 
     `found` is the smallest step with which some omega exceeds twice its bound on the solution, or
-    overflows. It is 0 if this already happens with the smallest step that is tried. `foretold` is
+    overflows. It is 0 if this already happens with the smallest step that is tried. `predicted` is
     the smallest step with which the wobble about axis 3 doubles. `limit` is the largest allowed
-    difference of the two, relative to `foretold`.
+    difference of the two, relative to `predicted`.
     """
 
     found: float
-    foretold: float
+    predicted: float
     limit: float
 
 
@@ -44,7 +44,7 @@ def divergence(
     a, b, c = scene.euler_coefficients
     spin = abs(scene.omega[2])
     rate = math.sqrt(-a * b) * spin
-    foretold = _doubling(matrix, rate, time, smallest)
+    predicted = _doubling(matrix, rate, time, smallest)
     bounds = _bounds(scene, time)
     # omega3**2 - (C/A) omega1**2 and omega3**2 - (C/B) omega2**2 are constant. Until the wobble has
     # doubled, they allow the spin, and with it the rate, to change by this fraction at most.
@@ -54,10 +54,10 @@ def divergence(
         change = abs(c) / min(abs(a), abs(b)) * wobble**2 / (2.0 * spin * spin)
     low = _doubling(matrix, rate * (1.0 + change), time, smallest)
     # Between two results, a peak may be missed by half the angle of a step.
-    missed = -math.log(math.cos(min(1.5, 0.5 * rate * foretold)))
+    missed = -math.log(math.cos(min(1.5, 0.5 * rate * predicted)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
-    limit = max(foretold - low, high - foretold) / foretold + 2.0 * foretold / time
-    return Divergence(found, foretold, limit)
+    limit = max(predicted - low, high - predicted) / predicted + 2.0 * predicted / time
+    return Divergence(found, predicted, limit)
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:

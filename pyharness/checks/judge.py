@@ -159,7 +159,7 @@ def reference_truth(
     # amplifies errors by more than 1e3.
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(known.time) < len(times):
-        raise InputError("the solution leaves every bound")
+        raise InputError("the solution grows without bound")
     return Truth(known.time, known.omega, known.error, flow, known.attitude, known.angle_error)
 
 

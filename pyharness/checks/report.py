@@ -105,8 +105,8 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
         [*key, *(x for values in cells[key] for x in (len(values), max(values, default=None)))]
         for key in sorted(cells, key=lambda each: (each[0], bands.index(each[1])))
     ]
-    told = "worst: error less rounding (2e-15 K) over the tolerance; K: growth of a difference"
-    return [Table(_SAMPLES, rows), told]
+    told = "worst: (error - 2e-15 K) / tolerance, with K the error amplification:"
+    return [told, Table(_SAMPLES, rows)]
 
 
 def verdict(checks: Sequence[Check]) -> str:

@@ -10,24 +10,24 @@ from pyharness.model.report import Column, Picture, Report, Section, Table, shor
 
 _COLUMNS = (
     *words("method"), Column("checks"), Column("failed"), Column("bounded"),
-    Column("share", short), Column("value", short), Column("limit", short),
+    Column("ratio", short, name="share"), Column("value", short), Column("limit", short),
     Column("worst at", left=True, fit="cut"),
 )  # fmt: skip
 _NOTE = (
-    "bounded: checks with a bound, the rest describe; share: of the bound that the worst takes, "
-    "value and limit its own (without a bound: the largest value)"
+    "bounded: number of checks with a bound; the others only describe. ratio: value over limit of "
+    "the worst check, with its value and limit (without a bound: the largest value)."
 )
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
     """Return the report: the failures, then a table for each trial; each trial has a figure."""
-    text: list[Section] = [told_singly(checks)]
+    text: list[Section] = [told_singly(checks), [_NOTE]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]
         if own:
             text.append([f"{each.name}: {each.title}", f"  bound: {each.bound}"])
             text.append([_table(own)])
-    report = checks_report("stress", checks, [*text, [_NOTE, verdict(checks)]])
+    report = checks_report("stress", checks, [*text, [verdict(checks)]])
     pictures = {each.name: partial(_picture, each, checks) for each in trials}
     return report._replace(pictures=pictures)
 

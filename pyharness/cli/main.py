@@ -15,7 +15,7 @@ VERBS = {
     "run": "compute one trajectory with a program of the appendix or with a method",
     "cards": "show the listings card by card with scan, port, twin and apparatus",
     "deck": "write a program as a deck of cards in fixed-form FORTRAN",
-    "defects": "list the defects and readings with their evidence and their effect",
+    "defects": "list the defects and readings with their evidence and effect",
     "limits": "show what the original programs converge to as the step goes to zero",
     "figures": "redraw Figures 6 to 12 of the thesis, original and corrected",
     "claims": "judge the statements of the thesis for the original and the corrected programs",
@@ -95,6 +95,9 @@ def _run(arguments: list[str]) -> int:
     from pyharness.cli.options import Parser
 
     parser = Parser(verb, VERBS[verb])
+    if {"-h", "--help"} & {*rest}:
+        sys.stdout.write(parser.format_help())
+        return 0
     code: int = parser.module.run(parser.read(verb, rest))
     return code
 

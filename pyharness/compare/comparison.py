@@ -139,7 +139,9 @@ class Comparison:
                 found.append(f"{each.who}: Fortran and twin differ in {told}")
             if each.order is not None and each.order.state == "misses":
                 told = f"{each.order}, due {each.order.due}"
-                found.append(f"{each.who}: misses the reference as the step is halved: {told}")
+                found.append(
+                    f"{each.who}: does not converge to the reference as the step is halved: {told}"
+                )
         return tuple(found)
 
     @property

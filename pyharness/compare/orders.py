@@ -69,7 +69,7 @@ class Order:
         return {
             "singular": f"IER = 129 at steps of {self.step_size:.1e} s",
             "sensitive": "the error may be rounding that the motion has multiplied",
-            "unbounded": "the solution itself leaves every bound",
+            "unbounded": "the solution itself grows without bound",
             "rounding": "rounding from the start",
         }.get(self.state, f"does not settle down to steps of {self.step_size:.1e} s")
 

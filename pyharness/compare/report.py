@@ -39,22 +39,24 @@ def comparison_report(comparison: Comparison) -> Report:
         f"(estimated {short(truth.estimate)} before rounding to binary64)"
     )
     legend = (
-        "w1-w3, V: largest error against the reference (rad/s, m/s). energy, mom.sq: largest "
-        "relative drift. ulp: distance between Fortran and Python in units in the last place. "
-        "stop: variable and its Lipschitz quotient against the limit. us/step: "
-        f"{'Fortran, the call included' if in_floats else _in_word(comparison)}."
+        "w1 to w3, V: largest error of the angular velocity (rad/s) and of the velocity (m/s). "
+        "energy, mom.sq: largest relative drift of the energy and of the squared angular momentum. "
+        "ulp: largest distance between Fortran and Python, in units in the last place. stop: "
+        "variable that ended the run, its Lipschitz quotient and the limit. us/step: time per step "
+        f"of {'Fortran, with the call' if in_floats else _in_word(comparison)}."
     )
     motion = []
     if comparison.growth is not None and comparison.digits is not None:
         motion.append(
-            f"growth of a small difference {short(comparison.growth)}: "
+            f"error amplification {short(comparison.growth)}: "
             f"rounding leaves {comparison.digits:.1f} digits"
         )
     attitudes = _attitudes(comparison)
     if attitudes:
         legend += (
-            " angle: largest error of the attitude (rad); beside a program's rows by a step of "
-            "order 4. L in space: largest drift of the angular momentum over its size."
+            " angle: largest error of the attitude (rad); a program's attitude is integrated from "
+            "row to row by a method of order 4. L in space: largest relative drift of the angular "
+            "momentum."
         )
     failures = [f"failed: {x.method}: {x.failure}" for x in comparison.methods if x.failure]
     told, programs, methods = verdict(comparison), _programs(comparison), _methods(comparison)
@@ -68,10 +70,11 @@ def comparison_report(comparison: Comparison) -> Report:
         "compare",
         text=[
             [*scene, reference, *motion],
+            [legend],
             [programs],
             [methods],
             *attitudes,
-            [legend, *failures, *told],
+            [*failures, *told],
         ],
         record=lambda: _record(comparison),
         data=_data(comparison),
@@ -100,8 +103,8 @@ def _as_expected(comparison: Comparison) -> str:
     same = sum(not each.differences for each in comparison.programs)
     if any(each.ulps is None for each in comparison.programs):
         return (
-            f"programs in {comparison.word}: their twins alone, so that there are no bits of two "
-            "languages to agree, nor orders"
+            f"programs in {comparison.word}: only the twins run, so neither bits of two languages "
+            "nor orders are compared"
         )
     text = f"as expected: Fortran = Python bit for bit in {same} of {len(comparison.programs)}"
     orders = [each.order for each in comparison.programs if each.order is not None]
@@ -111,7 +114,8 @@ def _as_expected(comparison: Comparison) -> str:
         f"{each.value:.1f}" if each.value is not None else "rounding" if each.is_judged else "-"
         for each in orders
     )
-    return f"{text}; orders corrected {seen} (due: {', '.join(str(each.due) for each in orders)})"
+    due = ", ".join(str(each.due) for each in orders)
+    return f"{text}; orders {seen} (expected {due})"
 
 
 def _programs(comparison: Comparison) -> Table:

@@ -12,7 +12,7 @@ from pyharness.model.facts import shipped
 # Suffixes of the pictures in the documents.
 _PICTURES = (".png", ".svg")
 # Documents with an entry of their own in the menu.
-_OF_THE_MENU = ("findings.md", "methods.md")
+_OF_THE_MENU = ("index.md", "explanation/findings.md", "explanation/methods.md")
 
 
 def documents_folder(given: str | None = None) -> Path:

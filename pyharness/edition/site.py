@@ -36,8 +36,8 @@ MENU = (
     ("Figures", "figures.html"),
     ("Claims", "claims.html"),
     ("Apparatus", "apparatus.html"),
-    ("Findings", "docs/findings.html"),
-    ("Methods", "docs/methods.html"),
+    ("Findings", "docs/explanation/findings.html"),
+    ("Methods", "docs/explanation/methods.html"),
     ("Documents", "docs/index.html"),
     ("API", "api.html"),
     ("Search", "search.html"),
@@ -165,15 +165,12 @@ def _listing() -> Iterator[Page]:
 
 
 def _documents(docs: Path) -> Iterator[Page]:
-    titles = []
     for path, each in documents.documents(docs):
         found = [
             Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
         ]
-        titles.append((path, each.title))
         yield Page(path, each.title, "document.html", {"document": each}, found,
                    menu=path if path in dict(MENU).values() else "docs/index.html")  # fmt: skip
-    yield Page("docs/index.html", "Documents", "documents.html", {"documents": titles})
 
 
 def _rendered(page: Page) -> bytes:

@@ -155,7 +155,7 @@ def _listed(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
             if not isinstance(each, str):
                 raise InputError(f"{where}: {kind_of(each)} where a name belongs")
         if len(set(values)) < len(values):
-            raise InputError(f"{where}: a name stands twice; allowed: each once")
+            raise InputError(f"{where}: a name is given twice; allowed: each once")
         return Axis(field, dimension, len(values), "listed", tuple(values))
     floats = tuple(finite(where, each) for each in values)
     return _checked(where, Axis(field, dimension, len(values), "listed", floats))

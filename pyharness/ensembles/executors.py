@@ -83,7 +83,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
             if deaths == _ATTEMPTS:
                 raise InputError(
                     f"--executor processes: a process died {_ATTEMPTS} times; is there enough "
-                    "memory? The same command goes on with what is missing"
+                    "memory? The same command continues with what is missing"
                 ) from None
 
 
@@ -230,14 +230,14 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
         except dask.KilledWorker:
             raise InputError(
                 "--executor dask: the workers that took a chunk died, one after the other; is "
-                "there enough memory? The same command goes on with what is missing"
+                "there enough memory? The same command continues with what is missing"
             ) from None
         except InputError:
             raise
         except Exception as error:  # a worker lacks something, or the scheduler is gone
             raise InputError(
                 f"--executor dask: chunk {chunk_of[future.key]}: {type(error).__name__}: {error}; "
-                "the same command goes on with what is missing"
+                "the same command continues with what is missing"
             ) from None
         yield chunk_of.pop(future.key), found
         future.release()

@@ -248,7 +248,7 @@ REDUCTIONS = {
         needs=("moments", "no torque"),
     ),
     "growth": Reduction(
-        "logarithm of the growth of a small difference, over the time",
+        "logarithm of the error amplification, over the time",
         "1/s",
         _growth,
         parameters={"offset": 1e-6},

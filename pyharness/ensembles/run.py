@@ -102,7 +102,7 @@ def swept(
         except OSError as error:
             raise InputError(
                 f"--out '{path}': {error.strerror or error}; what is done stays, and the same "
-                "command goes on from there"
+                "command continues from there"
             ) from None
         yield store, outcome
 

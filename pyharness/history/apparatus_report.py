@@ -44,8 +44,12 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
         [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
         for each in entries
     ]
-    note = "`defects NAME` shows the statements, the evidence and the effect."
-    return Report("defects", [[Table(_ENTRIES, rows)], [note]], lambda: {"entries": entries})
+    legend = (
+        "kind: defect (a fault of the author), reading (a card that can be read in two ways), "
+        "conjecture (an assumption where no card exists), and others. flag: number of the switch "
+        "in the programs; -: no switch. `defects NAME` shows statements, evidence and effect."
+    )
+    return Report("defects", [[legend], [Table(_ENTRIES, rows)]], lambda: {"entries": entries})
 
 
 def entry_report(
@@ -87,7 +91,8 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
         columns = ("original, with it", "original", "corrected, with it", "corrected")
     told: list[Section] = [
         [
-            "effect, measured now, 100 steps: largest error of w (rad/s) and of V (m/s), the stop;",
+            "Effect, measured now over 100 steps. w: largest error of the angular velocity "
+            "(rad/s); V: of the velocity (m/s); stop: variable and step that ended the run.",
             ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)),
         ]
     ]

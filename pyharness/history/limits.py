@@ -1,7 +1,7 @@
 """The limits of the original programs as the step size goes to zero.
 
 A program that does not converge to the solution converges to another function, or to none.
-docs/findings.md derives the limits. This module computes each limit independently of the programs,
+docs/explanation/findings.md derives the limits. This module computes each limit independently of the programs,
 and compares the programs with their limits while the step is halved.
 """
 
@@ -31,7 +31,7 @@ TENDS_TO = {
     "runge-kutta": "2 y(t/2) - y(0), y the true solution",
 }
 SLOW_SLOPES = "w' = F(p, t) with p' = F(p, t) / 2, p(0) = w(0)"
-NOTHING = "nothing: TIME = t^2/(2h) + t/2 leaves every bound"
+NOTHING = "nothing: TIME = t^2/(2h) + t/2 grows without bound"
 
 _STEP = digits("g")
 _COLUMNS = (
@@ -73,7 +73,7 @@ class Limit:
     def approach(self) -> str:
         """Return a description of the convergence to the limit."""
         if self.blow_up is not None:
-            return f"no order: the limit leaves every bound at t = {self.blow_up:.3g} s"
+            return f"no order: the limit grows without bound at t = {self.blow_up:.3g} s"
         if self.order is not None:
             return f"order {self.order:.2f} toward the limit"
         last = self.halvings[-1].from_limit

@@ -211,9 +211,11 @@ def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
     best = " and ".join(each.mistake for each in found if each.in_both == most)
     text: list[Section] = [
         [
-            "Conjectures: mistakes that the programs for three weightings may have had, which IV.2 "
-            "says gave no meaningful results in Cases 1 and 2, and which are not printed. Largest "
-            "error over the largest omega, by weighting and case; a tenth of it is a failure."
+            "Conjectures: mistakes that the programs for three other weightings may have had. IV.2 "
+            "says that they gave no meaningful results in Cases 1 and 2; they are not printed.",
+            "sub, gal, lsq: subdomain, Galerkin and least squares; .1, .2: Cases 1 and 2. Each "
+            "cell is the largest error relative to the largest omega; a tenth or more fails. "
+            "both, either: with how many weightings the mistake fails in both cases, or in either."
             + ("" if word == BINARY64 else f" Computed in {word}."),
         ],
         [Table(_TABLE, rows)],

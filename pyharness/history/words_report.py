@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyharness.history.words import WordCell, WordRun
 from pyharness.model.records import build_record
-from pyharness.model.report import Column, Picture, Report, Table, numbers, short, words
+from pyharness.model.report import Column, Picture, Report, Section, Table, numbers, short, words
 from pyharness.original.word import RULES
 
 if TYPE_CHECKING:
@@ -29,17 +29,29 @@ def words_report(cells: Sequence[WordCell]) -> Report:
     """Report cells that all have the same word lengths."""
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
-    tables = [[_lengths(cells)], [_errors(cells)]]
-    notes = [
-        "page, stop: the least p from which on the printed rows, or how the run ends, are those of "
-        "binary64. truncation: largest error in 113 bits (rad/s). rounding: the least p from which "
-        f"on the error is at most {ROUNDS:g} times that. IER: the largest p with IER = 129, of any "
-        "rule. -: not up to the largest p. Rules: ne (nearest even), chop (towards zero), FX and "
-        "RX (CDC, unrounded and rounded)."
+    tables: list[Section] = [
+        [
+            "Smallest precision p, in bits, from which on the printed rows (page) or the end of "
+            "the run (stop) are those of binary64; -: not up to the largest p. Rounding rules: ne "
+            "(nearest even), chop (towards zero), FX and RX (CDC, unrounded and rounded):",
+            _lengths(cells),
+        ],
+        [
+            "truncation: largest error with 113 bits (rad/s). rounding: smallest p from which on "
+            f"the error is at most {ROUNDS:g} times the truncation error. IER: largest p, with any "
+            "rule, with which LEQT1F reports IER = 129:",
+            _errors(cells),
+        ],
     ]
+    notes: list[str] = []
     if all(cell.of(p, rule) for cell in cells for _, p, rule in _MACHINE):
-        tables.insert(0, [_machine(cells)])
-        notes = [*_changes(cells), *notes]
+        legend = (
+            "fields: numbers on the printed page, in binary64. cdc48, rounded: how many of them "
+            "differ in the CDC's arithmetic, unrounded and rounded. stop: variable and step at "
+            "which the run ended. error: largest error of w (rad/s):"
+        )
+        tables.insert(0, [legend, _machine(cells)])
+        notes = _changes(cells)
 
     def draw() -> Picture:
         return _picture(cells)

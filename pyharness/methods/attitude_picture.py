@@ -88,7 +88,7 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
     times = [end * n / (count - 1) for n in range(count)]
     found = solve(scene, times, method, tolerance, attitude=True)
     if not found.has_all_rows:
-        raise InputError("--animate: the motion overflows on the way; take a shorter time")
+        raise InputError("--animate: the motion overflows before the end; take a shorter time")
     assert found.attitude is not None
     figure = Figure(figsize=(4.6, 4.9), dpi=80)
     update = _scene_of_brick(figure, scene, found, abs(end) / seconds)

@@ -60,8 +60,8 @@ def gauss(stages: int) -> Integrator:
                 enough = effort * max(needed, 0.5 * pace * more * steps) / most
                 remedies = "take a shorter time, a larger tolerance or more stages"
                 raise TimedError(
-                    f"gauss-{stages} gave up at t = {{time}} s after {spent} right-hand sides; "
-                    + advice(remedies, effort, enough),
+                    f"gauss-{stages} exceeded its work limit at t = {{time}} s after {spent} "
+                    "right-hand sides; " + advice(remedies, effort, enough),
                     reached,
                 )
             found = _Solution(

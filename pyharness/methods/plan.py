@@ -91,7 +91,7 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
     if closed:
         yield Decision("integration", False, f"closed form: {chosen.closed_form}")
     else:
-        why = "asked for" if closed_form(scene) else _why_no_form(scene)
+        why = "requested" if closed_form(scene) else _why_no_form(scene)
         yield Decision("integration", True, why)
     for name, value, product in zip(
         ("A w2 w3", "B w1 w3", "C w1 w2"),
@@ -116,14 +116,14 @@ def _decisions(chosen: Plan) -> Iterator[Decision]:
         if part == "attitude" and law.in_space:
             yield Decision(part, True, "the torque is fixed in space")
         else:
-            yield Decision(part, wanted, "asked for" if wanted else "not asked for")
-    wanted, why = chosen.rows, "rows asked for" if chosen.rows else "only the end"
+            yield Decision(part, wanted, "requested" if wanted else "not requested")
+    wanted, why = chosen.rows, "intermediate output requested" if chosen.rows else "only the end"
     if wanted and closed:
         wanted, why = False, "closed form"
     yield Decision("dense output", wanted, why)
     # No prepared solver uses the reference or SciPy.
-    yield Decision("reference", False, "not asked for")
-    yield Decision("SciPy", False, "ours")
+    yield Decision("reference", False, "not requested")
+    yield Decision("SciPy", False, "our own kernels solve it")
 
 
 def _why_no_form(scene: Scene) -> str:

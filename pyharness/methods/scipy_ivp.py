@@ -113,7 +113,7 @@ def scipy_method(name: str) -> Integrator:
             if tolerance < finest * (1.0 - 1e-9):
                 raise InputError(
                     f"tolerance is {tolerance:g}; {run.label} can't meet it over "
-                    f"{ahead.radians:.3g} radians in which small differences grow "
+                    f"{ahead.radians:.3g} radians in which perturbations grow "
                     f"{ahead.growth:.3g} times; allowed for this motion: {finest * 1.06:.2g} to 1, "
                     "or a shorter time"
                 )
@@ -138,7 +138,7 @@ def scipy_method(name: str) -> Integrator:
             if result.status == 1 and low <= 0.0 <= high:
                 # Omega is bounded, but its phase can't be computed any further.
                 raise TimedError(
-                    f"{run.label} gave up at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
+                    f"{run.label} stopped at t = {{time}} s: beyond {_LARGEST_PHASE:.0e} radians "
                     "the phase has hardly a digit left; take a shorter time",
                     float(result.t_events[0][0]) * run.unit,
                 )
@@ -253,7 +253,7 @@ class _Run:
                 if "infs or NaNs" in str(error):
                     raise _NoNumberError from None
                 raise InputError(
-                    f"{self.label} gave up: {error}; take a shorter time, slower motion or smaller "
+                    f"{self.label} failed: {error}; take a shorter time, slower motion or smaller "
                     "torques"
                 ) from None
 
@@ -266,7 +266,8 @@ class _Run:
         self.evaluations += 1
         if self.evaluations > self.most:
             raise TimedError(
-                f"{self.label} gave up at t = {{time}} s after {self.most} right-hand sides; "
+                f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
+                "right-hand sides; "
                 + advice(
                     "take a shorter time or a larger tolerance",
                     self.effort,

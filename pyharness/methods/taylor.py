@@ -37,7 +37,7 @@ def taylor(
     if status == GAVE_UP:
         count = "1 step" if steps == 1 else f"{steps} steps"
         raise TimedError(
-            f"taylor gave up before t = {{time}} s after {count}; "
+            f"taylor exceeded its work limit before t = {{time}} s after {count}; "
             + advice("take a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )

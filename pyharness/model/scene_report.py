@@ -71,7 +71,7 @@ def ending(trajectory: Trajectory) -> str:
 def sensitive(growth: float | None, digits: float | None) -> str:
     """Return a phrase for a result whose amplified rounding error exceeds the tolerance."""
     left = counted(math.floor(digits or 0.0), "digit")
-    return f"sensitive: rounding grows by {short(growth)} on the way; {left} left"
+    return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
@@ -81,5 +81,5 @@ def estimates(trajectory: Trajectory) -> list[str]:
         told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")
         told.append(f"digits left {trajectory.digits:.1f}")
     if trajectory.growth is not None:
-        told.append(f"growth of a small difference {short(trajectory.growth)}")
+        told.append(f"error amplification {short(trajectory.growth)}")
     return ["; ".join(told)] if told else []

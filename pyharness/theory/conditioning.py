@@ -70,7 +70,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
     if not complete:
-        raise InputError(f"conditioning: the solution leaves every bound before t = {time:g} s")
+        raise InputError(f"conditioning: the solution grows without bound before t = {time:g} s")
     return along(scene, times, omega)
 
 

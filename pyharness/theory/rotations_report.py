@@ -16,9 +16,10 @@ _FULL = (
     + " ".join(_TIMES)
 )
 _KEY = (
-    "Q: rates of equation 32, 1/s. stable: no small disturbance grows, neither with exp(Q t) nor "
-    "with t. doubling, period: of a disturbance, s. flips: the shortest time between flips, s. "
-    "linear: when the linear picture is a tenth off, s."
+    "w1 to w3: omega of the rotation, rad/s. stable: whether no perturbation grows, neither as "
+    "exp(Q t) nor as t. doubling, period: time in which a perturbation doubles, and its period, s. "
+    "flips: shortest time between flips, s. linear: time after which the linear approximation has "
+    "an error of a tenth, s. Q: rates of equation 32, 1/s."
 )
 _OMEGA = digits(".4g")
 _SECONDS = digits(".3g")
@@ -26,10 +27,12 @@ _SECONDS = digits(".3g")
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
     """Return the report of the steady rotations of a scene, with a row for each."""
-    text: list[Section] = [[*heading(scene), f"disturbance: {found.disturbance:g} of the rotation"]]
+    text: list[Section] = [
+        [*heading(scene), f"perturbation: {found.disturbance:g} of the rotation"]
+    ]
     text.append([found.told])
     if found.rotations:
-        text += [[_table(found.rotations)], [_KEY]]
+        text += [[_KEY], [_table(found.rotations)]]
     return Report(
         "rotations",
         text=text,

@@ -63,7 +63,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
             return _march(scene, times, power)
         except _OtherUnitError as other:
             power += other.power
-    raise InputError("integer series: omega leaves every bound")
+    raise InputError("integer series: omega grows without bound")
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
@@ -104,7 +104,7 @@ def _march(scene: Scene, times: Sequence[float], power: int) -> Path:
                 break
             length = max(1, int(length * 2.0 ** (-excess - 0.05)))
         if length == 1 < whole - begin:
-            raise InputError("integer series: omega leaves every bound")
+            raise InputError("integer series: omega grows without bound")
         while len(rows) < len(times) and wanted[len(rows)] * whole <= begin + length:
             part = (wanted[len(rows)] * whole - begin) / length
             rows.append([_at(each, part) for each in terms[:3]])

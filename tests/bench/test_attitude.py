@@ -1,4 +1,4 @@
-"""`bench --attitude`: both are judged, by whoever carries both; nothing asserts seconds."""
+"""`bench --attitude`: methods are judged by omega and attitude; timings are not asserted."""
 
 import json
 import sys
@@ -44,7 +44,7 @@ def truths() -> dict[str, Reference]:
 def _error(contender: SceneContender, scene: Scene, truth: Reference) -> float:
     ready = contender.prepare(scene)(2.0, 1e-12)
     ready.run()
-    # The second call starts where the first one did.
+    # The second call must start from the initial condition again.
     error = error_of(ready.read(ready.run()), truth)
     assert error is not None
     return error
@@ -61,7 +61,7 @@ def test_everyone_reaches_both(contender: SceneContender, truths: dict[str, Refe
 
 
 def _backward(right: Callable[..., Any]) -> Callable[..., Any]:
-    """Return right-hand sides, written or called, in which one of the attitude has a wrong sign."""
+    """Return right-hand sides, as text or values, with a wrong sign in one attitude component."""
 
     def rates(*given: Any, **named: Any) -> Any:
         found = list(right(*given, **named))
@@ -86,7 +86,7 @@ def test_a_wrong_sign_is_seen(name: str, truths: dict[str, Reference]) -> None:
     peer = next(each for each in ABLE if each.name == name)
     if not peer.is_installed:
         pytest.skip(f"{peer.package} is not installed")
-    # Omega alone is right.
+    # Only omega is right.
     assert _error(peer, FREE, truths[FREE.name]) > 0.1
 
 
@@ -96,7 +96,7 @@ def test_orekit_turns_as_the_closed_form(
 ) -> None:
     if not OREKIT.is_installed:
         pytest.skip(f"{OREKIT.package} is not installed")
-    # Each prepares anew, in the machine that the first one started.
+    # The second call reuses the Java virtual machine that the first one started.
     for _ in range(2):
         assert _error(OREKIT, FREE, truths[FREE.name]) < 1e-12
     right = orekit_peer._end
@@ -144,7 +144,7 @@ def test_the_larger_error_counts(truths: dict[str, Reference]) -> None:
         (End(omega, attitude=tilted), 2e-5),
         (End(off, attitude=right), 1e-3),
         (End(off, attitude=tilted), 1e-3),
-        # A quaternion stands for the attitude of its direction, whatever its length and sign.
+        # The attitude depends on the direction of a quaternion, not on its length or sign.
         (End(omega, attitude=-1.01 * tilted), 2e-5),
     ):
         assert error_of(end, truth) == pytest.approx(error, rel=1e-4)

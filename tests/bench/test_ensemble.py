@@ -1,4 +1,4 @@
-"""`bench --ensemble`: all contenders come to the truth, and the report has what it promises."""
+"""`bench --ensemble`: all contenders reach the truth, and the report has all its parts."""
 
 import csv
 import io
@@ -21,9 +21,9 @@ from pyharness.cli.main import main
 from tests.issue_limit import IDLE, independent
 
 Capture = pytest.CaptureFixture[str]
-# Settings for an error of 1e-8.
+# Settings that give an error of 1e-8.
 SETTINGS = {"tolerance": 1e-9, "steps": 400.0, "none": 1.0}
-BODIES = 70  # more than a block, and no whole number of them
+BODIES = 70  # more than a block, and not a multiple of its size
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measuring, "_BATCH", 0.0)
 
 
-# Those that take seconds to compile are tried where they are measured.
+# Contenders that compile for seconds are tested only where they are measured.
 FAST = [each for each in (*own_ensembles(), *ensemble_peers()) if each.package != "diffrax"]
 
 
@@ -49,7 +49,7 @@ def test_contender_comes_to_the_truth(contender: EnsembleContender) -> None:
         wanted = load.part(rows).ends()
         for threads in contender.threads:
             run = contender.prepare(load, SETTINGS[contender.setting], threads)
-            run()  # the second call begins anew
+            run()  # the second call must start from the initial conditions again
             np.testing.assert_allclose(run()[rows], wanted, rtol=0.0, atol=2e-8)
 
 
@@ -60,7 +60,7 @@ def test_a_seed_says_which_bodies() -> None:
     assert np.array_equal(free.omega0, again.omega0)
     assert np.array_equal(free.omega0, pushed.omega0)
     assert not np.array_equal(free.omega0, other.omega0)
-    # So large that it matters.
+    # The torque changes the result noticeably.
     assert np.abs(pushed.ends() - free.ends()).max() > 0.5
 
 
@@ -90,7 +90,7 @@ def test_table_has_every_part(capsys: Capture) -> None:
         assert title in shown
     for name in ("closed-form", "taylor", "rk4", "numpy-rk4", "scipy-dop853-loop"):
         assert re.search(rf"^{name} ", shown, flags=re.MULTILINE)
-    assert re.search(r"^ +10000 ", shown, flags=re.MULTILINE)  # bodies, a hundred times as many
+    assert re.search(r"^ +10000 ", shown, flags=re.MULTILINE)  # a hundred times as many bodies
 
 
 @pytest.mark.usefixtures("hurried")

@@ -1,4 +1,4 @@
-"""The benchmark: known times and errors give the expected table; nothing asserts seconds."""
+"""The benchmark: known times and errors give the expected table; timings are not asserted."""
 
 import csv
 import itertools
@@ -55,7 +55,7 @@ def _finding(rows: list[Row], *refused: Refusal) -> Finding:
     return Finding(loads, rows, list(refused), {(5, "heyoka"): 0.5}, doubt)
 
 
-# Microseconds and errors, made up.
+# Made-up times (microseconds) and errors.
 ROWS = [
     *(
         _row(SHORT, method, seconds, error)
@@ -166,7 +166,8 @@ def test_ratio_has_three_digits_in_seven_characters(value: float | None, text: s
 def test_error_is_relative_to_the_largest_component() -> None:
     truth = reference(case_scene(3), [3.0])
     omega = truth.omega[0].copy()
-    # Half a unit in the last place of the largest component is the error of the truth rounded.
+    # Rounding the truth to double precision has an error of at most half a unit in the last place
+    # of its largest component.
     assert 0.0 < (relative_error(omega, truth) or 0.0) <= 2.0**-53
     assert relative_error(omega, replace(truth, remainder=None)) == 0.0
     omega[0] += 1e-5
@@ -235,7 +236,7 @@ def test_measure_judges_refuses_and_goes_on(right: Array) -> None:
 
 @pytest.mark.usefixtures("hurried")
 def test_every_contender_of_ours_meets_its_order_or_tolerance_and_counts() -> None:
-    """Case 3 has a closed form, and every method takes it."""
+    """Check every contender on Case 3, which has a closed form and suits every method."""
     others = [each for each in peers() if each.package == "scipy"][:2]
     found = measure([Workload("3", case_scene(3), 3.0)], own() + others)
     good = {(row.method, row.setting): row for row in found.rows if row.error is not None}

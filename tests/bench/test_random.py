@@ -1,4 +1,4 @@
-"""`bench --random`: scenes are of the kinds they say, and their ratios come to what is expected."""
+"""`bench --random`: scenes are of the kinds they claim, and time ratios have known values."""
 
 import csv
 import json
@@ -23,7 +23,7 @@ from pyharness.truth.reference import reference
 from pyharness.views.render import render
 
 Capture = pytest.CaptureFixture[str]
-SEED = "f"  # of scenes that the reference solves fast
+SEED = "f"  # seed of scenes that the reference solves fast
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_spreads_are_of_the_scenes_in_which_the_error_is_reached() -> None:
     found = {(each.target, each.kind): each for each in spreads(_finding(), KINDS)}
     assert len(found) == len(TARGETS) * 3
     first = found[1e-6, "all"]
-    # Ratios 8, 4, 2, 1.
+    # The ratios are 8, 4, 2 and 1.
     assert (first.method, first.scenes, first.reached, first.smallest) == ("auto", 4, 4, 1.0)
     assert first.mean == pytest.approx(math.sqrt(8.0))
     assert first.quartiles == pytest.approx((1.75, 3.0, 5.0))
@@ -150,7 +150,7 @@ def test_verb_gives_rows_and_spreads(capsys: Capture, monkeypatch: pytest.Monkey
         "1: no torque, compact",
         "2: constant torque, compact",
     }
-    # A reference that were another scene's would leave no digit.
+    # If the reference belonged to another scene, no digit would agree.
     assert (
         max(
             row["error"] / row["setting"]

@@ -1,4 +1,4 @@
-"""A browser, and the site as files: no network, no server."""
+"""Fixtures for a browser and the site as files, without network or server."""
 
 import os
 import shutil
@@ -14,11 +14,11 @@ from pyharness.cli.output import write_tree
 _SWITCHES = (
     "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    # A page that is still scrolling takes no click.
+    # A page that is still scrolling does not accept a click.
     "--force-prefers-reduced-motion",
 )  # fmt: skip
 
-# On the PATH, or where GitHub's machines have them.
+# Names on the PATH, and paths on GitHub's machines.
 _BROWSERS = (
     "chromium", "google-chrome", "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
 )  # fmt: skip
@@ -31,7 +31,7 @@ def _first(names: tuple[str, ...]) -> str | None:
 
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
-    """Return Chromium without a window; tests are skipped where there is none, and fail in CI."""
+    """Yield headless Chromium; without a browser, skip the tests, or fail them in CI."""
     chromium, driver = _first(_BROWSERS), _first(_DRIVERS)
     if chromium is None or driver is None:
         told = "no chromium and chromedriver on the PATH: the pages are not tried in a browser"
@@ -44,9 +44,9 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
     for switch in (*_SWITCHES, f"--user-data-dir={profile}", "--window-size=1280,1000"):
         options.add_argument(switch)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    # A named driver: none is looked for, and none is fetched.
+    # With a named driver, Selenium neither searches for one nor downloads one.
     chrome = Chrome(options=options, service=Service(executable_path=driver))
-    # axe-core takes seconds for the longest page, and a minute where other work has the processors.
+    # axe-core takes seconds for the longest page, and a minute if other work uses the processors.
     chrome.set_script_timeout(100)
     yield chrome
     chrome.quit()

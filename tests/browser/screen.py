@@ -1,4 +1,4 @@
-"""What tests in a browser share: a screen, what the console says, what is too wide."""
+"""Helpers for tests in a browser: the screen, the console's messages, pages that are too wide."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,13 +6,13 @@ from contextlib import contextmanager
 from selenium.webdriver import Chrome
 
 WIDTHS = (360, 800, 1440)
-# Wider than any font that a reader may have: every letter takes an em more.
+# Wider than any font of a reader: every letter takes one em more.
 WIDEST_FONT = "* { letter-spacing: 1em !important; }"
 
 
 @contextmanager
 def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]:
-    """Give the browser a width (pixels) and a preference."""
+    """Set the browser's width (pixels) and its preferred colour scheme."""
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     features = [{"name": "prefers-color-scheme", "value": scheme}]
@@ -25,12 +25,12 @@ def screen(browser: Chrome, width: int, scheme: str = "light") -> Iterator[None]
 
 
 def errors(browser: Chrome) -> list[str]:
-    """Return what the console says, and forget it."""
+    """Return the console's messages and clear them."""
     return [each["message"] for each in browser.get_log("browser")]  # type: ignore[no-untyped-call]
 
 
 def add_style(browser: Chrome, style: str) -> None:
-    """Add a style to the page that the browser shows."""
+    """Add a style sheet to the page that the browser shows."""
     script = (
         "const style = document.createElement('style');"
         "style.textContent = arguments[0]; document.head.append(style);"
@@ -39,7 +39,7 @@ def add_style(browser: Chrome, style: str) -> None:
 
 
 def too_wide(browser: Chrome) -> int:
-    """Return by how many pixels a page is wider than the screen."""
+    """Return the number of pixels by which a page is wider than the screen."""
     script = "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
     found: int = browser.execute_script(script)
     return found

@@ -1,4 +1,4 @@
-"""The laboratory in a browser: numbers, switches, addresses, and how long a change takes."""
+"""The laboratory in a browser: numbers, switches, addresses, and the time that a change takes."""
 
 import re
 import time
@@ -21,10 +21,10 @@ Open = Callable[[str], None]
 
 @pytest.fixture
 def laboratory(browser: Chrome, site: Path) -> Iterator[Open]:
-    """Return what opens the page anew with a fragment; nothing may be said on its console."""
+    """Yield a function that loads the page with a fragment; its console must stay empty."""
 
     def opened(fragment: str = "") -> None:
-        # A change of the fragment alone would not load the page.
+        # Changing only the fragment would not reload the page.
         browser.get("about:blank")
         browser.get(f"{(site / 'laboratory.html').as_uri()}{fragment}")
 
@@ -40,13 +40,13 @@ def _text(browser: Chrome, id: str) -> str:
 
 
 def _rows(browser: Chrome) -> list[list[str]]:
-    """Return the table's cells, once it has been opened."""
+    """Open the table and return the text of its cells."""
     browser.execute_script("document.getElementById('numbers').open = true")
     read = (
         "return [...document.querySelectorAll('#rows tr')]"
         ".map((row) => [...row.cells].map((cell) => cell.textContent))"
     )
-    # It is filled when the browser has told that it was opened.
+    # The page fills the table after the browser has reported that it was opened.
     deadline = time.monotonic() + 5.0
     while True:
         found: list[list[str]] = browser.execute_script(read)
@@ -100,7 +100,7 @@ def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> Non
     assert not browser.find_element(By.ID, "stop-test").is_displayed()
     assert not browser.find_element(By.CSS_SELECTOR, "[value=stage-base]").is_displayed()
     assert len(_rows(browser)) == 30
-    # Another address in the same page.
+    # Change the fragment without reloading the page.
     browser.execute_script("location.hash = 'case=2&program=runge-kutta&listing=original'")
     deadline = time.monotonic() + 5.0
     while "step 25" not in _text(browser, "status") and time.monotonic() < deadline:
@@ -116,7 +116,7 @@ def test_the_link_that_skips_the_menu_leaves_the_state(browser: Chrome, laborato
     _click(browser, "a.skip")
     time.sleep(0.1)
     assert browser.switch_to.active_element.get_dom_attribute("id") == "main"
-    # What the address names can still be cited.
+    # The address still names the state, so that it can be cited.
     assert browser.current_url == address
     browser.refresh()
     assert _text(browser, "status") == told
@@ -133,7 +133,7 @@ def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> No
     seen = set()
     for _ in range(60):
         browser.switch_to.active_element.send_keys(Keys.TAB)
-        # A page may take its time to scroll.
+        # A page may still be scrolling.
         WebDriverWait(browser, 3.0).until(lambda _: browser.execute_script(in_sight))
         seen.add(browser.execute_script("return document.activeElement.id"))
     assert {"omega0", "lipschitz", "address", "printer-page"} <= seen
@@ -191,7 +191,7 @@ def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Ope
     laboratory("#case=2&program=runge-kutta&listing=original&fix=stage-base")
     field = browser.find_element(By.ID, "steps")
     field.send_keys("x", Keys.TAB)
-    # Another control shows another run, and leaves the field as it is.
+    # Another control changes the run, and leaves the invalid field unchanged.
     program = Select(browser.find_element(By.ID, "program"))
     program.select_by_visible_text("two-term")
     assert "steps: '100x'" in _text(browser, "problems")
@@ -200,7 +200,7 @@ def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Ope
     step.send_keys("y", Keys.TAB)
     assert "steps: '100x'" in _text(browser, "problems")
     assert "step-size: '0.01y'" in _text(browser, "problems")
-    # What another program's switches were is not forgotten.
+    # The page has kept the switches of the other program.
     program.select_by_visible_text("runge-kutta")
     assert browser.current_url.endswith("listing=original&fix=stage-base")
     _click(browser, "#reset")
@@ -245,7 +245,7 @@ def test_without_script_the_default_state_is_there(site: Path) -> None:
 def test_how_long_a_change_takes(
     browser: Chrome, laboratory: Open, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Printed, not judged: seconds are the machine's."""
+    """Print the times without judging them, because they depend on the machine."""
     change = """const done = arguments[arguments.length - 1];
       const box = document.querySelector("input[value=torque-held]");
       const taken = [];

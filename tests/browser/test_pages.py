@@ -1,4 +1,4 @@
-"""Every page in a browser: no error, nothing wider than the screen, no barrier."""
+"""Every page in a browser: no error, nothing wider than the screen, no accessibility barrier."""
 
 import json
 import re
@@ -19,8 +19,8 @@ def addresses(site: Path) -> list[str]:
 
 
 STYLES = Path(__file__).parents[2] / "web" / "site"
-# Mark one element with text for each path of tags, classes and whatever else a style may select by:
-# the cells of a column have the same colours in every row.
+# Mark one element with text for each path of tags, classes and other attributes by which a style
+# may select. Cells of a column have the same colours in every row, so that one of them suffices.
 _MARK_ONE_OF_EACH = """
 const [attributes, ids] = arguments;
 const paths = new Map([[document.documentElement, ""]]);
@@ -40,9 +40,9 @@ for (const each of document.querySelectorAll("body, body *")) {
 
 
 def barriers(browser: Chrome, *only: str) -> list[dict[str, Any]]:
-    """Return what axe-core finds in a page: rule, its impact, where; by all rules, or `only` these.
+    """Return axe-core's findings in a page (rule, impact, place), by all rules or by `only` these.
 
-    Contrast is measured of one element of each style: of thousands of cells it takes a minute.
+    Contrast is measured for one element of each style, because thousands of cells take a minute.
     """
     browser.execute_script(files("axe_core_python").joinpath("axe.min.js").read_text())
     browser.execute_script(_MARK_ONE_OF_EACH, *selected_by())
@@ -76,7 +76,7 @@ def _violations(browser: Chrome, context: str, options: dict[str, Any]) -> list[
 def test_no_page_has_an_error_or_is_wider_than_the_screen_whatever_the_font(
     browser: Chrome, site: Path
 ) -> None:
-    """Each page is loaded once, as on a phone, and the screen then changes its width."""
+    """Load each page once, at the width of a phone, and then change the width of the screen."""
     errors(browser)
     found: dict[str, Any] = {}
     for address in addresses(site):
@@ -125,7 +125,7 @@ def test_no_page_has_a_barrier(browser: Chrome, site: Path) -> None:
 
 
 def test_styles_select_by_nothing_that_the_samples_leave_out() -> None:
-    """A position among others would give elements of one path different colours."""
+    """A selector by position would give different colours to elements of one path."""
     attributes, ids = selected_by()
     assert {"class", "data-theme", "aria-invalid"} <= set(attributes)
     assert "theme" in ids
@@ -173,7 +173,7 @@ def test_a_reader_chooses_dark_or_light(browser: Chrome, site: Path) -> None:
         browser.find_element(By.ID, "theme").click()
         dark = paper()
         assert dark != light
-        # It is kept for the other pages.
+        # The other pages use the chosen scheme too.
         browser.get((site / "claims.html").as_uri())
         assert paper() == dark
         browser.find_element(By.ID, "theme").click()
@@ -196,7 +196,7 @@ def test_the_search_finds_a_card_and_keeps_its_words_in_the_address(
     links = browser.find_elements(By.CSS_SELECTOR, "#results a")
     found = [str(each.get_dom_attribute("href")) for each in links]
     assert "listing/two-term.html#1660" in found
-    # Another number is another card.
+    # Another number shows another card.
     browser.execute_script("location.hash = '#q=two-term+1660'")
     WebDriverWait(browser, 5).until(lambda _: query.get_property("value") == "two-term 1660")
     links = browser.find_elements(By.CSS_SELECTOR, "#results a")
@@ -220,7 +220,7 @@ def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> Non
     defects = shown()
     assert "1660" in defects < every
     assert "160" not in defects
-    # What an address names is shown, whatever the filter.
+    # The card that the address names is shown even if the filter hides it.
     browser.execute_script("location.hash = '#160'")
     assert shown() == defects | {"160"}
     browser.execute_script("document.getElementById('kind-all').click()")

@@ -1,4 +1,4 @@
-"""The judgement of an attitude: what a closed form has to refuse, and in which words."""
+"""Judgement of attitudes: a closed form solves what it can, and gives a reason where it refuses."""
 
 from pyharness import Scene, TorqueLaw
 from pyharness.checks.check import REFUSED, Check, Name

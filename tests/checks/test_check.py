@@ -1,4 +1,4 @@
-"""Names of checks, and which attempts are computed."""
+"""Names of checks, and the selection of the attempts to compute."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ def test_an_id_is_made_of_the_parts_of_a_name() -> None:
     assert Name("separatrix", "rk4", "none", command="stress").replay == (
         "python -m pyharness stress --only separatrix/rk4/none"
     )
-    # Suites of problems name the problem first.
+    # In suites of problems, the name of the problem comes first.
     assert Name("random", "solve-auto", "17").id == "random/17/solve-auto"
     assert (
         Name("external", "rk45", "b5/20", quantity="attitude").id == "external/b5/20/rk45/attitude"
@@ -36,7 +36,7 @@ def test_only_what_is_requested_is_computed() -> None:
     assert [check.id for check in found] == ["a/b/coarse/drift"]
     assert computed == ["a/b/coarse"]
     assert len(list(made(attempts, []))) == 6
-    # A check that is there already has been selected before.
+    # Checks that have been computed already were selected before.
     assert list(made(found, ["d"])) == found
 
 

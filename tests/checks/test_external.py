@@ -1,4 +1,4 @@
-"""Published figures: their files are read strictly, all methods agree, and a fault shows."""
+"""Published figures: files are read strictly, all methods agree with them, and faults are found."""
 
 import re
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ def _read(folder: Path, text: str, name: str = "mine.toml") -> Problem:
 
 
 def _top(folder: Path, body: str, start: str, time: str, *prints: str) -> Problem:
-    """Return the good file's problem with another body, start and figure."""
+    """Return the problem of the good file with another body, initial omega, time and figure."""
     text = _GOOD.replace("1.0, -1.0, -0.51", body).replace("0.0, 1.0, 1.0", start)
     omega = ", ".join(f'"{each}"' for each in prints)
     return _read(
@@ -50,7 +50,7 @@ def _top(folder: Path, body: str, start: str, time: str, *prints: str) -> Proble
 
 
 def _checks(problem: Problem, *names: str) -> list[Check]:
-    """Return the checks of the first figure by some methods."""
+    """Return the checks of a problem's first figure by the named methods."""
     prefix = f"external/{problem.name}/{problem.values[0].time}"
     return list(external_checks([problem], [f"{prefix}/{name}" for name in names]))
 
@@ -67,7 +67,7 @@ def _checks(problem: Problem, *names: str) -> list[Check]:
         ("5.", 0.0, 0.5),
         ("+0.0", 0.0, 0.05),
         ("0e-9999", 0.0, 5e-324),
-        # The source may admit more, and not less.
+        # The source may state a larger error than the digits imply, but not a smaller one.
         ("0.9396570798729192", 5e-15, 5e-15),
         ("0.606", 5e-15, 5e-4),
     ],
@@ -146,7 +146,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
 
 def test_problems_of_the_package_agree_with_every_method() -> None:
-    """Some of them; all are what `verify` is run for."""
+    """Check some of the problems; `verify` checks all of them."""
     some = [f"external/{name}" for name in ("detest-b5", "fresnel", "jacobi-parameter-half")]
     checks = list(external_checks(problems(), some))
     assert [check for check in checks if not check.passed] == []
@@ -188,7 +188,7 @@ def test_a_last_digit_that_counts_is_caught_in_every_problem(problem: Problem) -
 
 @pytest.mark.parametrize("axis", range(3))
 def test_no_number_at_all_is_caught(axis: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """NaN in one component must not hide behind two that are right."""
+    """NaN in one component must not be hidden by two right components."""
     honest = METHODS["taylor"]
 
     def spoiled(*given: Any) -> Trajectory:
@@ -202,11 +202,12 @@ def test_no_number_at_all_is_caught(axis: int, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_what_gives_up_or_ends_early_fails_with_its_reason(tmp_path: Path) -> None:
-    """The solution is 1 / (1 - t) on every axis: nothing is there to compare at t = 2."""
+    """The solution is 1 / (1 - t) on every axis, so that nothing can be compared at t = 2."""
     problem = _top(tmp_path, "1.0, 1.0, 1.0", "1.0, 1.0, 1.0", "2", "0.5", "", "")
     series, program = _checks(problem, "taylor", "closed-form", "runge-kutta")
     assert (series.passed, series.note) == (False, "ended before t = 2 s")
-    # A program in its shortest steps can't tell a solution without bound from steps too long.
+    # Even with its shortest steps, a program can't distinguish an unbounded solution from steps
+    # that are too long.
     assert program.passed
     assert re.match(r"refused: runge-kutta in steps of .* s: overflow", program.note)
 
@@ -220,12 +221,12 @@ good_to = 2.0
 
 
 def _impatient(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a method give up where it is asked for more than 100 s."""
+    """Make a method refuse times beyond 100 s."""
     honest = METHODS[name]
 
     def solve(scene: Scene, times: Sequence[float], *rest: float) -> Trajectory:
         if times[-1] > 100.0:
-            raise InputError(f"gave up at t = {times[-1]:g} s")
+            raise InputError(f"exceeded its work limit at t = {times[-1]:g} s")
         return honest.solve(scene, times, *rest)
 
     monkeypatch.setitem(METHODS, name, replace(honest, solve=solve))
@@ -234,7 +235,7 @@ def _impatient(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_gives_up_later_is_judged_earlier(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """There a file of the user's is told; the project's own problems, and `auto`, fail."""
+    """For a user's file the refusal is a note; the project's own problems, and `auto`, fail."""
     for name in ("gauss-8", "auto", "dop853"):
         _impatient(name, monkeypatch)
     problem = _read(tmp_path, _LATER)
@@ -245,7 +246,7 @@ def test_what_gives_up_later_is_judged_earlier(
     assert early.passed
     assert early.value is not None
     assert (late.passed, late.value) == (True, None)
-    assert late.note == "refused: gave up at t = 150 s"
+    assert late.note == "refused: exceeded its work limit at t = 150 s"
     assert [id for id, check in checks.items() if not check.passed] == ["external/mine/150/auto"]
     own = external_checks([replace(problem, path=None)], [early.id, late.id])
     assert [check.id for check in own if not check.passed] == [late.id]
@@ -254,20 +255,20 @@ def test_what_gives_up_later_is_judged_earlier(
 
 @pytest.mark.parametrize("time", ["-5", "20"])
 def test_a_long_motion_gets_the_tolerance_that_is_claimed_for_it(time: str, tmp_path: Path) -> None:
-    """A symmetric top turns by 5 radians a second, and a difference grows as it goes."""
+    """The phase of a symmetric top grows by 5 rad/s, and a perturbation grows with time."""
     phase = 5 * float(time)
     prints = f"{np.sin(phase):.15f}", f"{np.cos(phase):.15f}", "10.0"
     problem = _top(tmp_path, "0.5, -0.5, 0.0", "0.0, 1.0, 10.0", time, *prints)
     for check in _checks(problem, "lsoda", "dop853"):
         assert check.passed
-        # 4e-14 a step, 40 of them for 100 radians that grow as much, of 10 rad/s.
+        # 4e-14 for each of 40 steps, amplified 100 times over 100 radians, relative to 10 rad/s.
         assert (check.limit or 1.0) < 3e-9
 
 
 def test_a_far_time_leaves_the_excuse_of_a_near_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What rounding does to the problem is found where the series gets."""
+    """The limit for a near time is the same, whether or not the series reaches a later time."""
     only = ["external/mine/20/reference"]
     (alone,) = external_checks([_read(tmp_path, _GOOD)], only)
     _impatient("taylor", monkeypatch)
@@ -277,7 +278,7 @@ def test_a_far_time_leaves_the_excuse_of_a_near_one(
 
 
 def test_beyond_the_series_a_closed_form_tells_what_rounding_does(tmp_path: Path) -> None:
-    """10.1 rad/s is no binary number: after 1e9 s that is 2e-7 radians."""
+    """10.1 rad/s is not a binary number, which changes the angle after 1e9 s by 2e-7 rad."""
     with mpmath.workdps(40):
         sine = mpmath.nstr(mpmath.sin(mpmath.mpf("5.05e9")), 12)
     problem = _top(tmp_path, "0.5, -0.5, 0.0", "0.0, 1.0, 10.1", "1e9", sine, "", "10.1")
@@ -298,9 +299,10 @@ def test_programs_in_steps_far_too_long_are_no_fault_of_a_file(
 
 
 def _nasa_attitude(x: float, y: float, latitude: float, angles: Sequence[float]) -> Rotation:
-    """Return body to inertial axes: north, east and down of the start, which turn with the Earth.
+    """Return the rotation from body to inertial axes, through local axes that turn with the Earth.
 
-    `x` and `y` are the inertial position, `angles` yaw, pitch and roll from the local axes.
+    The local axes point north, east and down at the start. `x` and `y` are the inertial position,
+    and `angles` are yaw, pitch and roll from the local axes.
     """
     phi, turn = np.radians(latitude), np.arctan2(y, x)
 
@@ -329,7 +331,7 @@ _NASA = (
 
 
 def _with_attitudes(folder: Path, entries: Sequence[tuple[str, str]]) -> Problem:
-    """Return NASA's brick with attitudes printed for times."""
+    """Return NASA's brick with attitudes printed for the given times."""
     (brick,) = (each for each in problems() if each.name == "nasa-brick")
     head = _GOOD.partition("[body]")[0].replace('"as printed"', '"as printed"\nunit = "deg/s"')
     moments, omega = list(brick.scene.moments or ()), [10.0, 20.0, 30.0]
@@ -347,7 +349,7 @@ def test_published_attitudes_of_the_brick_agree(tmp_path: Path) -> None:
         assert value.time == time
         assert value.pointing is not None
         assert value.pointing.attitude == pytest.approx(q, abs=1e-11)
-        # The other sign is the same attitude.
+        # The quaternion with the other sign is the same attitude.
         printed = [f"{each:.9f}" for each in -q]
         entries.append((time, f"attitude = {printed}"))
     checks = list(external_checks([_with_attitudes(tmp_path, entries)]))
@@ -356,7 +358,7 @@ def test_published_attitudes_of_the_brick_agree(tmp_path: Path) -> None:
     assert all(check.id.endswith("/attitude") for check in checks)
     assert max(check.value or 0.0 for check in checks) < 4e-9
     assert max(check.limit or 0.0 for check in checks) < 1e-7
-    # The Earth's turn counts: without it nothing would agree.
+    # Without the Earth's rotation no attitude would agree.
     bare = Rotation.from_euler("ZYX", _NASA[3][4], degrees=True).as_quat(scalar_first=True)
     entry = f"attitude = {[f'{each:.9f}' for each in bare]}"
     assert not any(

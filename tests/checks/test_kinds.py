@@ -1,4 +1,4 @@
-"""`verify`: what it checks, that each check can fail, and what a user sees then."""
+"""`verify`: the checks it makes, that each of them can fail, and the output that a user sees."""
 
 import datetime
 import json
@@ -51,7 +51,7 @@ def test_every_cell_has_a_name_of_its_own() -> None:
 
 
 def test_checks_have_names_of_their_own_and_all_pass() -> None:
-    """A part of everything; all of it is what `verify` is run for."""
+    """Make a part of the checks; `verify` itself makes all of them."""
     checks = list(verify(Selection(seed="fixed", draws=12, thin=True)))
     assert [check.id for check in checks if not check.passed] == []
     assert len({check.id for check in checks}) == len(checks)
@@ -101,7 +101,7 @@ _VELOCITY = {
 def test_fault_in_both_languages_is_seen(
     kind: str, program: str, file: str, fault: tuple[str, str], tmp_path: Path
 ) -> None:
-    """Far below what an order shows."""
+    """The fault is far too small to show in a measured order."""
     faulty = plant_in_twin(program, file, *fault, tmp_path)
     with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
         checks = verify(Selection(only=[f"{kind}/case-{case}" for case in (1, 3, 5, 6, 7)]))
@@ -172,7 +172,7 @@ def test_random_draws_can_be_had_again() -> None:
     assert draw("a", 3) == draw("a", 3)
     assert draw("a", 3) != draw("a", 4)
     assert draw("a", 3) != draw("b", 3)
-    # As they were drawn when this was written: a replay must outlive the version of Python.
+    # Values drawn when this test was written: a replay must not depend on the version of Python.
     assert draw("2026-W47", 0).scene.omega[0].hex() == "-0x1.5f01c99996168p+0"
 
 
@@ -223,7 +223,7 @@ def _written(folder: Path) -> Path:
 def test_record_that_was_changed_fails_and_is_mended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One unit in the last place of one number, the digest of what is not shown, a lost entry."""
+    """Change one number by a unit in the last place, change a digest, or remove an entry."""
     path = _written(tmp_path)
     good = path.read_text()
     only = ["verify", "--only", "golden/two-term", "--record", str(tmp_path)]
@@ -258,7 +258,7 @@ def test_record_that_was_changed_fails_and_is_mended(
 def test_record_that_is_none_is_told_in_one_line_and_mended(
     damage: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What a conflict of a merge leaves, for instance; and files of what is gone are removed."""
+    """Mend, for instance, a merge conflict; files of programs that no longer exist are removed."""
     path = _written(tmp_path)
     good = path.read_text()
     path.write_bytes(damage.encode("latin-1"))
@@ -282,7 +282,7 @@ def test_no_record_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "is not a folder" in capsys.readouterr().err
 
 
-# One in the languages, one in a prepared solver: all are what `verify --self-test` is run for.
+# One plant in both languages and one in a prepared solver; `verify --self-test` makes them all.
 @pytest.mark.parametrize("name", ["sign-in-both", "stale-solver"])
 def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
     chosen = Selection(seed="fixed", draws=12, thin=True, only=BY_NAME[name].kinds)

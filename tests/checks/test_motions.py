@@ -1,4 +1,4 @@
-"""Trials of motions: torque, length, invariance, threads; and what they are held against."""
+"""Trials of motions: torque, length, invariance, threads; and the truth they are compared with."""
 
 import time
 from dataclasses import replace
@@ -51,7 +51,7 @@ def test_bounds_hold(only: str) -> None:
 
 @pytest.mark.parametrize("name", length.MARCHERS)
 def test_brouwers_law_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To 1e4 revolutions; with four stages energy drifts there if weights lose their low words."""
+    """Integrate 1e4 revolutions, where 4-stage Gauss drifts if its weights lose their low parts."""
     monkeypatch.setattr(length, "_FIT_FROM", 1e2)
     shorter = replace(length.MARCHERS[name], revolutions=1e4, others=1e4)
     checks = list(length.hold(shorter, named("length", name, "tumbling")))
@@ -60,7 +60,7 @@ def test_brouwers_law_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_power_tells_chance_from_a_preference() -> None:
-    """Of a thousand sets of true random walks hardly one is taken for a drift, or the reverse."""
+    """Of 1000 random walks and 1000 drifts, at most 5 are taken for the other kind."""
     source = np.random.default_rng(1)
     steps = np.array([10.0 ** (k / 2.0) for k in range(6, 11)])
     lengths = np.diff([0.0, *steps])

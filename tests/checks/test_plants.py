@@ -1,4 +1,4 @@
-"""Planted faults: every check of the suite is seen to fail. A plant nothing catches fails here."""
+"""Planted faults: every check of the suite can fail, and some check catches every plant."""
 
 from dataclasses import replace
 from functools import cache
@@ -14,11 +14,12 @@ from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled
 from pyharness.truth.reference import Reference, reference
 
-# Enough steps that orders settle.
+# Enough steps for the measured orders to settle.
 _SCENE = replace(case_scene(5), steps=25)
 
-# program, file, what stands there, the fault, whether the truth shows it too: it can't where the
-# fault is of the size of rounding, is in the velocity, or leaves a method of the same order.
+# Program, file, passage, faulty passage, and whether the comparison with the truth shows the fault
+# too. It can't if the fault is of the size of rounding, is in the velocity, or leaves a method of
+# the same order.
 TWIN_PLANTS = {
     # The control: the same machinery without a fault raises no alarm.
     **{
@@ -63,7 +64,7 @@ TWIN_PLANTS = {
 @pytest.mark.bitwise
 @pytest.mark.parametrize("name", TWIN_PLANTS)
 def test_fault_in_a_twin_is_caught(name: str, tmp_path: Path) -> None:
-    """By the bits in every case, and by the truth where the fault is larger than rounding."""
+    """The bits show every fault; the truth shows those that are larger than rounding."""
     program, file, old, new, shows_in_truth = TWIN_PLANTS[name]
     planted = plant_in_twin(program, file, old, new, tmp_path)
     listing = corrected(program)

@@ -1,4 +1,4 @@
-"""`verify --port`: ports that are right, wrong by a bit, silent, dead; the one in JavaScript."""
+"""`verify --port`: ports that are right, wrong by a bit, silent or dead; the port in JavaScript."""
 
 import json
 import math
@@ -36,14 +36,14 @@ def _python(path: Path, text: str) -> str:
 
 
 def _answering(path: Path, change: str) -> str:
-    """Return the command of the documented port, whose `rows` a line of Python changes."""
+    """Return the command of the documented port with a line of Python that changes its `rows`."""
     before, place, after = documented().partition("    ier = ")
     return _python(path, f"{before}    {change}\n{place}{after}")
 
 
 @pytest.fixture(params=["documented", "JavaScript"])
 def right(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """Return the command of a port that has the twins' bits."""
+    """Return the command of a port that is bit-for-bit identical to the twins."""
     if request.param == "JavaScript":
         return node(WEB)
     return _python(tmp_path / "port.py", documented())
@@ -224,7 +224,7 @@ def _gone(pid: int) -> bool:
             os.kill(pid, 0)
         except ProcessLookupError:
             return True
-        # One that nobody has waited for has ended, too.
+        # A zombie, for which nobody has waited, has ended too.
         status = Path(f"/proc/{pid}/stat")
         if status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z":
             return True
@@ -262,7 +262,7 @@ def test_requests_give_the_floats_back() -> None:
 
 
 def test_what_leaves_the_group_of_a_port_is_ended_too(tmp_path: Path) -> None:
-    """A grandchild in a session of its own, whose parent has ended, outlived the check."""
+    """A grandchild in its own session, whose parent had ended, outlived the check."""
     script = (
         "import os, sys, time\n"
         "if os.fork() == 0:\n"
@@ -280,7 +280,7 @@ def test_what_leaves_the_group_of_a_port_is_ended_too(tmp_path: Path) -> None:
 
 
 def test_a_port_may_complain_without_end(tmp_path: Path) -> None:
-    """Its stderr went to a file that filled the disk; the last of it is kept."""
+    """The stderr of a port went to a file that filled the disk; now only its end is kept."""
     script = (
         "import sys\n"
         "for i in range(3000): print('x' * 1000, file=sys.stderr)\n"

@@ -23,7 +23,7 @@ from tests.ports import WEB, node, sample
 
 
 def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
-    """Orders of operations that no cell shows, velocity tested before omega among them."""
+    """Random scenes show what no cell shows, for example a test of velocity before omega."""
     seen = set()
     with PortProcess(node(WEB)) as process:
         for number in range(200):
@@ -43,7 +43,7 @@ def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
 @pytest.mark.parametrize("waves", ["sines", "cosines"])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_torque_of_waves_alone_acts(program: str, waves: str) -> None:
-    """No case has a torque of cosines alone, and the random scenes above have none of either."""
+    """No case has a torque of cosines alone, and the test above skips scenes with waves."""
     wave: Wave = ((0.3, -0.2, 0.5), 1.7)
     law = TorqueLaw(**{waves: [wave]})  # type: ignore[arg-type]
     scene = Scene("waves", (0.1, 0.2, 0.3), moments=(3, 2, 4), torque=law, step_size=0.1, steps=20)
@@ -54,11 +54,11 @@ def test_a_torque_of_waves_alone_acts(program: str, waves: str) -> None:
         found = read_answer(line, scene.steps)
         idle = run_program(replace(scene, torque=TorqueLaw()), listing, "python", may_stop=False)
         assert abs(twin.omega - idle.omega).max() > 0.01
-        # Here a sine may have another last bit than the twin's.
+        # Here the last bit of a sine may differ from the twin's.
         assert abs(found.rows[:, 1:4] - twin.omega).max() < 1e-13
 
 
-# File, what stands there, the fault, and in which of the programs it shows.
+# File, passage, faulty passage, and the programs in which the fault shows.
 FAULTS = {
     "the control": ("equations.js", "m[0] + a *", "m[0] + a *", ""),
     "a sign": ("equations.js", "m[2] + c * u[0]", "m[2] - c * u[0]", "two-term four-term"),
@@ -99,7 +99,7 @@ def test_sine_and_cosine_of_the_javascript_are_the_nearest_floats() -> None:
     engine = shlex.split(node(WEB))[0]
     source = random.Random(1982)
     angles = [source.uniform(-1.0, 1.0) * 10.0 ** source.uniform(-9.0, 8.0) for _ in range(20_000)]
-    # Close to a multiple of a quarter turn, where digits cancel.
+    # Angles close to a multiple of a quarter turn, where digits cancel.
     angles += [n * (math.pi / 2) for n in range(-500, 500)]
     angles += [0.0, -0.0, 1e-300, 2.0**-27, 29.2, 112.60000000000004, 170.00000000000006]
     script = (

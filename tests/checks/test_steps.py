@@ -50,8 +50,8 @@ def test_bounds_hold(only: str, limits: int) -> None:
     assert all(limit is not None and limit < 1e-5 for limit in steps), "it bounds nothing"
 
 
-def test_programs_meet_the_singularity_that_was_foretold() -> None:
-    """In the original the points move out of danger; corrected every step prints 129."""
+def test_programs_meet_the_singularity_that_was_predicted() -> None:
+    """The original's moved points leave the singular range; corrected, every step prints 129."""
     for label, count in (("original", 19), ("corrected", 300)):
         (check,) = checks_of(f"matrices/four-term/{label}/ier-1e-06").values()
         assert check.note == f"IER = 129 in {count} of 300 steps"
@@ -60,7 +60,7 @@ def test_programs_meet_the_singularity_that_was_foretold() -> None:
 
 
 def test_in_24_bits_the_four_term_matrix_is_singular_at_the_step_of_the_thesis() -> None:
-    """The solver in NumPy's binary32, against the rule in fractions."""
+    """Compare the solver in NumPy's binary32 with the rule in exact fractions."""
     step = singular_below("four-term", bits=24)
     assert step == pytest.approx(0.0155, rel=1e-3)
     for factor, expected in ((0.01 / step, 129), (0.999, 129), (1.001, 0)):
@@ -77,7 +77,7 @@ def test_condition_is_that_of_numpy() -> None:
 
 
 def test_polynomials_are_those_of_the_schemes() -> None:
-    """Classical Runge-Kutta has the exponential's first five terms, one correction its first 3."""
+    """Classical Runge-Kutta has the first five terms of exp, one correction the first three."""
     (((*exponential,),),) = amplification(corrected("runge-kutta")).coefficients
     assert exponential == [Fraction(1, math.factorial(k)) for k in range(5)]
     for program in ("two-term", "four-term"):
@@ -90,7 +90,7 @@ def test_polynomials_are_those_of_the_schemes() -> None:
 
 
 def test_boundaries_are_the_known_ones() -> None:
-    """Hairer and Wanner 1996, IV.2: 2.785 and the root of 8 for order 4, 2 and 0 for order 2."""
+    """Hairer and Wanner 1996, IV.2: 2.785 and the root of 8 for order 4; 2 and 0 for order 2."""
     fourth, second = amplification(corrected("runge-kutta")), amplification(corrected("two-term"))
     distance, slope = boundary(fourth, -1.0)
     assert distance == pytest.approx(2.785293563405282, rel=1e-12)
@@ -103,14 +103,14 @@ def test_boundaries_are_the_known_ones() -> None:
 
 
 def test_the_limit_of_the_punched_runge_kutta_is_in_its_matrix() -> None:
-    """What decays ends near minus its beginning: 2 y(t/2) - y(0), with y gone."""
+    """A decaying solution ends near minus its initial value: 2 y(t/2) - y(0) with y(t/2) near 0."""
     matrix = amplification(original("runge-kutta")).at(np.array(-0.01)).real
     end = np.linalg.matrix_power(matrix, 5000) @ np.ones(2)
     assert end[1] == pytest.approx(-1.0, abs=0.02)
 
 
 def test_weights_of_moved_points() -> None:
-    """Two points extrapolate s**2 to -2/9 of time squared, as docs/findings.md derives it."""
+    """Two points extrapolate s**2 to -2/9 of t**2; docs/explanation/findings.md has the derivation."""
     assert weight_of_squares(corrected("two-term"), 50) == Fraction(5, 18)
     for n in (1, 7, 100):
         assert weight_of_squares(original("two-term"), n) == Fraction(n, 2) - Fraction(2 * n * n, 9)
@@ -138,7 +138,7 @@ def test_plot_of_regions_draws_the_regions(tmp_path: Path) -> None:
 
 
 def test_forecast_is_what_comes_of_it() -> None:
-    """Not a bound alone: truncation is foretold to a few per cent, even where IER is 129."""
+    """The forecast is no mere bound: it has the truncation error to 5 %, even where IER is 129."""
     forecast = Forecaster(path(case_scene(5), 1.0), "four-term")
     for count in (1000, 10_000, 100_000):
         (check,) = checks_of(f"step-size/four-term/case-5/corrected/{1.0 / count:.0e}").values()
@@ -147,7 +147,7 @@ def test_forecast_is_what_comes_of_it() -> None:
 
 @pytest.mark.parametrize("name", SCHEMES)
 def test_schemes_have_their_orders(name: str) -> None:
-    """What a step misses begins one power above the order, and not later."""
+    """The local error of a step begins one power of the step size above the order."""
     omega = np.array([[0.3, 1.0, -0.7]])
     missed = np.abs(local_error(SCHEMES[name].scheme, case_scene(5), omega)).max(axis=(1, 2))
     order = SCHEMES[name].order
@@ -166,7 +166,7 @@ def test_series_and_numbers_agree() -> None:
 
 
 def test_linear_theory_does_not_see_the_moved_points() -> None:
-    """The original two-term program leaves with every step; corrected it is as theory has it."""
+    """The original two-term program diverges with any step; the corrected one follows theory."""
     before, after = (
         checks_of(f"step-size/two-term/case-4/{label}/diverges").popitem()[1]
         for label in ("original", "corrected")

@@ -1,4 +1,4 @@
-"""The trials: their bounds hold, planted faults are caught, and what failed can be run again."""
+"""`stress`: the bounds of its trials hold, planted faults are caught, failures can be repeated."""
 
 import itertools
 import json
@@ -27,7 +27,7 @@ from tests.checks.stressed import checks_of, failed
 
 @pytest.mark.parametrize("name", ["separatrix", "near-symmetry", "shapes", "scales"])
 def test_bounds_hold(name: str) -> None:
-    """In one of five circumstances; all of them are what `stress` is run for."""
+    """Test one in five circumstances; `stress` itself tests all of them."""
     some = [each.name for each in EXTREMES[name]()][::5]
     subjects = {*truth.ALL, *PROGRAM_REGISTRY}
     checks = list(stress([f"{name}/{who}/{where}" for who in subjects for where in some]))
@@ -40,7 +40,8 @@ def test_bounds_hold(name: str) -> None:
         if check.limit is not None:
             least[subject] = min(least[subject], check.limit)
     assert subjects == {check.id.split("/")[1] for check in checks}
-    # Programs are described, never judged; some bound of every method is worth the name.
+    # Programs are described, not judged, so they have no limit. Every method has at least one
+    # useful bound.
     assert all((least[each] < 1e-3) == (each in truth.ALL) for each in subjects), least
     assert all(least[program] == math.inf for program in PROGRAM_REGISTRY)
 
@@ -81,7 +82,7 @@ def test_what_is_conserved_is_read_as_an_error_of_omega() -> None:
         found = truth.conserved(scene, omega + error * np.sign(omega), 1.0)
         assert 0.99 * error < found <= error + 1e-15
     assert truth.conserved(scene, np.array([math.nan, 0.0, 0.0]), 1.0) == math.inf
-    # Momentum is held where energy does not change.
+    # The angular momentum is checked even if the energy does not change.
     spin = Scene("", (1.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0))
     assert truth.conserved(spin, np.array([0.0, math.sqrt(0.5), 0.0]), 1.0) > 0.1
 
@@ -118,7 +119,7 @@ def test_table_is_narrow_and_json_tells_all(
     assert "all well" in text
     for row in ("closed-form ", "rk4 ", "two-term "):
         assert sum(line.startswith(row) for line in lines) == 1
-    # Nothing is written where a part of a trial is asked for.
+    # No file is written if only a part of a trial is requested.
     assert list(tmp_path.iterdir()) == []
     code, text = _run(capsys, "--only", only, "--format", "json")
     record = json.loads(text)
@@ -184,7 +185,7 @@ def test_only_what_failed_is_saved_unless_a_folder_is_given(
         folder = tmp_path / "worst"
         assert folder.exists() == (names is not None)
         assert names is None or [each.name for each in folder.iterdir()] == names
-    # What can't be saved does not hide what failed.
+    # A failure to save the worst scene does not hide the failed check.
     (tmp_path / "worst/separatrix-quick.toml").unlink()
     (tmp_path / "worst").rmdir()
     (tmp_path / "worst").write_text("a file")
@@ -214,7 +215,7 @@ def test_wrong_usage_is_one_line(
 
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Return the figures that are saved from now on."""
+    """Return the list to which every saved figure will be appended."""
     figure_module = pytest.importorskip("matplotlib.figure")
     saved: list[Any] = []
     real = figure_module.Figure.savefig
@@ -230,12 +231,12 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 @pytest.mark.parametrize(
     ("only", "key"),
     [
-        # Programs have marks of their own, and a long name stands above the kinds of disturbance.
+        # Programs have their own markers, and a long name is placed above the kinds of disturbance.
         (
             "separatrix/improved-euler,separatrix/gauss-1,separatrix/two-term",
             "coarse error,coarse drift,steps error,steps drift,original,corrected,no setting",
         ),
-        # Four bodies each, and names as long as impossible-three.
+        # Four bodies each, with names as long as impossible-three.
         ("shapes/closed-form", "fine error,fine drift"),
     ],
 )

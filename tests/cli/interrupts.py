@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 from tests.ensembles.sweeps import text
 
-_PATIENCE = 20.0  # s, until a command that was interrupted must have ended
-_MOURNING = 10.0  # s, until the workers of a command that was killed must have ended
+_PATIENCE = 20.0  # s, within which an interrupted command must end
+_MOURNING = 10.0  # s, within which the workers of a killed command must end
 # Long enough for every trial, with chunks short enough that each is soon written.
 SWEEP = text(
     '[[axis]]\nfield = "tilt"\nfrom = 0.1\nto = 1.0\ncount = 100',
@@ -29,7 +29,7 @@ EXECUTORS = ("here", "processes", "dask")
 
 
 class Trial(NamedTuple):
-    """What came of a trial: the command, when the signal was sent (s), and what was wrong."""
+    """The outcome of a trial: the command, the time of the signal (s), and any fault."""
 
     verb: str
     moment: float
@@ -40,7 +40,7 @@ class Trial(NamedTuple):
 
 
 def commands(folder: Path) -> dict[str, list[str]]:
-    """Return the commands, by a name."""
+    """Return the commands by name."""
     (folder / "sweep.toml").write_text(SWEEP)
     found = {"compare": ["compare", "--case", "3"], "verify": ["verify"]}
     for executor in EXECUTORS:
@@ -52,9 +52,9 @@ def commands(folder: Path) -> dict[str, list[str]]:
 
 @contextlib.contextmanager
 def hearing() -> Iterator[None]:
-    """Let commands started meanwhile hear a Ctrl-C, also where this process ignores it.
+    """Let commands started meanwhile receive Ctrl-C, even if this process ignores it.
 
-    A shell starts what runs in the background so.
+    A shell starts background jobs with Ctrl-C ignored.
     """
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -66,7 +66,7 @@ def hearing() -> Iterator[None]:
 def interrupted(
     verb: str, arguments: list[str], moment: float, to_group: bool, sent: signal.Signals
 ) -> Trial:
-    """Send a command a signal after some seconds, and say what came of it."""
+    """Start a command, send it a signal after `moment` seconds, and return the outcome."""
     with tempfile.TemporaryDirectory() as folder:
         if verb in EXECUTORS:
             arguments = [*arguments, "--out", str(Path(folder) / "store")]
@@ -101,14 +101,15 @@ def _judged(code: int, errors: str, was_running: bool, sent: signal.Signals) -> 
         return "had ended" if code == 0 else f"CODE {code} by itself"
     if sent == signal.SIGKILL:
         return "killed" if code == -signal.SIGKILL else f"CODE {code}"
-    # Until the interpreter has read this project's first file, it is not ours to answer: it dies
-    # by the signal, or with a traceback that has no file of ours in it.
+    # Until the interpreter has read the first file of this project, the project can't handle the
+    # signal. The process then dies by the signal, or with a traceback that has no file of the
+    # project.
     if code == -signal.SIGINT and not errors:
         return "interpreter's"
     if "Traceback" in errors:
         ours = re.search(r'File ".*/pyharness/(?!__init__)[\w/]+\.py"', errors)
         return "TRACEBACK" if ours else "interpreter's"
-    # The forecast of a sweep is a line of its own.
+    # The forecast of a sweep is a line by itself.
     lines = [line for line in errors.splitlines() if " scenes in " not in line]
     if code == 130 and lines == ["pyharness: interrupted"]:
         return "interrupted"
@@ -116,7 +117,7 @@ def _judged(code: int, errors: str, was_running: bool, sent: signal.Signals) -> 
 
 
 def left_behind(session: int) -> list[int]:
-    """Return the processes that a command leaves behind, after a while."""
+    """Return the processes of a session that are still alive after a grace period."""
     end = time.monotonic() + _MOURNING
     while (left := _members(session)) and time.monotonic() < end:
         time.sleep(0.05)
@@ -141,19 +142,19 @@ def _end(session: int) -> None:
 def trials(
     count: int, longest: float, seed: int, sent: signal.Signals, verbs: list[str]
 ) -> Iterator[Trial]:
-    """Yield trials with moments drawn from 0 to `longest` seconds."""
+    """Yield trials with the signal sent at random times from 0 to `longest` seconds."""
     draw = random.Random(seed)
     with tempfile.TemporaryDirectory() as folder:
         every = commands(Path(folder))
         for i in range(count):
             verb = verbs[i % len(verbs)]
-            # A terminal sends a Ctrl-C to all processes of the group, `kill` to one.
+            # A terminal sends Ctrl-C to all processes of the group; `kill` sends a signal to one.
             to_group = sent == signal.SIGINT and draw.random() < 0.5
             yield interrupted(verb, every[verb], draw.uniform(0.0, longest), to_group, sent)
 
 
 def main() -> int:
-    """Run trials, say each that went wrong, and count what came of all."""
+    """Run trials, print each that went wrong, and count the outcomes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", type=int, nargs="?", default=300)
     parser.add_argument("--longest", type=float, default=4.0)

@@ -1,4 +1,4 @@
-"""Where the pages go: a folder of their own, whole or as it was."""
+"""The output folder of `edition`: it contains only pages, all of them or none."""
 
 import json
 import os
@@ -21,7 +21,7 @@ FILES = {"index.html": b"<p>", "docs/a.html": b"a", MARK: json.dumps(LISTED).enc
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make a site of three files."""
+    """Replace the site by one of three files."""
     monkeypatch.setattr(site, "build_site", lambda progress, docs: FILES)
 
 
@@ -36,7 +36,7 @@ def test_a_folder_is_made_and_made_anew(tmp_path: Path, capsys: Capture) -> None
     assert main(["edition", "--out", str(folder)]) == 0
     assert _there(folder) == FILES
     assert f"Open {folder}/index.html" in capsys.readouterr().out
-    (folder / "docs/old.html").write_bytes(b"of before")  # listed, and not made any more
+    (folder / "docs/old.html").write_bytes(b"of before")  # listed, but no longer part of the site
     assert main(["edition", "--out", str(folder), "--format", "json"]) == 0
     assert _there(folder) == FILES
     assert json.loads(capsys.readouterr().out)["files"]["docs/a.html"] == 1
@@ -119,7 +119,7 @@ def test_what_fails_leaves_all_as_it_was(
 def test_without_the_documents_it_says_where_they_are(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An installed package has none, and what is beside it is of others."""
+    """An installed package has no documents, and the files beside it belong to other packages."""
     for given, told in (
         ([], "an installed package has no documents; give --docs DIR"),
         (["--docs", str(tmp_path)], f"--docs '{tmp_path}': has no findings.md"),
@@ -137,7 +137,7 @@ def test_what_writes_pages_may_be_missing(
 ) -> None:
     for module in [each for each in sys.modules if each.startswith("pyharness.edition")]:
         monkeypatch.delitem(sys.modules, module)
-    monkeypatch.setitem(sys.modules, name, None)  # an import of it fails
+    monkeypatch.setitem(sys.modules, name, None)  # importing it fails
     assert main(["edition", "--out", str(tmp_path / "site")]) == 2
     assert (
         f"edition needs {name}: pip install 'rigid-body-harness[edition]'"

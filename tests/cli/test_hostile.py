@@ -1,4 +1,4 @@
-"""Hostile input: devices, pipes, counts without end, letters that steer a terminal."""
+"""Hostile input: devices, pipes, endless counts, characters that control a terminal."""
 
 import importlib
 import os
@@ -24,7 +24,7 @@ SWEEP = (
     "[scene]\ncase = 3\n[[axis]]\nfield = 'omega.1'\nfrom = 1.0\nto = 2.0\ncount = 2\n"
     "[solve]\nt_end = 1.0\n"
 )
-# Every option that names a file to read; FILE stands for it.
+# Every option that reads a file, with FILE in place of its name.
 READERS = (
     "run --method auto --scene FILE", "plan --scene FILE", "compare --scene FILE",
     "cards --scan FILE", "words --vectors FILE", "verify --external FILE",
@@ -89,14 +89,14 @@ def test_reader_takes_files_and_pipes_up_to_its_limit() -> None:
 
 
 def test_sweep_and_its_scene_come_through_pipes(capsys: Capture) -> None:
-    """Both were read twice; from a pipe the second time nothing comes, without end."""
+    """Both files were read twice, and the second read of a pipe waited without end."""
     sweep = SWEEP.replace("case = 3", f"file = '/dev/fd/{_piped(BODY)}'")
     assert main(["sweep", f"/dev/fd/{_piped(sweep)}", "--out", "store"]) == 0
     assert "2 scenes in 1 chunk" in capsys.readouterr().err
 
 
 def _piped(text: str) -> int:
-    """Return the end of a pipe to read a text from."""
+    """Return the read end of a pipe that contains a text."""
     reader, writer = os.pipe()
     os.write(writer, text.encode())
     os.close(writer)
@@ -109,7 +109,8 @@ def test_record_and_list_of_an_edition_are_read_with_a_limit(capsys: Capture) ->
     assert "is no record" in _refusal("verify --only golden --record record", capsys)
     Path("site").mkdir()
     os.mkfifo(f"site/{MARK}")
-    # What it lists can't be known, so that there are no other files of the verb's own.
+    # The list of pages can't be read, so every other file counts as one that `edition` did not
+    # write.
     Path("site/mine.txt").write_text("mine")
     assert "holds 'mine.txt'" in _refusal("edition --out site", capsys)
 
@@ -170,7 +171,7 @@ def test_output_layer_keeps_lines_and_letters(capsys: Capture) -> None:
     assert printable("a\nb") == "a\\nb"
     warn(STEERING)
     assert capsys.readouterr().err == "pyharness: warning: \\x1b[31m\\x07\\u202e\\x9b\n"
-    progress(STEERING)  # to a terminal alone
+    progress(STEERING)  # written to a terminal only
     assert capsys.readouterr().err == ""
 
 
@@ -178,7 +179,7 @@ def test_output_layer_keeps_lines_and_letters(capsys: Capture) -> None:
 def test_folder_that_can_not_be_made_is_refused_before_any_work(
     name: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Permissions let a superuser do all; making a folder tells."""
+    """Permissions do not restrict a superuser, so the test tries to make the folder."""
     site = importlib.import_module("pyharness.edition.site")
     monkeypatch.setattr(site, "build_site", lambda *_: pytest.fail("worked"))
     assert "give a" in _refusal(f"edition --out {name}", capsys)
@@ -192,7 +193,7 @@ def test_file_that_can_not_be_written_is_refused_before_any_work(
     for path in ("/proc/rows", "x" * 256):
         _refusal(f"run --case 3 --method auto --out {path}", capsys)
     assert list(Path().iterdir()) == []
-    # The check leaves nothing behind, and what was there as it was.
+    # The check leaves no new file, and leaves an existing file unchanged.
     Path("there").write_text("old")
     output.check_writable("there", "--out")
     output.check_writable("new", "--out")

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGKILL: one line, exit code 130, nothing left behind, whenever they come."""
+"""Ctrl-C and SIGKILL at any time: one line, exit code 130, nothing left behind."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ import pytest
 
 from tests.cli.interrupts import SWEEP, hearing, left_behind, trials
 
-# A command that interrupts itself, and one of the ways in which an interrupt gets lost.
+# A command that interrupts itself; `body` is one of the ways in which an interrupt can get lost.
 SCRIPT = """
 import os, signal, sys, time
 from pyharness.cli import interruption, main
@@ -111,7 +111,7 @@ def test_what_is_left_to_the_resource_tracker_is_removed_without_a_word() -> Non
         "resource_tracker.register('/mp-none-of-this-name', 'semaphore')\n"
         "os._exit(130)"
     )
-    # The tracker holds the streams open, so its last word is heard.
+    # The resource tracker keeps the streams open, so that its last message is captured too.
     found = subprocess.run(
         [sys.executable, "-u", "-c", script], capture_output=True, text=True, check=False
     )

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, whatever interrupts; stderr has no say in the result."""
+"""Files are written completely or not at all after any interruption; stderr changes no result."""
 
 import itertools
 import os
@@ -40,7 +40,7 @@ def _files(folder: Path) -> None:
     write_files({str(folder / name): content for name, content in NEW.items()}, "--out")
 
 
-# What writes, and what is there afterwards.
+# Functions that write, and the files that exist afterwards.
 WRITERS: dict[str, tuple[Callable[[Path], None], dict[str, bytes | None]]] = {
     "three": (_files, {**NEW}),
     "one": (lambda at: write_files({str(at / "a"): NEW["a"]}, "--out"), {**OLD, "a": NEW["a"]}),
@@ -53,7 +53,7 @@ WRITERS: dict[str, tuple[Callable[[Path], None], dict[str, bytes | None]]] = {
 
 
 def _folder(tmp_path: Path) -> Path:
-    """Return a new folder with what was there before."""
+    """Return a new folder with the old files."""
     folder = Path(tempfile.mkdtemp(dir=tmp_path))
     for name, content in OLD.items():
         (folder / name).write_bytes(content)
@@ -68,7 +68,7 @@ def test_file_has_the_mode_of_any_new_one(tmp_path: Path) -> None:
 
 
 class _Failing:
-    """A function that fails once: before it has done anything, or when it is `done`."""
+    """A function that fails once: before it has done anything, or afterwards if `done`."""
 
     def __init__(self, real: Callable[..., Any], fails: int, done: bool, error: type) -> None:
         self.real, self.fails, self.done, self.error = real, fails, done, error
@@ -100,7 +100,7 @@ CALLS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
 def test_nothing_is_left_behind_by_a_call_that_fails(
     writer: str, call: str, error: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each call in turn: before it has done anything, and when it is done."""
+    """Let each call fail in turn, before it has done anything and when it is done."""
     write, after = WRITERS[writer]
     owner, name, real = CALLS[call]
     for number, done in itertools.product(range(4), (False, True)):
@@ -113,17 +113,17 @@ def test_nothing_is_left_behind_by_a_call_that_fails(
             except (KeyboardInterrupt, MemoryError, InputError):
                 pass
             else:
-                # There are not so many calls, or there is a way round.
+                # The writer makes fewer calls than that, or can do without a hard link.
                 assert failing.calls <= number or call == "link"
                 assert _tree(folder) == after
                 continue
-        # A single rename that is done is all that there was to do.
+        # For a single file, the rename is the last thing to be done.
         assert _tree(folder) in ((OLD, after) if writer == "one" else (OLD,))
 
 
 @pytest.fixture
 def ctrl_c() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt: a shell's background job ignores it."""
+    """Let Ctrl-C raise KeyboardInterrupt, which a shell's background job would ignore."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -132,7 +132,7 @@ def ctrl_c() -> Iterator[None]:
 @pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("writer", ["three", "one", "made"])
 def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path) -> None:
-    """The signal itself, at each line of the room in turn."""
+    """Send the signal at each line of the output module in turn."""
     write, after = WRITERS[writer]
     outcomes = []
     for number in range(400):
@@ -186,7 +186,7 @@ def test_a_ctrl_c_while_files_are_written_gives_up(
 
 @pytest.fixture(params=["same", "other"])
 def elsewhere(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
-    """Return a folder, once on another file system than `tmp_path`."""
+    """Return a folder, either on the file system of `tmp_path` or on another one."""
     shared = tmp_path if request.param == "same" else Path("/dev/shm")
     other = request.param == "same" or (
         shared.exists() and shared.stat().st_dev != tmp_path.stat().st_dev

@@ -1,4 +1,4 @@
-"""`sweep`: its output, its picture, and mistakes in one line that lose nothing."""
+"""`sweep`: its output, its picture, and mistakes, which are reported in one line."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""Candidates: what is judged is what was asked for."""
+"""Candidates of a comparison: the program that is judged is the one that was requested."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_end_of_a_program_is_its_last_row(program: str, implementation: str) -> 
 
 
 def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bits are the same: only who made them tells the two apart."""
+    """The bits are the same, so only the module that computed them distinguishes the two."""
     for room in ("compare.candidates", "original.compiled"):
         monkeypatch.setattr(f"pyharness.{room}.extension", lambda: pytest.fail("compiled"))
     assert program_candidate(original("two-term"), "python").end(SCENE, END).ended == "complete"

@@ -1,4 +1,4 @@
-"""`compare`: what it finds, when it objects, and that its views say the same."""
+"""`compare`: its findings, the results it reports as unexpected, and the agreement of its views."""
 
 import csv
 import io
@@ -45,14 +45,15 @@ def test_all_is_as_expected_in_every_case() -> None:
         assert max(map(len, _text(found).splitlines())) <= 100
         assert verdict(found)[0].startswith("as expected: Fortran = Python bit for bit in 6")
         if case == 6:
-            # It reaches 1e111, and the picture stays whole: no warning, no empty frame.
+            # The solution reaches 1e111, and the picture is still complete, without warning or
+            # empty frame.
             assert len(saved(comparison_picture(found), "x.png")) == 2
         torque_free = found.scene.torque.is_zero
         assert (found.programs[0].accuracy.momentum is not None) == torque_free
 
 
 def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> None:
-    """Case 2 original: step 25, by V2."""
+    """Case 2 original stops at step 25 by V2."""
     lines = _text(case_2).splitlines()
     row = next(line for line in lines if line.startswith("runge-kutta") and "original" in line)
     assert row.split()[2:5] == ["25", "V2", "3305>500"]
@@ -60,7 +61,10 @@ def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> N
 
 def test_table_of_what_failed_and_of_large_quotients_fits() -> None:
     found = compare_programs(replace(case_scene(3), step_size=1e-5, steps=3))
-    why = "Radau gave up at t = 49.568 s after 250000 right-hand sides; take a shorter time or less"
+    why = (
+        "Radau exceeded its work limit at t = 49.568 s after 250000 right-hand sides; take a "
+        "shorter time or less"
+    )
     failed = replace(found.methods[-1], trajectory=None, accuracy=None, failure=why)
     text = _text(replace(found, methods=(*found.methods[:-1], failed)))
     assert "U2 2.4e5>500" in text
@@ -87,7 +91,7 @@ def test_listings_for_the_options() -> None:
     assert labels(base="corrected") == [(p, "corrected") for p in PROGRAM_REGISTRY]
     wanted = [("four-term", label) for label in ("original", "custom", "corrected")]
     assert labels(programs=["four-term"], fix=["dt-accumulates"]) == wanted
-    # A defect goes to the programs that have it.
+    # A defect is selected only for the programs that have it.
     programs = [program for program, label in labels(fix=["stage-base"]) if label == "custom"]
     assert programs == ["runge-kutta"]
     keeping = listings_for(["runge-kutta"], keep=["stage-base"])
@@ -133,7 +137,7 @@ def test_accuracy_against_known_numbers() -> None:
     stretched = accuracy(scene, _trajectory(truth.omega * 1.01), truth)
     assert stretched.energy == pytest.approx(0.0201)
     assert stretched.momentum == pytest.approx(0.0201)
-    # Along axis 3 alone: the drifts are its shares of I w**2 and of I**2 w**2.
+    # Only omega3 differs, so the drifts are its fractions of the sums of I w**2 and I**2 w**2.
     along = accuracy(scene, _trajectory(truth.omega * [1.0, 1.0, 1.01]), truth)
     moments = np.array(scene.moments)
     for drift, weights in ((along.energy, moments), (along.momentum, moments**2)):
@@ -145,14 +149,14 @@ def test_error_of_attitudes_is_an_angle() -> None:
     scene = replace(case_scene(4), steps=2, attitude=(0.5, -0.1, 0.7, 0.5))
     truth = reference(scene, scene.times())
     assert truth.attitude is not None
-    # A turn about an axis of space, and signs, which play no part.
+    # A rotation about an axis of space, and a change of the quaternion's sign, which has no effect.
     turn = (math.cos(5e-4), 0.0, math.sin(5e-4), 0.0)
     turned = np.array([truth.attitude[0], [-x for x in product(turn, tuple(truth.attitude[1]))]])
     found = accuracy(scene, replace(_trajectory(truth.omega), attitude=turned), truth)
     assert found.turned is not None
     assert found.turned == pytest.approx([0.0, 1e-3], abs=1e-15, rel=1e-9)
     assert found.angle == found.turned[1]
-    # The angular momentum turns as the body does, as far as it lies across the axis.
+    # The angular momentum rotates with the body, in proportion to its component across the axis.
     start = turned_to_space(np.array([scene.attitude]), np.array([[0.0, 30.0, 200.0]]))[0]
     across = math.hypot(start[0], start[2]) / float(np.linalg.norm(start))
     assert found.momentum_in_space == pytest.approx(1e-3 * across, rel=1e-6)
@@ -197,7 +201,7 @@ def test_compare_asks_for_no_attitude_by_itself(case_2: room.Comparison) -> None
 
 
 def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Exit code 1 hangs on this: plant a difference of one bit, and a program of no order."""
+    """These give exit code 1: plant a difference of one bit, and a program without an order."""
     real = Program.run
 
     def off_by_one_bit(self: Program, *given: Any, **named: Any) -> Trajectory:
@@ -212,7 +216,10 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
 
     for planted, words in (
         (off_by_one_bit, "runge-kutta corrected: Fortran and twin differ in omega"),
-        (wrong, "runge-kutta corrected: misses the reference as the step is halved: order"),
+        (
+            wrong,
+            "runge-kutta corrected: does not converge to the reference as the step is halved",
+        ),
     ):
         monkeypatch.setattr(Program, "run", planted)
         found = compare_programs(case_scene(3), [corrected("runge-kutta")])
@@ -252,7 +259,7 @@ def test_picture_and_its_numbers(case_2: room.Comparison) -> None:
 
 
 def test_a_reading_that_is_not_adopted_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its order is nobody's due, and its steps are those that were run."""
+    """A reading has no expected order, and its time per step counts the steps that were run."""
     monkeypatch.setattr(room, "timed", lambda *_: [1.0])
     listings = [Listing("two-term", ["c1-for-c"]), original("runge-kutta")]
     reading, before = compare_programs(case_scene(2), listings).programs

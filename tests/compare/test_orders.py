@@ -1,4 +1,4 @@
-"""Orders: seen where the step is small enough, missed where it is, and else not judged."""
+"""Measured orders: seen if the step is small enough, missed by faults, and else not judged."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -36,7 +36,7 @@ def _order(scene: Scene, program: str | Program, listing: Listing | None = None)
 
 
 WAVE = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e4),))
-# The motion of Case 4, and the time that it takes, in other units.
+# The motion of Case 4 with rescaled time.
 SLOW = scaled(case_scene(4), 1e-8)
 
 
@@ -44,11 +44,13 @@ SLOW = scaled(case_scene(4), 1e-8)
 @pytest.mark.parametrize(
     "scene",
     [
-        _steps(7, 1.0, 5),  # steps that skip periods of the torque agree, and are wrong
-        _steps(6, 0.5, 10),  # each overflows at first
+        _steps(
+            7, 1.0, 5
+        ),  # results with steps that skip periods of the torque agree, but are wrong
+        _steps(6, 0.5, 10),  # each program overflows at first
         _steps(4, 5.0, 3),
         Scene("wave", (0.0, 1.0, 1.0), (40.0, 30.0, 20.0), torque=WAVE, steps=10),
-        SLOW,  # the matrix of such steps is found singular
+        SLOW,  # the solver finds the matrix of such steps singular
     ],
     ids=["skipped periods", "overflow", "far too long", "fast torque", "singular at first"],
 )
@@ -61,13 +63,13 @@ def test_step_far_too_long_is_halved_until_the_order_shows(program: str, scene: 
 @pytest.mark.parametrize(
     ("scene", "program", "state", "words"),
     [
-        # A textbook method of the same order comes no further.
+        # A textbook method of the same order does not settle either.
         (_steps(2, 0.2, 10000), "two-term", "unsettled", "does not settle"),
-        # Each step is then one of order 1; the program says so by IER.
+        # Each step then has order 1, which the program reports by IER.
         (_steps(5, 1e-6, 100), "four-term", "singular", "IER = 129"),
         (_steps(5, 3e-5, 100), "four-term", "singular", "IER = 129"),
         *(
-            # Spin about the middle axis, disturbed: after some flips no step settles.
+            # Perturbed rotation about the middle axis: after some flips no step settles.
             (replace(_steps(4, 5.0, 50), omega=(1e-6, 1.0, 1e-6)), program, "sensitive", "rounding")
             for program in PROGRAMS
         ),
@@ -99,7 +101,7 @@ def test_matrix_that_a_fault_makes_singular_is_a_miss(
 
 
 def test_program_that_does_not_settle_where_others_do_misses() -> None:
-    """In the original, TIME runs away and the torque with it."""
+    """In the original, TIME grows without bound, and with it the torque."""
     order = _order(_steps(6, 0.01, 150), "two-term", Listing("two-term", {"dt-accumulates"}))
     assert (order.state, order.value) == ("misses", None)
     assert "does not settle" in str(order)
@@ -114,7 +116,7 @@ def _of_order(order: float) -> Callable[[Scene], Array]:
 
 
 def _once(scene: Scene) -> Array:
-    """Return an error that falls once as it should, and then no more."""
+    """Return a solution whose error falls at the first halving as it should, and then no more."""
     return _exact(scene) + (1e-3 if scene.steps == 4 else 2.5e-4)
 
 
@@ -145,7 +147,7 @@ def test_only_what_shows_the_order_is_as_due(
 
 @pytest.mark.parametrize(("share", "grew"), [(0.7, True), (1.5, False)])
 def test_rounding_that_grew_is_no_more_than_eight_a_step(share: float, grew: bool) -> None:
-    """Of a sphere nothing grows: there are 8 roundings of a step, and 8 of either end."""
+    """A sphere amplifies no error: there are 8 roundings for each step, and 8 at either end."""
     scene = Scene("", (0.3, 1.0, -0.6), (2.0, 2.0, 2.0), steps=1000)
     error = share * 8.0 * ROUNDING * (1000.0 + 2.0)
     found = Order(4, "misses", 0.0, 0.01, 1000, error, 10.0)
@@ -155,7 +157,7 @@ def test_rounding_that_grew_is_no_more_than_eight_a_step(share: float, grew: boo
 def test_larger_errors_than_those_of_a_textbook_are_no_miss(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A right program may need some more halvings than there is room for."""
+    """A right program may need more halvings than the limit on steps allows."""
 
     def coarse(self: Program, finer: Scene, *rest: Any, **named: Any) -> Trajectory:
         run = whole(self, finer, *rest, **named)
@@ -188,11 +190,11 @@ def test_compare_tells_what_it_does_not_judge() -> None:
     table = render(report, "table")
     assert found.unexpected == ()
     assert "not judged: four-term corrected: IER = 129" in table
-    assert "orders corrected - (due: 2)" in table
+    assert "orders - (expected 2)" in table
     assert report.record()["not_judged"] == list(found.not_judged)
 
 
 def test_compare_names_rounding() -> None:
     found = compare_programs(case_scene(1), [corrected("two-term")])
-    assert "orders corrected rounding (due: 2)" in render(comparison_report(found), "table")
+    assert "orders rounding (expected 2)" in render(comparison_report(found), "table")
     assert found.not_judged == ()

@@ -1,4 +1,4 @@
-"""`make cross-check`: make every build, compare their bits, run the suites; 1 on any fault."""
+"""`make cross-check`: make every build, compare bits, run the suites; exit status 1 on faults."""
 
 import json
 import os
@@ -19,7 +19,7 @@ from tests.cross.comparison import compared, inside
 from tests.instruction_sets import fuses_here
 
 FOLDER = ROOT / "build" / "cross"
-# The kernels that answer to the truth, not to bits.
+# Tests of the kernels that are compared with the truth, not bit for bit.
 MODERN = (
     "tests/original/test_linear_solver.py",
     *(
@@ -27,8 +27,8 @@ MODERN = (
         for name in ("closed_form", "fixed_step", "gauss", "quick", "prepared", "taylor")
     ),
 )
-# What calls the kernels, each in ways of its own, and itself; what the other tests do with the
-# results is the same in every build.
+# Tests that call the kernels, each in its own way. What the other tests do with the results is the
+# same in every build.
 CALLING = (
     "tests/fuzz",
     "tests/methods",
@@ -37,26 +37,27 @@ CALLING = (
     "tests/compare/test_candidates.py",
     "tests/checks/test_motions.py::test_bounds_hold",
     "tests/checks/test_stress.py::test_bounds_hold",
-    # Every digest has been computed by then, with traps where there are any.
+    # Every digest has been computed by then, with traps if the build has them.
     "--deselect=tests/original/test_programs.py::test_every_cell_agrees",
     "--deselect=tests/original/test_programs.py::test_nasty_scenes_agree",
-    # The same kernels on many more bodies, the slowest of all with checks.
+    # These tests call the same kernels with many more bodies, and are the slowest with checks.
     "--ignore=tests/methods/test_many_alone.py",
-    # Seven threads do for two and three, and what Python warns of is no question of the build.
+    # The test with seven threads covers two and three, and Python's warnings do not depend on the
+    # build.
     "--deselect=tests/methods/test_many.py::test_threads_change_no_bit[2-",
     "--deselect=tests/methods/test_many.py::test_threads_change_no_bit[3-",
     "--deselect=tests/model/test_impossible.py",
-    # How soon a kernel ends is no question of bits, and how pip builds none of kernels.
+    # These tests do not depend on bits: how soon a kernel ends, and how pip builds the package.
     "--deselect=tests/methods/test_interruption.py::test_kernel_ends_at_once",
     "--ignore=tests/model/test_build.py",
 )
-# Recursion: the entries release the lock, so that two threads may well be in one of them.
+# Recursion is not checked: the entries release the lock, so that two threads may be in one entry.
 CHECKED = (
     "-fcheck=all,no-recursion", "-finit-real=snan", "-finit-integer=-2147483647",
     "-finit-logical=true", "-finit-derived",
 )  # fmt: skip
 ORIGINAL = "fortran/original/"
-# Faults that bits need not show: program, file, what stands there, the fault, what must be said.
+# Faults that need not change bits: program, (file, passage, faulty passage), expected message.
 FAULTS = {
     "index": ("two-term", ("two_term.fypp", "M1(3) + A1*U2(3)*U3(3)",
                            "M1(3) + A1*U2(3)*U3(3) + 0.0_wp*U3(2 + I)"), "above upper bound"),
@@ -67,7 +68,7 @@ FAULTS = {
 
 
 def main() -> int:
-    """Run the builds named on the command line, or all."""
+    """Run the builds named on the command line, or all of them."""
     builds, skipped = _builds()
     chosen = sys.argv[1:] or [build.name for build in builds]
     for name in chosen:
@@ -78,7 +79,7 @@ def main() -> int:
     environment(FOLDER / "environment")
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         wanted = [build for build in builds if build.name in chosen]
-        wanted.sort(key=lambda build: not build.checked)  # the longest first
+        wanted.sort(key=lambda build: not build.checked)  # the slowest first
         twin = pool.submit(_twin)
         found = pool.map(lambda build: list(_checked(build, twin.result())), wanted)
         checks = [check for each in found for check in each]
@@ -88,7 +89,7 @@ def main() -> int:
 
 
 def _builds() -> tuple[list[Build], list[str]]:
-    """Return what can be made here, and in words what can't."""
+    """Return the builds that can be made here, and the reasons for those that can't."""
     gfortran = os.environ.get("FC", "gfortran")
     faults = tuple((ORIGINAL + file, old, new) for _, (file, old, new), _ in FAULTS.values())
     debug = Build("debug", gfortran, "gcc", "0", CHECKED, checked=True, tests=CALLING)
@@ -157,7 +158,7 @@ def _checked(build: Build, twin: dict[str, str]) -> Iterator[Check]:
     yield Check(Name("build", name), not wrong, None, None, "; ".join(wrong), replay)
     entries = facts("divergences")["divergence"]
     listed = {(each["build"], each["cell"]) for each in entries if each["kind"] == "cross-build"}
-    # A compiler may have fewer words.
+    # A compiler may support fewer floating-point formats.
     due = {
         cell: each
         for cell, each in twin.items()
@@ -185,9 +186,9 @@ def _tell(name: str, begin: float, built: float, compared_at: float) -> None:
 
 
 def _suite(build: Build, tree: Path) -> Check:
-    """Run tests in the tree of a build, with traps where it has run-time checks."""
+    """Run tests in the tree of a build, with floating-point traps if it has run-time checks."""
     name = build.name
-    # With -s the last words of a process that a test ends are not held back.
+    # With -s, the last output of a process that a test ends is not lost.
     processes = ["-n", "2", "--dist", "worksteal"] if build.checked else []
     arguments = ["pytest", "-sq", *processes, "-p", "no:cacheprovider", *build.tests]
     done = _run(tree, ["-m", *arguments], traps=build.checked)
@@ -206,7 +207,7 @@ def _suite(build: Build, tree: Path) -> Check:
 
 
 def _faults(tree: Path) -> Iterator[Check]:
-    """See that each planted fault ends the process, by the message that is due."""
+    """Check that each planted fault ends the process with the expected message."""
     for name, (program, _, words) in FAULTS.items():
         code = (
             "import tests.conftest; from pyharness.cli.main import main; "
@@ -220,7 +221,7 @@ def _faults(tree: Path) -> Iterator[Check]:
 
 
 def _run(tree: Path, arguments: list[str], traps: bool = False) -> subprocess.CompletedProcess[str]:
-    # Tests start processes in other folders.
+    # Tests start processes in other folders, and these must find the tree of the build.
     variables = {"PYTHONPATH": str(tree)} | ({"PYHARNESS_TRAPS": "1"} if traps else {})
     return subprocess.run(
         [str(FOLDER / "environment" / "bin" / "python"), *arguments], cwd=tree, check=False,

@@ -1,4 +1,4 @@
-"""The builds that are held against each other, and whether each is what it claims to be."""
+"""Builds of the cross-check, and checks that each build is what it claims to be."""
 
 import json
 import os
@@ -16,25 +16,25 @@ NOT_COPIED = shutil.ignore_patterns(".*_cache", ".git", ".venv", "build", "dist"
 
 @dataclass(frozen=True)
 class Build:
-    """One way to compile the project, and what is done with it after its bits are compared."""
+    """One way to compile the project, and the tests to run after its bits have been compared."""
 
-    name: str  # also that of its folder
-    compiler: str  # the command
-    family: str  # what meson calls such a compiler
-    optimization: str  # meson's word: 0, 2, 3
+    name: str  # also the name of its folder
+    compiler: str  # the compiler's command
+    family: str  # meson's name for such a compiler
+    optimization: str  # meson's level: 0, 2, 3
     flags: tuple[str, ...] = ()
-    # Of the original programs: ``fast`` shows that the comparison sees a compiler's fault.
+    # For the original programs; ``fast`` shows that the comparison detects a compiler's fault.
     contract: str = "off"
     checked: bool = False  # with run-time checks, which need the compiler's library
-    plants: tuple[tuple[str, str, str], ...] = ()  # file, what stands there, the fault
-    faulty: bool = False  # to be caught at its faults, and nothing else
+    plants: tuple[tuple[str, str, str], ...] = ()  # file, passage, faulty passage
+    faulty: bool = False  # made only to check that its faults are caught
     tests: tuple[str, ...] = ()
 
 
 def make(build: Build, folder: Path) -> Path:
     """Copy the checkout into `folder`, build there, and put the extensions into its package.
 
-    RuntimeError with the end of what the build said.
+    Raise RuntimeError with the end of the build's output if it fails.
     """
     tree = folder / build.name
     shutil.rmtree(tree, ignore_errors=True)
@@ -70,12 +70,12 @@ def make(build: Build, folder: Path) -> Path:
 
 
 def _fill_results_with_nan(tree: Path) -> None:
-    """F2py hands out results that begin as zeros: let them begin as NaN, and integers as -1."""
+    """Fill new results of f2py with NaN, and integers with -1, instead of zeros."""
     import numpy.f2py
 
     text = (Path(numpy.f2py.get_include()) / "fortranobject.c").read_text()
     zeros = "PyArray_FILLWBYTE(arr, 0);"
-    # Those that begin as they happen to be, too.
+    # Fill those results too that f2py leaves uninitialised.
     unless = "if (!(intent & F2PY_INTENT_CACHE)) {"
     meson = (tree / "meson.build").read_text()
     place = "f2py_folder / 'fortranobject.c'"
@@ -87,9 +87,10 @@ def _fill_results_with_nan(tree: Path) -> None:
 
 
 def false_claims(build: Build, tree: Path, record: dict[str, str]) -> list[str]:
-    """Name all in which a build is not what it claims.
+    """Return the ways in which a build is not what it claims.
 
-    By what meson ran, and by what the loaded extension says of itself in `record`.
+    It compares the claims with the commands that meson ran and with the loaded extension's
+    description of itself in `record`.
     """
     found = []
     if not Path(record["extension"]).resolve().is_relative_to(tree.resolve()):
@@ -116,7 +117,7 @@ def _wrong_words(build: Build, words: Sequence[str]) -> list[str]:
     if Path(words[0]).name != Path(build.compiler).name:
         found.append(f"meson ran {words[0]}, not {build.compiler}")
     contract = ("-ffp-contract", f"-ffp-contract={build.contract}")
-    # Of several, compilers take the last.
+    # If there are several, compilers use the last one.
     for beginning, expected in (("-O", f"-O{build.optimization}"), contract):
         last = [word for word in words if word.startswith(beginning)][-1:]
         if last != [expected]:
@@ -126,10 +127,10 @@ def _wrong_words(build: Build, words: Sequence[str]) -> list[str]:
 
 
 def environment(folder: Path) -> Path:
-    """Make an environment with all packages of this one but the project itself; its Python.
+    """Make an environment with all packages of this one except the project; return its Python.
 
-    An editable install puts a finder of its own before all folders; in a second environment that
-    reads the first one's packages as a plain folder there is none.
+    An editable install puts its own finder before all folders. The second environment reads the
+    first one's packages as a plain folder, and so has no such finder.
     """
     import sysconfig
 
@@ -142,7 +143,7 @@ def environment(folder: Path) -> Path:
 
 
 def native_flag(compiler: str) -> str | None:
-    """Return the option that compiles for this very processor, or None where there is none."""
+    """Return the option that compiles for this very processor, or None if there is none."""
     for flag in ("-march=native", "-mcpu=native"):
         command = [compiler, flag, "-fsyntax-only", "-x", "f95", os.devnull]
         if subprocess.run(command, capture_output=True, check=False).returncode == 0:

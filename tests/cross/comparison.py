@@ -1,4 +1,4 @@
-"""Digests in, checks out: every cell of every build against the twin."""
+"""Checks from digests: every cell of every build is compared with the Python twin."""
 
 from collections.abc import Collection, Iterator, Mapping
 
@@ -12,9 +12,9 @@ def compared(
     twin: Mapping[str, str],
     listed: Collection[tuple[str, str]] = (),
 ) -> Iterator[Check]:
-    """Yield a check for each cell of a build: its digests against those of the Python twin.
+    """Yield a check for each cell of a build, which compares its digest with the Python twin's.
 
-    `listed` are build and cell of the divergences known; one that no longer occurs fails.
+    `listed` has build and cell of each known divergence; one that no longer occurs fails.
     """
     known_cells = {cell for name, cell in listed if name == build}
     for cell in sorted(digests.keys() | twin.keys() | known_cells):

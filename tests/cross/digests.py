@@ -1,4 +1,4 @@
-"""One digest for each cell, and what computed it: python -m tests.cross.digests LANGUAGE FILE."""
+"""A digest for each cell, and its build: `python -m tests.cross.digests LANGUAGE FILE`."""
 
 import hashlib
 import json
@@ -22,7 +22,7 @@ from tests.original.test_programs import NASTY
 
 
 def digest(run: Trajectory) -> str:
-    """Return a word for every bit of a trajectory; all NaN are one, as languages sign them."""
+    """Return a hash of all bits of a trajectory; NaN are equal, whatever their sign bit."""
     counters = [run.steps, run.evaluations, run.ended]
     if run.stop is not None:
         counters += [run.stop.step, run.stop.variable, float(run.stop.quotient).hex()]
@@ -40,7 +40,7 @@ def digest(run: Trajectory) -> str:
 
 
 def count_of_runs() -> int:
-    """Return how many digests there are, where the compiler has every word."""
+    """Return the number of digests of a compiler that supports every floating-point format."""
     cells = list(all_cells())
     nasty = sum(2 * len(list(all_listings(program))) for program in PROGRAMS) * len(NASTY)
     words = sum(_has_other_words(listing) for listing, _ in cells) * (len(COMPILED_WORDS) - 1)
@@ -48,7 +48,7 @@ def count_of_runs() -> int:
 
 
 def all_digests(language: str) -> Iterator[tuple[str, str]]:
-    """Yield name and digest of every cell, of every listing on the nasty scenes, and in words."""
+    """Yield name and digest of every cell, every nasty scene, and the cells in other formats."""
     for listing, case in all_cells():
         run = PROGRAM_REGISTRY[listing.program].run(case_scene(case), listing, language)
         yield f"cells/{cell_name(listing, case)}", digest(run)
@@ -64,7 +64,7 @@ def all_digests(language: str) -> Iterator[tuple[str, str]]:
 
 
 def _in_words(language: str) -> Iterator[tuple[str, str]]:
-    """Yield name and digest of the cells with all defects or none, in the other words of IEEE."""
+    """Yield name and digest of cells with all defects or none, in the other IEEE formats."""
     compiled = language == "fortran"
     run = compiled_in_word.run if compiled else in_word.run
     for word in compiled_words() if compiled else COMPILED_WORDS:
@@ -79,7 +79,7 @@ def _has_other_words(listing: Listing) -> bool:
 
 
 def replay(cell: str) -> str:
-    """Return what follows `python -m` to hold Fortran against twin in a cell again."""
+    """Return the arguments of `python -m` that compare Fortran with the twin in a cell again."""
     if cell.startswith(("cells/", "words/")):
         return f"pyharness verify --only {cell}"
     _, program, name = cell.split("/")[:3]
@@ -90,7 +90,7 @@ def replay(cell: str) -> str:
 
 
 def main(language: str, file: str) -> None:
-    """Write the digests, and the build that they come from."""
+    """Write the digests, and a description of the build that computed them."""
     record = {
         "extension": _kernels.__file__,
         "compiler": f"{_build.COMPILER} {_build.COMPILER_VERSION}",

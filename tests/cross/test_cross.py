@@ -1,4 +1,4 @@
-"""The cross-check's own parts: digests, their comparison, claims, floating-point guards."""
+"""Parts of the cross-check: digests, their comparison, claims, floating-point guards."""
 
 import shutil
 import subprocess
@@ -23,9 +23,9 @@ from tests.cross.digests import count_of_runs, digest, replay
 from tests.traps import DIVIDE, INVALID, TOO_LARGE, UntoldException, guarded
 
 
-def test_readme_has_the_number_of_runs_that_are_compared() -> None:
+def test_contributing_has_the_number_of_runs_that_are_compared() -> None:
     told = f"compares every bit of {count_of_runs()} runs"
-    assert told in " ".join((ROOT / "README.md").read_text().split())
+    assert told in " ".join((ROOT / "CONTRIBUTING.md").read_text().split())
 
 
 def test_digest_sees_every_bit_and_every_counter() -> None:
@@ -54,7 +54,7 @@ def test_digest_sees_every_bit_and_every_counter() -> None:
 
 
 def _next(array: np.ndarray) -> np.ndarray:
-    """One unit in the last place in the last number."""
+    """Return a copy whose last number is larger by one unit in the last place."""
     changed = array.copy()
     changed.flat[-1] = np.nextafter(changed.flat[-1], np.inf)
     return changed
@@ -118,10 +118,10 @@ Guarded = Callable[..., Callable[..., Any]]
 
 @pytest.fixture
 def guarded_entry(monkeypatch: pytest.MonkeyPatch) -> Guarded:
-    """Return what makes a guarded entry that raises flags, and answers a status and a quotient."""
+    """Return a factory of guarded entries, which raise flags and return a status and a quotient."""
 
     def make(raised: int, status: int, quotient: float = 0.0, name: str = "entry") -> Any:
-        # Without traps, as on macOS.
+        # A library without traps, as on macOS.
         library = Mock(spec=["feclearexcept", "fetestexcept"])
         library.fetestexcept = lambda mask: raised & mask
         monkeypatch.setattr(traps, "_mathematics", lambda: library)
@@ -168,7 +168,7 @@ def test_guard_lets_through_what_the_answer_tells_of(
 def test_guard_knows_an_attempt_that_is_refused(
     code: int, is_told: bool, guarded_entry: Guarded
 ) -> None:
-    """Of the prepared methods only `quick` tries again, and may overflow and be complete."""
+    """Only the prepared method `quick` retries, so that it may overflow and still be complete."""
     packed = np.zeros(20)
     packed[0] = code
     assert _untold(guarded_entry(TOO_LARGE, COMPLETE, name="solve_packed"), packed) != is_told
@@ -186,7 +186,7 @@ def test_guard_knows_an_infinity_that_was_given(guarded_entry: Guarded) -> None:
     ("named", "words"), [("", "no flang, and none could be installed"), ("none", "no 'none'")]
 )
 def test_flang_that_can_not_be_had_is_one_line(named: str, words: str, tmp_path: Path) -> None:
-    """The cross-check shows it and goes on."""
+    """The cross-check shows the line and continues."""
     for tool in ("sh", "id"):
         (tmp_path / tool).symlink_to(shutil.which(tool) or "")
     environment = {"PATH": str(tmp_path), "INSTALL": "no", "FLANG": named}

@@ -1,4 +1,4 @@
-"""The pages of a site as a reader of HTML sees them: names, links, what they load."""
+"""Pages of a site, parsed as HTML: their names, links, and the files that they load."""
 
 import posixpath
 from collections.abc import Iterator
@@ -6,12 +6,12 @@ from html.parser import HTMLParser
 from typing import NamedTuple
 from urllib.parse import unquote
 
-# By element, what names another file.
+# For each element, the attribute that names another file.
 _TARGETS = {"a": "href", "link": "href", "script": "src", "img": "src"}
 
 
 class Target(NamedTuple):
-    """What an element names: a path from the page's folder, and an anchor."""
+    """The target of an element: a path from the page's folder, and an anchor."""
 
     element: str
     path: str
@@ -19,7 +19,7 @@ class Target(NamedTuple):
 
 
 class Read(HTMLParser):
-    """What a page has: its anchors, its targets, its headings, its text."""
+    """The content of a page: its anchors, targets, elements and text."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -31,7 +31,7 @@ class Read(HTMLParser):
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Keep an element."""
+        """Record an element."""
         found = dict(attrs)
         self.elements.append((tag, found))
         if found.get("id") is not None:
@@ -41,17 +41,17 @@ class Read(HTMLParser):
             self.targets.append(Target(tag, unquote(path), unquote(anchor)))
 
     def handle_data(self, data: str) -> None:
-        """Keep a text."""
+        """Record a text."""
         self.text.append(data)
 
 
 def pages(site: dict[str, bytes]) -> dict[str, Read]:
-    """Read every page of a site."""
+    """Parse every page of a site."""
     return {name: Read(each.decode()) for name, each in site.items() if name.endswith(".html")}
 
 
 def dead(site: dict[str, bytes]) -> Iterator[str]:
-    """Give every link and every source that leads nowhere."""
+    """Yield every link and every source that leads nowhere."""
     read = pages(site)
     for name, page in read.items():
         for element, path, anchor in page.targets:
@@ -61,7 +61,7 @@ def dead(site: dict[str, bytes]) -> Iterator[str]:
             target = target if path else name
             if target not in site:
                 yield f"{name}: {element} {path}"
-            # The laboratory's anchor is a state.
+            # The laboratory's anchor is a state, not an element.
             elif (
                 anchor
                 and target in read

@@ -1,4 +1,4 @@
-"""Modules as one script: the same numbers, and a line for what is no known form."""
+"""Modules bundled as one script: the same numbers, and a one-line error for unknown syntax."""
 
 import json
 import re
@@ -16,7 +16,7 @@ from tests.ports import WEB, engine
 
 
 def _run(script: str, **known: object) -> str:
-    """Return what a classic script leaves in `said`; it knows what is given, and no module."""
+    """Run a script without modules, with the globals `known`; return its value of `said`."""
     run = (
         "const vm = require('node:vm');"
         "const { script, known } = JSON.parse(require('node:fs').readFileSync(0));"

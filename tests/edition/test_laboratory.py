@@ -1,4 +1,4 @@
-"""The laboratory without a page: runs, words, reference and printer page in JavaScript."""
+"""The laboratory without a page: runs, addresses, reference and printer page in JavaScript."""
 
 import html
 import itertools
@@ -31,7 +31,7 @@ LABORATORY = WEB / "laboratory"
 
 
 def ask(body: str, given: Any) -> Any:
-    """Return what JavaScript makes of `given`; `body` returns it, and may import our modules."""
+    """Return the value of the JavaScript `body`, which may use `given` and the laboratory."""
     names = {"state": "S", "experiment": "E", "reference": "R", "printer-page": "P"}
     imports = [
         f"import * as {name} from {json.dumps(str(LABORATORY / f'{file}.js'))};"
@@ -70,7 +70,7 @@ def test_printer_pages_are_those_of_the_program() -> None:
 
 
 def test_numbers_that_do_not_fit_are_printed_as_the_formats_have_it() -> None:
-    """Asterisks, steps of four digits, zeros without a sign, halves away from zero."""
+    """Test asterisks, four-digit steps, zeros without a sign, and halves rounded away from zero."""
     values = [0.0, -0.0, -0.00001, 0.03125, -0.03125, 99999.99994, 99999.99996, -9999.99994]
     values += [-9999.99996, 1e22, 0.00005, -0.99999, 1e-300, math.inf, -math.inf, math.nan]
     source = random.Random(1982)
@@ -93,7 +93,7 @@ def test_numbers_that_do_not_fit_are_printed_as_the_formats_have_it() -> None:
 
 
 def _words() -> list[str]:
-    """Return what may stand behind the page's address: random states, in words."""
+    """Return address fragments of random states."""
     source = random.Random(1982)
     found = []
     for _ in range(300):
@@ -145,7 +145,7 @@ def test_states_go_round_through_words_and_mean_what_the_command_line_means(
         assert each["run"]["ended"] == told["ended"]
         assert told["stop"] is None or each["run"]["stop"]["variable"] == told["stop"]["variable"]
         if each["state"]["case"] == 7:
-            continue  # where the C library's sines may be others, in steps of any length
+            continue  # the sines of another C library may differ
         rows = [row[1:4] for row in each["run"]["rows"]]
         assert rows == told["trajectory"]["omega"], each["command"]
 
@@ -216,7 +216,7 @@ def test_what_an_address_has_wrong_is_told_in_a_line_and_the_default_taken(
 
 
 def _motions() -> list[Scene]:
-    """Return the cases over 300 steps, and other starts, steps, bodies and torques."""
+    """Return the cases over 300 steps, and scenes with other starts, steps, bodies and torques."""
     found = [replace(case_scene(number), steps=300) for number in case_numbers()]
     source = random.Random(1982)
     for _ in range(15):
@@ -349,7 +349,7 @@ def test_data_are_json_and_know_every_switch() -> None:
 
 
 def test_files_are_small() -> None:
-    """What is to be read is in pieces that can be."""
+    """Readers see these files, so that each must be short enough to read."""
     for file in LABORATORY.glob("*.js"):
         assert len(file.read_text().splitlines()) < 300, file.name
 

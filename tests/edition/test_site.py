@@ -27,7 +27,7 @@ def test_no_link_is_dead(built_site: dict[str, bytes]) -> None:
     [
         ("index.html", b'href="claims.html"', b'href="claim.html"'),
         ("claims.html", b'href="#vi-superior"', b'href="#vi-inferior"'),
-        ("docs/findings.html", b'src="figures/', b'src="figure/'),
+        ("docs/explanation/findings.html", b'src="../figures/', b'src="../figure/'),
         ("listing/two-term.html", b"../apparatus.html#", b"../apparatus.html#no-"),
     ],
 )
@@ -226,10 +226,11 @@ def test_the_api_has_what_docstrings_say() -> None:
 def test_a_page_says_under_which_entry_of_the_menu_it_is(built_site: dict[str, bytes]) -> None:
     for name, entry in (
         ("listing/two-term.html", "listing/index.html"),
-        ("docs/words.html", "docs/index.html"),
-        ("docs/findings.html", "docs/findings.html"),
+        ("docs/explanation/words.html", "docs/index.html"),
+        ("docs/explanation/findings.html", "docs/explanation/findings.html"),
     ):
-        current = re.findall(r'href="\.\./([^"]*)" aria-current="(\w+)"', built_site[name].decode())
+        links = r'href="(?:\.\./)+([^"]*)" aria-current="(\w+)"'
+        current = re.findall(links, built_site[name].decode())
         assert current == [(entry, "page" if entry == name else "true")]
 
 
@@ -258,13 +259,17 @@ def test_pictures_and_licences_are_beside_the_pages(built_site: dict[str, bytes]
 @pytest.mark.parametrize(
     ("name", "target", "found"),
     [
-        ("atlas/README.md", "../findings.md#what-is-true", "../findings.html#what-is-true"),
-        ("methods.md", "figures/growth.svg", "figures/growth.svg"),
-        ("methods.md", "../README.md", None),
-        ("methods.md", "missing.md", None),
-        ("methods.md", "space-torque.toml", None),
-        ("methods.md", "#which-one", "#which-one"),
-        ("methods.md", "https://example.org/a.md", "https://example.org/a.md"),
+        (
+            "atlas/README.md",
+            "../explanation/findings.md#what-is-true",
+            "../explanation/findings.html#what-is-true",
+        ),
+        ("explanation/methods.md", "../figures/growth.svg", "../figures/growth.svg"),
+        ("explanation/methods.md", "../../README.md", None),
+        ("explanation/methods.md", "missing.md", None),
+        ("explanation/methods.md", "../space-torque.toml", None),
+        ("explanation/methods.md", "#which-one", "#which-one"),
+        ("explanation/methods.md", "https://example.org/a.md", "https://example.org/a.md"),
     ],
 )
 def test_links_of_documents(name: str, target: str, found: str | None) -> None:

@@ -1,4 +1,4 @@
-"""What stands for a claim in the tests."""
+"""A claim for the tests of sweeps."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ CLAIMS = {"stays": "tests.ensembles.claims:stays"}
 
 
 def stays(batch: Batch) -> NDArray[Any]:
-    """Whether the middle component is at the end what it was, to a tenth; silent where it was 0."""
+    """Return 1 if omega2 ends within a tenth of its initial value, 0 if not, 2 if that is 0."""
     before = batch.omega0[:, 1]
     holds = np.abs(batch.omega[:, 1] - before) <= 0.1 * np.abs(before)
     return np.where(before == 0.0, 2, holds)

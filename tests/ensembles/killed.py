@@ -1,4 +1,4 @@
-"""A sweep killed at half way and resumed: ``python -m tests.ensembles.killed 10000000``."""
+"""A sweep killed half way and resumed: ``python -m tests.ensembles.killed 10000000``."""
 
 import os
 import shutil
@@ -38,7 +38,7 @@ count = 100
 
 @dataclass(frozen=True)
 class Killed:
-    """What came of it: chunks in all, done when it was killed, and what was wrong then."""
+    """The outcome: all chunks, those done when the sweep was killed, and faults after resuming."""
 
     n_chunks: int
     n_done: int
@@ -49,13 +49,13 @@ class Killed:
 def kill_and_resume(
     folder: Path, scenes: int, chunk: int, t_end: float = 1.0, executor: str = "here"
 ) -> Killed:
-    """Sweep once undisturbed, and once killed at half way and resumed; compare the bytes."""
+    """Run a sweep undisturbed; kill it half way and resume it; compare the bytes."""
     path = folder / "sweep.toml"
     path.write_text(SWEEP.format(chunk=chunk, count=scenes // 100, t_end=t_end))
     whole, killed = folder / "whole.zarr", folder / "killed.zarr"
     _finish(path, whole)
     n_chunks = len(_done(whole))
-    # On a busy machine it may have ended before anyone looked.
+    # On a busy machine the sweep may have ended before the signal.
     for _ in range(_ATTEMPTS):
         shutil.rmtree(killed, ignore_errors=True)
         if _killed(_start(path, killed, executor), killed, n_chunks // 2):
@@ -75,7 +75,7 @@ def kill_and_resume(
 
 
 def _killed(process: "subprocess.Popen[bytes]", store: Path, count: int) -> bool:
-    """Kill a sweep when so many chunks are done; return whether it was still at work then."""
+    """Kill a sweep when `count` chunks are done; return whether it was still running."""
     end = time.monotonic() + _PATIENCE
     while len(_done(store)) < count and process.poll() is None and time.monotonic() < end:
         time.sleep(0.001)
@@ -86,7 +86,7 @@ def _killed(process: "subprocess.Popen[bytes]", store: Path, count: int) -> bool
 
 def _start(path: Path, store: Path, executor: str = "here") -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "pyharness", "sweep", str(path), "--out", str(store)]
-    # A group of its own, so that its workers die with it.
+    # A process group of its own, so that its workers are killed with it.
     return subprocess.Popen(
         [*command, "--executor", executor],
         stdout=subprocess.DEVNULL,
@@ -101,19 +101,19 @@ def _finish(path: Path, store: Path) -> None:
 
 
 def _done(store: Path) -> list[tuple[str, ...]]:
-    """Return the places of the chunks that are done: their checksums are written last."""
+    """Return the places of the chunks that are done, whose checksums are written last."""
     found = (store / "checksums" / "c").rglob("*")
     chunks = (each for each in found if each.is_file() and each.suffix != ".partial")
     return [_place(each, store) for each in chunks]
 
 
 def _place(path: Path, store: Path) -> tuple[str, ...]:
-    # After the array's name and "c": two dimensions of the grid, and perhaps the component's.
+    # After the array's name and "c" come two dimensions of the grid, and perhaps the component's.
     return path.relative_to(store).parts[2:4]
 
 
 def main() -> int:
-    """Do it with so many scenes, and say what was seen."""
+    """Kill and resume a sweep of so many scenes, and print the outcome."""
     scenes = int(float(sys.argv[1])) if len(sys.argv) > 1 else 10_000_000
     with tempfile.TemporaryDirectory() as folder:
         begin = time.monotonic()

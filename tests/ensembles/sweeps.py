@@ -1,4 +1,4 @@
-"""Sweep files of the tests."""
+"""Sweep files for the tests."""
 
 import time
 from pathlib import Path
@@ -48,7 +48,7 @@ values = [0.01, 0.02]
 
 
 def text(*axes: str, top: str = 'reductions = ["end", "status"]', scene: str = BASE) -> str:
-    """Return a sweep file of these axes."""
+    """Return the text of a sweep file with these axes."""
     return "\n".join([top, scene, *axes])
 
 
@@ -59,7 +59,7 @@ def written(folder: Path, content: str, name: str = "sweep.toml") -> str:
 
 
 def files(store: Path) -> dict[str, bytes]:
-    """Return the content of every file of a store, by its path in it."""
+    """Return the content of every file of a store by its path."""
     found = (each for each in store.rglob("*") if each.is_file())
     return {str(each.relative_to(store)): each.read_bytes() for each in found}
 

@@ -1,4 +1,4 @@
-"""The atlas: its sweep files with few places on each axis, and what its pages say of them."""
+"""The atlas: coarse versions of its sweeps, and the statements on its pages."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ import pytest
 from docs.atlas import draw
 from docs.atlas.collocation import tenfold
 from docs.atlas.maps import place_of
-from docs.atlas.stops import case_scenes, foretold
+from docs.atlas.stops import case_scenes, predicted
 from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.forecast import places_of_a_chunk
 from pyharness.ensembles.run import run_sweep
@@ -26,7 +26,7 @@ ATLAS = Path(__file__).parent.parent.parent / "docs/atlas"
 
 
 def _coarse(folder: Path, name: str, count: int, **more: str) -> Sweep:
-    """Read a sweep file of the atlas with other counts, and other texts in place of some."""
+    """Return a sweep of the atlas with `count` points on each axis and other values for `more`."""
     content = re.sub(r"count = \d+", f"count = {count}", (ATLAS / f"{name}.toml").read_text())
     for old, new in more.items():
         content, n = re.subn(rf"(?m)^{old} = .*$", f"{old} = {new}", content)
@@ -35,7 +35,7 @@ def _coarse(folder: Path, name: str, count: int, **more: str) -> Sweep:
 
 
 def _whole(sweep: Sweep) -> dict[str, Any]:
-    """Return the arrays of all of a sweep."""
+    """Return the arrays of a whole sweep."""
     found: dict[str, Any] = {}
     for chunk in range(sweep.n_chunks):
         for name, values in solve_chunk(sweep, chunk).items():
@@ -73,10 +73,10 @@ def test_square_of_all_bodies_is_symmetric_about_its_diagonal(tmp_path: Path) ->
     found = _whole(sweep)["flip-time"]
     other = _coarse(tmp_path, "stability", 8).text.replace("0.7853981633974483", f"{np.pi / 2}")
     mirrored = _whole(read_sweep(written(tmp_path, other)))["flip-time"]
-    # The least moment's axis and the largest's change places, b/a and c/b too.
+    # This exchanges the axes of the least and the largest moment, and with them b/a and c/b.
     assert found[0] == pytest.approx(mirrored[1].swapaxes(1, 2), rel=1e-9)
     assert (np.diff(found[0], axis=0) < 0.0).all()
-    # Half way between them the diagonal is the separatrix.
+    # For the tilt half way between the two axes, the diagonal is the separatrix.
     at = np.arange(1, 8)
     for beside in (found[1][:, at, at - 1], found[1][:, at - 1, at]):
         assert (found[1][:, at, at] > beside).all()
@@ -93,7 +93,7 @@ def test_flips_without_torque_are_those_of_the_closed_form(tmp_path: Path) -> No
     tilts, up, across = (axis.coordinates() for axis in sweep.axes[3:])
     tilt, c_b, b_a = (each.ravel() for each in np.meshgrid(tilts, up, across, indexing="ij"))
     times = flip_times(_bodies(b_a, c_b), _starts(tilt))
-    # It begins half way between two flips.
+    # The trajectory begins half way between two flips.
     expected = np.floor(50.0 / times + 0.5)
     near = np.abs(50.0 / times + 0.5 - np.rint(50.0 / times + 0.5)) < 1e-6
     assert (found.ravel() == expected)[~near].all()
@@ -133,9 +133,10 @@ def _starts(tilt: Array) -> Array:
 
 
 def _first_flip(bodies: Array, tilt: Array, torque: float) -> Array:
-    """Return when omega2 first is 0, by a quadrature over its angle.
+    """Return the first time at which omega2 is 0, by a quadrature over the integral of omega2.
 
-    Over the angle both others are hyperbolic functions, torque or not, so that omega2 squared is
+    The integral of omega2 is an angle. Omega1 and omega3 are hyperbolic functions of it, with or
+    without torque, so that omega2 squared is
     cos^2(tilt) + 2 M angle / I2 - (s2 / s1) sin^2(tilt) sinh^2(rate angle).
     """
     i1, i2, i3 = bodies.T
@@ -153,7 +154,7 @@ def _first_flip(bodies: Array, tilt: Array, torque: float) -> Array:
             middle = 0.5 * (low + high)
             above = square(middle) > 0.0
             low, high = np.where(above, middle, low), np.where(above, high, middle)
-    # The end is a root of omega2 squared: a substitution makes it smooth.
+    # The upper end is a root of omega2 squared: a substitution makes the integrand smooth.
     nodes, weights = np.polynomial.legendre.leggauss(400)
     u = 0.5 * (nodes + 1.0)
     values = [
@@ -164,7 +165,7 @@ def _first_flip(bodies: Array, tilt: Array, torque: float) -> Array:
     return total
 
 
-def test_corrected_program_stops_where_it_is_foretold(tmp_path: Path) -> None:
+def test_corrected_program_stops_where_it_is_predicted(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "stops", 41)
     found = _whole(sweep)
     stopped = found["status"] == Statuses.STOPPED
@@ -175,16 +176,17 @@ def test_corrected_program_stops_where_it_is_foretold(tmp_path: Path) -> None:
     scenes = case_scenes(sweep)
     assert [scene.name for scene in scenes] == ["Case 2", "Case 3", "Case 4", "Case 5"]
     for i, scene in enumerate(scenes):
-        constant, step = foretold(scene, 10.0)
+        constant, step = predicted(scene, 10.0)
         short = steps < 0.1 * step
         below, above = constants < constant * (1.0 - 1e-3), constants > constant * (1.0 + 1e-3)
         assert stopped[2, i][np.ix_(short, below)].all()
         assert not stopped[2, i][np.ix_(short, above)].any()
         if 1 <= i <= 2:
-            # Beyond rk4's region what grows ends in the test.
+            # Beyond rk4's stability region the stop test ends every run.
             assert stopped[2, i][steps > 1.05 * step].all()
             assert not stopped[2, i][np.ix_(steps < 0.95 * step, constants > 10.0)].any()
-    # By component it is a comb; one norm, and every other defect, make a clean edge.
+    # The test by component gives an edge like a comb. With one norm, and every other defect kept,
+    # the edge is clean.
     changes = [
         (np.diff(stopped[i].astype(int), axis=1) != 0)[:, :, constants > 100.0].sum()
         for i in range(3)
@@ -207,5 +209,5 @@ def test_collocation_diverges_where_a_wobble_grows(tmp_path: Path) -> None:
         assert not changed[program, listing][steps[:, None] < 0.8 * line].any()
         assert changed[program, listing][(steps[:, None] > 1.25 * line) & (line < 0.5)].all()
     assert (changed[1, 0] == changed[1, 1]).all()
-    # What the original two-term program solves diverges however small the step.
+    # The original two-term program diverges however small the step.
     assert changed[0, 0][:, sizes > 15.0].mean() > 0.95

@@ -1,4 +1,4 @@
-"""A scene of a sweep has the same bits whatever the chunk that it is in."""
+"""A scene of a sweep has the same bits in every chunk."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ TIME = '[[axis]]\nfield = "t_end"\nfrom = 0.5\nto = 40.0\ncount = 4'
 @pytest.mark.parametrize("method", ["auto", "rk4"])
 @pytest.mark.parametrize("axes", [(TORQUE, TILT), (TILT, TORQUE, RATE, TIME)], ids=["two", "four"])
 def test_chunks_change_no_bit(axes: tuple[str, ...], method: str, tmp_path: Path) -> None:
-    """Torques of zero among others: a chunk may have no other, or one of each."""
+    """Some torques are zero, so that a chunk may have only zeros, or zeros among others."""
     if method == "rk4":
         axes = tuple(each for each in axes if each != TIME)
     solve = f'[solve]\nmethod = "{method}"'

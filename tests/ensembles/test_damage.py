@@ -1,4 +1,4 @@
-"""Damaged stores: one line that names what is damaged, and a repair with the same bytes."""
+"""Damaged stores: one line names the damage, and a repair restores the same bytes."""
 
 import json
 import os
@@ -128,7 +128,7 @@ def test_swapped_chunks_are_seen_with_their_checksums_too(
 ) -> None:
     swap(store / CHUNK, store / OTHER)
     assert (store / CHUNK).read_bytes() == (intact / "store" / OTHER).read_bytes()
-    # Two constant chunks may have the same bytes; those of the ends differ.
+    # Two constant chunks may have the same bytes; chunks of `end` differ.
     for name in ("end/c/{}/0/0", "checksums/c/{}/0"):
         swap(store / name.format(0), store / name.format(1))
     with pytest.raises(InputError, match="2 of 8 chunks are damaged, first chunk 1: 'checksums/c"):
@@ -177,7 +177,7 @@ def test_another_schema_is_refused_and_stays_as_it_was(
 
 
 def test_store_of_the_first_schema_is_refused(sweep: Sweep, store: Path) -> None:
-    # It had no checksums.
+    # The first schema had no checksums.
     shutil.rmtree(store / "checksums")
     described = json.loads((store / "zarr.json").read_text())
     described["attributes"]["schema"] = 1
@@ -214,7 +214,7 @@ def test_checksums_are_those_of_sha256sum(store: Path) -> None:
 
 
 def _damaged_at_random(store: Path, draw: random.Random) -> str:
-    """Damage a store in one way and return which."""
+    """Damage a store in one random way, and return a description of it."""
     every = sorted(path for path in store.rglob("*") if path.is_file())
     path, other = draw.sample(every, 2)
     while path.read_bytes() == other.read_bytes():
@@ -252,7 +252,7 @@ def test_no_damage_is_believed(
         run_sweep(sweep, str(store))
     except InputError as error:
         message = str(error)
-    # What was computed again without a question had no checksums any more.
+    # Chunks are computed again without an error only if their checksums are missing.
     else:
         message = ""
         assert files(store) == files(intact / "store"), what

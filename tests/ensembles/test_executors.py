@@ -1,4 +1,4 @@
-"""Executors: the same bytes from each, and from those whose workers die."""
+"""Executors: all return the same bytes, even if their workers die."""
 
 import multiprocessing
 import os
@@ -102,13 +102,13 @@ def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:
 def test_chunks_whose_processes_die_are_tried_three_times(
     sweep: Sweep, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Three deaths in a row end it; a chunk in between shows that there is memory enough."""
+    """Three deaths in a row end the sweep; a chunk in between shows that there is memory enough."""
     started: list[int] = []
     done = iter([1, 0, 2, 0, 0])
 
     def dying(sweep: Sweep, chunks: list[int], workers: int) -> Any:
         started.append(len(chunks))
-        # After so many deaths it would go on for ever; then all are done.
+        # After the planned deaths all chunks are done, so that a fault can't loop for ever.
         yield from ((chunk, {}) for chunk in chunks[: next(done, len(chunks))])
         if chunks:
             raise BrokenProcessPool
@@ -119,7 +119,7 @@ def test_chunks_whose_processes_die_are_tried_three_times(
         assert [next(results)[0] for _ in range(3)] == [0, 1, 2]
         with pytest.raises(InputError, match="a process died 3 times; is there enough memory"):
             next(results)
-    # One chunk and a death, a second death; two chunks and a first death again, and two more.
+    # One chunk and a death, then a second death. Two chunks and again a first death, then two more.
     assert started == [4, 3, 3, 1, 1]
 
 

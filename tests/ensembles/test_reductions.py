@@ -1,4 +1,4 @@
-"""Reductions: each against the motion itself, solved one scene at a time."""
+"""Reductions: each is compared with solutions of one scene at a time."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -102,7 +102,7 @@ def test_growth_is_that_of_the_middle_axis(tmp_path: Path) -> None:
     axis = '[[axis]]\nfield = "t_end"\nvalues = [10.0, 15.0]'
     _, found = _found(tmp_path, text(axis, top='reductions = ["growth"]'))
     logarithms = found["growth"] * [10.0, 15.0]
-    # A small difference grows in the long run with the rate sqrt((I2 - I1) (I3 - I2) / (I1 I3)).
+    # In the long run a perturbation grows with the rate sqrt((I2 - I1) (I3 - I2) / (I1 I3)).
     assert np.diff(logarithms) / 5.0 == pytest.approx(3.0**-0.5, rel=1e-3)
 
 
@@ -187,7 +187,7 @@ listing = "corrected"
     assert overflown.tolist() == [[False, True], [False, True]]
     assert (np.isfinite(found["overflow-time"]) == overflown).all()
     assert found["overflow-time"][1, 1] < found["overflow-time"][0, 1]
-    # omega = 1 / (1 - t): the step sees it somewhat late.
+    # omega = 1 / (1 - t): a program with finite steps overflows somewhat later than t = 1.
     assert 1.0 < found["overflow-time"][0, 1] < 1.3
 
 
@@ -210,7 +210,7 @@ def test_every_reduction_has_words_for_people() -> None:
 
 
 def test_error_is_relative_to_the_largest_component_up_to_there(tmp_path: Path) -> None:
-    """From rest a torque makes omega, so that the start alone would be no scale."""
+    """A torque makes omega much larger than its initial value, which would be no scale."""
     scene = _COARSE.replace("[0.0, 1.0, 0.0]", "[0.0, 1e-3, 0.0]").replace(
         "[scene.run]", "[scene.torque]\nconstant = [0.1, -0.2, 0.3]\n[scene.run]"
     )
@@ -228,7 +228,7 @@ def test_error_is_relative_to_the_largest_component_up_to_there(tmp_path: Path) 
 
 
 def test_what_is_no_number_is_no_flip() -> None:
-    """A component that changes its sign twice, and leaves the range of numbers below 0."""
+    """A component changes its sign twice, and becomes NaN after a negative value."""
     middle = np.array([-1.0, 1.0, -1.0, np.nan, np.nan])
     rows = np.stack([middle * 0.0, middle, middle * 0.0], axis=1)[None, :, :]
     solved = SimpleNamespace(

@@ -1,4 +1,4 @@
-"""Stores: the same to the bit whatever interrupts, and nobody else's."""
+"""Stores: bit-for-bit identical after any interruption, and never the store of another sweep."""
 
 import contextlib
 import errno
@@ -206,7 +206,7 @@ def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(store.Store, "read", slow_read)
     with engine("here") as own:
         assert 5_000.0 < forecast(sweep, str(tmp_path / "store"), 100_000, own) < 50_000.0
-        # Those that are there are read all the same.
+        # Existing chunks are read again, which takes time too.
         assert 2_000.0 < forecast(sweep, str(tmp_path / "store"), 1, own) < 20_000.0
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
 
@@ -235,7 +235,7 @@ def test_memory_is_refused_where_the_half_of_it_ends(
     sweep = read_sweep(written(tmp_path, text(TILT)))
     estimate = run_sweep(sweep, str(tmp_path / "store")).estimate
     assert estimate is not None
-    # Pages of one byte: the half of the memory, and two bytes less.
+    # Pages of one byte: exactly half of the memory, and two bytes less.
     for number, refused in ((2 * estimate.memory, False), (2 * estimate.memory - 2, True)):
         sizes = {"SC_PHYS_PAGES": number, "SC_PAGE_SIZE": 1}
         monkeypatch.setattr(os, "sysconf", sizes.__getitem__)

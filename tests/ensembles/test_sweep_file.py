@@ -1,4 +1,4 @@
-"""Sweep files: what they say, and every mistake in a line."""
+"""Sweep files: their meaning, and a one-line message for every mistake."""
 
 import tomllib
 from pathlib import Path
@@ -96,7 +96,7 @@ values = ["adopted", "do-variable"]
 
 
 def test_words_along_one_dimension_go_together(tmp_path: Path) -> None:
-    """The four-term program has no DO variable: across each other, the two are refused."""
+    """The four-term program has no DO variable, so a grid of the two dimensions is refused."""
     sweep = read_sweep(written(tmp_path, READINGS))
     where = points(sweep, tuple(slice(0, n) for n in sweep.shape))
     listings = [batch.listing for _, batch in batches(sweep, where)]
@@ -203,7 +203,7 @@ def test_sweep_of_the_documents_is_one() -> None:
 @pytest.mark.parametrize("more", ["", "draw = 'uniform'\nseed = 1\n"])
 @pytest.mark.parametrize("ends", [(-1.7e308, 1.7e308), (1.7e308, -1.7e308)])
 def test_axis_may_span_the_whole_range_of_numbers(ends: tuple[float, float], more: str) -> None:
-    """The distance of the ends is no number."""
+    """The difference of the ends overflows."""
     spread = [f"from = {ends[0]}", f"to = {ends[1]}", "count = 5"]
     table = "\n".join(["field = 'omega.1'", *spread, more])
     axis = axis_of(tomllib.loads(table), 1)
@@ -217,7 +217,7 @@ def test_axis_may_span_the_whole_range_of_numbers(ends: tuple[float, float], mor
 
 
 def test_drawn_value_never_leaves_the_ends_of_its_axis() -> None:
-    """The logarithm of the largest number, rounded, is that of none."""
+    """The logarithm of the largest number is rounded, and its exponential would overflow."""
     table = (
         "field = 'omega.1'\ndraw = 'log-uniform'\nfrom = 1.7976931348623157e308\n"
         "to = 1.7976931348623157e308\ncount = 9\nseed = 1"

@@ -1,10 +1,10 @@
-"""Errors and what is said of them: `python -m tests.estimates --scenes 20000 --seed 1`.
+"""True and reported errors: `python -m tests.estimates --scenes 20000 --seed 1`.
 
-Every scene is drawn anew from the seed and its number, solved to its tolerance, and compared with
-a truth of 31 digits (`tests.estimates.truth`). One scene again: `--seed 1 --only 123`. The exit
-status is 1 where an error exceeds the tolerance, where an answer reports wrongly whether any digit
-is left, where a reported error is below a hundredth of the true one, or below a tenth in more than
-one answer of a thousand.
+Every scene is drawn from the seed and its number, solved to its tolerance, and compared with a
+truth of 31 digits (`tests.estimates.truth`). `--seed 1 --only 123` repeats one scene. The exit
+status is 1 if an error exceeds the tolerance, if an answer reports wrongly whether any digit is
+left, if a reported error is below a hundredth of the true one, or if more than one in a thousand
+reported errors are below a tenth of it.
 """
 
 import argparse
@@ -25,11 +25,11 @@ from tests.estimates.scenes import Draw, drawn
 
 SENSITIVE = "sensitive"
 _ROUNDING = 2.0**-53
-_ULP = 2.0**-52  # errors up to it are of the rounding of the result
-_LOW = 1e-3  # share of the estimates that may be below a tenth of the error
-_GIVEN = 4e-15  # times K: what rounding may cost beside the tolerance
+_ULP = 2.0**-52  # errors up to it are rounding errors of the result
+_LOW = 1e-3  # fraction of the estimates that may be below a tenth of the error
+_GIVEN = 4e-15  # times K: error allowed for rounding, in addition to the tolerance
 _CALM = 1e6  # K above which no error is judged
-_SURELY, _HARDLY = 3.0, 1.0 / 30.0  # times the tolerance: rounding times K that has to be said
+_SURELY, _HARDLY = 3.0, 1.0 / 30.0  # limits of rounding times K over the tolerance
 
 COLUMNS = (
     "number", "kinds", "tolerance", "time", "turns", "growth", "largest", "truth_steps",
@@ -39,17 +39,17 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Answer:
-    """What an entry point returned for a scene, and the error it reported; None for no report."""
+    """The result of an entry point for a scene, and the error it reported; None for no report."""
 
     draw: Draw
     entrance: str
     method: str
     ended: str
-    error: float  # true: of omega over the largest, or the angle (rad); infinite without an answer
+    error: float  # true error of omega over the largest, or angle (rad); infinite without an answer
     estimate: float | None = None
     growth: float | None = None
     steps: int = 0
-    runs: int | None = None  # 2 where the first was not good enough
+    runs: int | None = None  # 2 if the first run was not accurate enough
 
     @property
     def limit(self) -> float:
@@ -58,40 +58,41 @@ class Answer:
 
     @property
     def is_judged(self) -> bool:
-        """Whether the motion is calm enough for that."""
+        """Whether the error amplification is small enough to judge the error."""
         return self.draw.truth.growth < _CALM
 
     @property
     def is_unfinished(self) -> bool:
-        """Whether a calm scene has no result."""
+        """Whether a scene that is judged has no result."""
         return self.is_judged and self.ended not in ("complete", SENSITIVE)
 
     @property
     def exceeds(self) -> bool:
-        """Whether the error is larger than allowed in a result that is said to be complete."""
+        """Whether the error is larger than allowed in a result that is reported as complete."""
         return self.is_judged and self.ended == "complete" and not self.error <= self.limit
 
     @property
     def lost(self) -> float:
-        """Rounding times K over the tolerance."""
+        """The rounding error times K, relative to the tolerance."""
         return _ROUNDING * self.draw.truth.growth / self.draw.tolerance
 
     @property
     def is_silent(self) -> bool:
-        """Whether a result without digits is said to be complete.
+        """Whether a result is reported as complete although rounding has left no digit.
 
-        A closed form loses no digit to rounding, and a torque in space tells no amplification: of
-        both the error decides.
+        A closed form loses no digit to rounding, and for a torque in space no amplification is
+        known. For both, the error decides.
         """
         known = self.growth is not None or self.error > self.draw.tolerance
         return self.lost > _SURELY and self.ended == "complete" and known
 
     @property
     def is_false_alarm(self) -> bool:
-        """Whether a scene is said to be sensitive that is not.
+        """Whether a scene is reported as sensitive that is not.
 
-        Torques that cancel are sensitive by themselves: no K says how much. With the attitude the
-        amplification is known up to the angle by which an error of omega may rotate the body.
+        Torques that cancel make a scene sensitive by themselves, which K does not measure. With the
+        attitude the amplification is known up to the angle by which an error of omega may rotate
+        the body.
         """
         angle = 1.0 + math.pi * self.draw.truth.turns * self.draw.attitude
         calm = self.lost * angle < _HARDLY and "cancelling" not in self.draw.kinds
@@ -99,7 +100,7 @@ class Answer:
 
     @property
     def seen(self) -> float | None:
-        """The estimate over the true error; None where one of them says nothing."""
+        """The estimate over the true error; None if one of them is meaningless."""
         if self.estimate is None or not self.error < 1.0 or self.error <= _ULP:
             return None
         return self.estimate / self.error
@@ -158,7 +159,7 @@ def _many(of: Draw) -> Answer:
 
 
 def _error(of: Draw, omega: Array, attitude: Array | None) -> float:
-    """Return the largest error of omega or of the attitude; of the last time where there is one."""
+    """Return the largest error of omega or of the attitude; with one row, at the last time only."""
     truth = of.truth
     if not np.isfinite(omega).all():
         return float("inf")
@@ -169,8 +170,8 @@ def _error(of: Draw, omega: Array, attitude: Array | None) -> float:
 
 
 def _answer(of: Draw, name: str, method: str, ended: str, error: float, said: Any) -> Answer:
-    """Read an answer; not every kernel has all attributes."""
-    evaluations = getattr(said, "evaluations", None)  # no solver has any
+    """Return an answer from a result; not every kernel has all attributes."""
+    evaluations = getattr(said, "evaluations", None)  # a prepared solver has none
     runs = None if evaluations is None else 1 + (evaluations > said.steps)
     return Answer(of, name, method, ended, error, said.error, said.growth, said.steps, runs)
 
@@ -185,7 +186,7 @@ ENTRANCES: dict[str, Callable[[Draw], Answer]] = {
 
 
 def answers(of: Draw) -> Iterator[Answer]:
-    """Call every entry point; a refusal is an answer too."""
+    """Yield the answer of every entry point; a refusal is an answer too."""
     for name, entrance in ENTRANCES.items():
         try:
             yield entrance(of)
@@ -239,7 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def faults(each: Answer) -> list[str]:
-    """Return the names of what is wrong with an answer; rarely an estimate may be low."""
+    """Return the names of an answer's faults; a few estimates may be low."""
     flags = {
         "exceeds": each.exceeds,
         "silent": each.is_silent,

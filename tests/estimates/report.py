@@ -1,4 +1,4 @@
-"""What a campaign has to say: what exceeds, estimates by kind, who is silent."""
+"""Report of a campaign: errors above the limit, estimates by kind, unreported loss of digits."""
 
 import itertools
 from collections import Counter
@@ -11,8 +11,8 @@ from tests.estimates.campaign import ENTRANCES, Answer
 from tests.estimates.scenes import KINDS
 
 _WORST = 8
-_ULP = 2.0**-53  # errors below it are of the rounding of the result alone
-_KNOWN = 1e13  # K above which a ratio to it says nothing
+_ULP = 2.0**-53  # errors below it are rounding errors of the result alone
+_KNOWN = 1e13  # K above which a ratio to it is meaningless
 _FEW = 1e3  # K below which second runs are counted
 
 
@@ -63,7 +63,7 @@ def _entrances(found: Sequence[Answer]) -> Section:
 
 
 def _worst(found: Iterable[Answer]) -> Section:
-    """List the worst scenes of each fault, to be had again by --only NUMBER."""
+    """List the worst scenes of each fault, which `--only NUMBER` repeats."""
     faults: list[tuple[str, Callable[[Answer], bool], Callable[[Answer], float]]] = [
         ("exceeds", lambda each: each.exceeds, lambda each: each.error / each.limit),
         ("silent", lambda each: each.is_silent, lambda each: each.lost),
@@ -94,7 +94,7 @@ def _endings(found: Iterable[Answer]) -> Section:
 
 
 def _kinds(found: Sequence[Answer]) -> Section:
-    """Say what was drawn, and how near to the tolerance the series comes."""
+    """List the kinds of scenes drawn, and the ratios of the series' errors to the tolerance."""
     rows = []
     for kind in KINDS:
         some = [e for e in found if e.entrance == "solve taylor" and kind in e.draw.kinds]
@@ -122,7 +122,7 @@ def _kinds(found: Sequence[Answer]) -> Section:
 
 
 def _estimates(found: Sequence[Answer], entrance: str) -> list[Section]:
-    """Hold what was said of error and growth to what they are."""
+    """Compare the reported errors and amplifications with the true ones."""
     rows = []
     for kind in KINDS:
         some = [each for each in found if kind in each.draw.kinds]
@@ -156,5 +156,5 @@ def _quantiles(values: Iterable[float], percents: Sequence[int]) -> list[float |
     given = list(values)
     if not given:
         return [None] * len(percents)
-    # Whole ones, for infinity minus infinity is no number.
+    # No interpolation, because infinity minus infinity is not a number.
     return [float(x) for x in np.percentile(given, percents, method="nearest")]

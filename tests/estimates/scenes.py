@@ -1,4 +1,4 @@
-"""Scenes for the campaign: calm and wild, by kind; a seed and a number say which.
+"""Random scenes of the campaign, calm and wild, each drawn from a seed and a number.
 
 Every draw has a kind of torque, of body and of motion. Independently of these it may have an
 attitude, a full inertia matrix, a torque about the axes of space, and times before the last.
@@ -19,11 +19,11 @@ from tests.estimates.truth import Truth, truth_of
 from tests.random_scenes import NASTY, triple
 
 _MOST_TURNS = 330.0
-_SHORT = 0.3  # share of scenes that end within a revolution or a few
+_SHORT = 0.3  # fraction of scenes that end within a revolution or a few
 COARSEST, FINEST = 1e-3, 1e-13
-# What no unit of time or moment changes, in bodies that there are.
+# The nasty scenes with a possible body and without extreme units of time or moment.
 _ROUGH = tuple(name for name in NASTY if name not in ("no body", "other units"))
-# In turn; those as they are drawn come twice.
+# The kinds of motion, used in turn; "plain" comes twice.
 _WAYS = (
     "plain", "near the middle axis", "plain", "strong torque", "rough", "steady", "cancelling",
     "slow",
@@ -43,18 +43,18 @@ KINDS = (
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """What a number of a seed stands for."""
+    """The scene, times and tolerance drawn for a number of a seed."""
 
     number: int
     scene: Scene
-    times: tuple[float, ...]  # s, away from 0 on either side
+    times: tuple[float, ...]  # s, of one sign, in order away from 0
     tolerance: float
     kinds: tuple[str, ...]  # of `KINDS`
     truth: Truth
 
     @property
     def attitude(self) -> bool:
-        """Whether the attitude is wanted."""
+        """Whether the attitude is requested."""
         return ATTITUDE in self.kinds
 
     @property
@@ -64,11 +64,12 @@ class Draw:
 
 
 def drawn(seed: str, number: int, tolerances: tuple[float, ...] = (), dressed: bool = True) -> Draw:
-    """Return what `number`, from 0 on, of a seed stands for.
+    """Return the draw for `number`, from 0 on, of a seed.
 
-    Its tolerance is one of those given, by default any from `COARSEST` to `FINEST`. Drawn again
-    where the body turns more than some 300 times, or the truth would take too many steps. Without
-    `dressed` it has principal axes, no attitude and one time, and no kind of motion after "rough".
+    Its tolerance is one of `tolerances`, by default any from `COARSEST` to `FINEST`. A scene is
+    drawn again if the body turns more than some 300 times, or if the truth would take too many
+    steps. Without `dressed` it has principal axes, no attitude and one time, and no kind of motion
+    after "rough".
     """
     source = Random(f"estimates/{seed}/{number}")
     law, place = LAWS[number % len(LAWS)], number // len(LAWS)
@@ -98,7 +99,7 @@ def drawn(seed: str, number: int, tolerances: tuple[float, ...] = (), dressed: b
 
 
 def _dressed(source: Random, scene: Scene) -> tuple[Scene, list[str]]:
-    """Return a scene that may have an attitude and no principal axes, and its kinds."""
+    """Return the scene, perhaps with an attitude or a full inertia matrix, and the kinds added."""
     kinds = []
     if source.random() < 0.5:
         kinds.append(ATTITUDE)
@@ -114,7 +115,7 @@ def _dressed(source: Random, scene: Scene) -> tuple[Scene, list[str]]:
 
 
 def _about_other_axes(source: Random, scene: Scene) -> Scene:
-    """Return a scene about axes that are not the principal ones, rounded as it comes."""
+    """Return the scene about axes that are not principal; its inertia matrix is rounded."""
     a, b, _ = np.linalg.qr([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)])[0]
     axes = np.array([a, b, np.cross(a, b)])
 
@@ -129,7 +130,7 @@ def _about_other_axes(source: Random, scene: Scene) -> Scene:
 
 
 def _times(source: Random, end: float) -> tuple[float, ...]:
-    """Return one to four times, whole units in the last place of the last."""
+    """Return one to four times, all multiples of the unit in the last place of the last one."""
     unit = math.ulp(end)
     parts = [source.random() for _ in range(source.choice((0, 0, 0, 1, 3)))]
     before = {math.floor(part * abs(end) / unit) * unit for part in parts} - {0.0}
@@ -166,7 +167,7 @@ def _by_kind(source: Random, law: str, way: str) -> tuple[Scene, float, tuple[st
 
 
 def _steady(source: Random, scene: Scene) -> Scene:
-    """Return a steady rotation but for rounding: about a principal axis, or held by a torque.
+    """Return a rotation that is steady up to rounding: about a principal axis, or by a torque.
 
     Half of those about an axis keep the torque of the scene along that axis.
     """
@@ -187,7 +188,7 @@ def _steady(source: Random, scene: Scene) -> Scene:
 
 
 def _cancelling(source: Random, scene: Scene) -> Scene:
-    """Return a scene with two torques more, which cancel but for a small part."""
+    """Return the scene with two more torques, which cancel except for a small part."""
     speed = math.hypot(*scene.omega)
     moments = np.array(scene.moments)
     large = 10.0 ** source.uniform(0.0, 4.0) * speed * speed
@@ -196,7 +197,7 @@ def _cancelling(source: Random, scene: Scene) -> Scene:
     frequency = speed * 10.0 ** source.uniform(-1.0, 0.5)
     law, one, other = scene.torque, triple(amplitude), triple(-amplitude * rest)
     if source.random() < 0.3:
-        # The two alone, from rest or from what they can give.
+        # The two torques alone, from rest or from an omega of the size that they can produce.
         law = TorqueLaw()
         small = large / speed * abs(rest - 1.0) * source.choice((0.0, 1.0))
         scene = replace(scene, omega=triple(small * np.array(scene.omega) / speed))
@@ -218,7 +219,7 @@ def _cancelling(source: Random, scene: Scene) -> Scene:
 
 
 def _pushed(scene: Scene, factor: float) -> Scene:
-    """Return a scene with so many times the torque."""
+    """Return the scene with its torque multiplied by `factor`."""
 
     def times(values: Triple) -> Triple:
         return values[0] * factor, values[1] * factor, values[2] * factor

@@ -1,4 +1,4 @@
-"""The campaign's truth against the reference, and the campaign at a small scale."""
+"""The campaign's truth against the reference, and the campaign on a small scale."""
 
 import csv
 from dataclasses import replace
@@ -29,7 +29,7 @@ pytestmark = [
     pytest.mark.skipif(not compiler_here(), reason="no compiler"),
 ]
 BODY = (1.0, 2.0, 2.7)
-# Torque of every kind at once, two waves of one frequency among them.
+# Every kind of torque at once, including two waves of one frequency.
 LAW = TorqueLaw(
     (0.3, -0.2, 0.1),
     (0.01, 0.02, -0.03),
@@ -47,7 +47,7 @@ SCENES = {
 
 
 def _apart(one: Truth, other: Truth) -> np.ndarray:
-    """Return the difference of the last rows: of omega, and of the angle where there is one."""
+    """Return the difference of the last rows: of omega, and of the attitude as a small rotation."""
     omega = (one.omega - other.omega) + (one.remainder - other.remainder)
     if one.attitude is None or other.attitude is None:
         return np.asarray(omega[-1])
@@ -56,7 +56,7 @@ def _apart(one: Truth, other: Truth) -> np.ndarray:
     difference = (one.attitude - other.attitude) + (
         one.attitude_remainder - other.attitude_remainder
     )
-    # Twice the vector part of the conjugate of the other times the difference: a small rotation.
+    # Twice the vector part of the other's conjugate times the difference is a small rotation.
     (w, *v), (a, *b) = other.attitude[-1], difference[-1]
     small = 2.0 * (w * np.array(b) - a * np.array(v) - np.cross(v, b))
     return np.concatenate([omega[-1], small])
@@ -95,7 +95,7 @@ JOINT = {
 
 @pytest.mark.parametrize("name", JOINT)
 def test_truth_with_attitude_is_that_of_the_series(name: str) -> None:
-    """A series of another order, in steps of its own, about principal axes."""
+    """Compare with a series of another order and with other steps, about principal axes."""
     scene, time = JOINT[name]
     times = [0.25 * time, time]
     found = truth_of(scene, times, attitude=True)
@@ -130,7 +130,7 @@ def test_angle_between_attitudes() -> None:
 
 
 def _beside(scene: Scene, small: np.ndarray) -> Scene:
-    """Return a scene from another omega, and from an attitude beyond a small rotation."""
+    """Return the scene with omega perturbed and the attitude rotated by a small angle."""
     omega = triple(np.array(scene.omega) + small[:3])
     if len(small) == 3:
         return replace(scene, omega=omega)
@@ -141,7 +141,7 @@ def _beside(scene: Scene, small: np.ndarray) -> Scene:
 
 @pytest.mark.parametrize("name", [*SCENES, *JOINT])
 def test_growth_is_the_norm_of_the_derivative(name: str) -> None:
-    """Of starts at intermediate times, each a little beside the path in every direction."""
+    """Perturb the state in every direction at intermediate times."""
     joint = name in JOINT
     scene, time = {**SCENES, **JOINT}[name]
     scene = replace(scene, attitude=scene.attitude or (1.0, 0.0, 0.0, 0.0)) if joint else scene
@@ -174,7 +174,7 @@ def test_growth_is_the_norm_of_the_derivative(name: str) -> None:
 
 def test_truth_says_what_it_cannot_know() -> None:
     runaway = Scene("", (1.0, 1.0, 1.0), None, (1.0, 1.0, 1.0))
-    with pytest.raises(InputError, match="leaves every bound"):
+    with pytest.raises(InputError, match="grows without bound"):
         truth_of(runaway, 2.0)
     with pytest.raises(InputError, match="too many steps"):
         truth_of(*SCENES["no torque"], most_steps=10)
@@ -208,9 +208,9 @@ def test_few_dozen_scenes(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
 
 
 _WERE_WRONG = [
-    # Cancelling and weak torques in space, long waves, one long step beside the middle axis.
+    # Cancelling and weak torques in space, long waves, one long step near the middle axis.
     *(("20261", number) for number in (371, 421, 759, 1257, 4379, 5860, 7959, 8937)),
-    # A remainder that was small by chance; rows before the last with a larger growth than it has.
+    # A remainder that is small by chance; rows before the last with a larger growth than the last.
     *(("20263", number) for number in (4773, 3755, 2359, 2555)),
     # A full inertia matrix with an attitude, by the closed form.
     *(("20271", number) for number in (34, 3970, 9474)),
@@ -222,7 +222,8 @@ def test_scenes_whose_reported_error_was_wrong(seed: str, number: int) -> None:
     for answer in answers(drawn(seed, number)):
         assert not answer.exceeds, answer
         assert not answer.is_low, answer
-        # The others answer for the last time alone, to which rounding may be amplified less.
+        # The other entry points answer for the last time only, where the amplification may be
+        # smaller.
         assert not (answer.is_silent and answer.entrance.startswith("solve ")), answer
 
 

@@ -1,7 +1,7 @@
-"""The truth of the campaign: omega and attitude in some 31 digits, and the error amplification K.
+"""The truth of the campaign: omega and attitude to some 31 digits, and the error amplification K.
 
-`pairs.c` beside this file, compiled when it is first needed. It is compared with
-`truth/reference.py` and `truth/free_attitude.py` in `test_estimates.py`.
+The kernel is `pairs.c` beside this file, compiled when it is first needed. `test_estimates.py`
+compares it with `truth/reference.py` and `truth/free_attitude.py`.
 """
 
 import ctypes
@@ -24,10 +24,10 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 MOST_STEPS = 40_000
-DIGITS_LOST = 1e-29  # of the pairs, over their many steps, before the motion amplifies it
+DIGITS_LOST = 1e-29  # rounding error of the pairs over many steps, before amplification
 COMPILER = os.environ.get("CC", "cc")
 _WHY = (
-    "", "takes too many steps", "leaves every bound", "needs too much memory",
+    "", "takes too many steps", "grows without bound", "needs too much memory",
 )  # fmt: skip
 _COEFFICIENTS, _INERTIA = 0, 1
 _ROW = 15
@@ -35,21 +35,21 @@ _ROW = 15
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The solution at the times requested, and measures of the motion until the last of them."""
+    """The solution at the requested times, and measures of the motion up to the last of them."""
 
     omega: Array  # shape (n, 3); rounded to binary64 (rad/s)
-    remainder: Array  # shape (n, 3); what rounding took (rad/s)
+    remainder: Array  # shape (n, 3); the truth minus `omega` (rad/s)
     attitude: Array | None  # shape (n, 4); rounded to binary64
     attitude_remainder: Array | None
     largest: float  # largest abs of any component of omega until the last time (rad/s)
     turns: float
-    # Largest norm of the derivative of a row by the state at any time before it; infinite beyond
+    # Largest norm of the state-transition matrix from any earlier time to a row; infinite beyond
     # 1e300. With the attitude the state has a small rotation too, and omega in units of `largest`.
     growth: float
     steps: int
 
     def at_the_end(self) -> "Truth":
-        """Return the last row alone."""
+        """Return the truth at the last time only."""
         found = replace(self, omega=self.omega[-1:], remainder=self.remainder[-1:])
         if self.attitude is None or self.attitude_remainder is None:
             return found
@@ -57,7 +57,7 @@ class Truth:
         return replace(found, attitude=attitude, attitude_remainder=remainder)
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of any component over the largest omega."""
+        """Return the largest error of any component of omega, relative to the largest omega."""
         return float(np.abs(omega - self.omega - self.remainder).max()) / self.largest
 
     def angle(self, attitude: Array) -> float:
@@ -65,7 +65,8 @@ class Truth:
         assert self.attitude is not None
         assert self.attitude_remainder is not None
         w, v = self.attitude[:, :1], self.attitude[:, 1:]
-        # Of attitude times the conjugate of the truth; the difference before the products.
+        # The vector part of attitude times the conjugate of the truth. The difference is taken
+        # before the products, so that no digits cancel.
         sign = np.sign(np.einsum("ij,ij->i", attitude, self.attitude))[:, None]
         difference = sign * attitude - self.attitude - self.attitude_remainder
         a, b = difference[:, :1], difference[:, 1:]
@@ -74,7 +75,7 @@ class Truth:
 
     @property
     def doubt(self) -> float:
-        """What the truth itself may be wrong by, over the largest omega."""
+        """The possible error of the truth itself, relative to the largest omega."""
         return DIGITS_LOST * self.growth
 
 
@@ -84,10 +85,10 @@ def truth_of(
     most_steps: int = MOST_STEPS,
     attitude: bool = False,
 ) -> Truth:
-    """Return the truth of a scene at `times` (s), in order away from 0 on one side.
+    """Return the truth of a scene at `times` (s), which have one sign and go away from 0.
 
-    Times are whole multiples of the unit in the last place of the last of them. InputError where
-    omega leaves every bound before, or more steps would be needed.
+    Times are whole multiples of the unit in the last place of the last of them. Raise InputError if
+    omega grows without bound before the last time, or if more than `most_steps` are needed.
     """
     until = np.atleast_1d(np.asarray(times, dtype=np.float64))
     unit = math.ulp(until[-1])
@@ -125,7 +126,7 @@ def truth_of(
 
 
 def _body(scene: Scene) -> list[float]:
-    """Return A, B, C in pairs, or the inertia matrix and its inverse."""
+    """Return A, B, C as pairs, or the inertia matrix and its inverse."""
     if scene.coefficients is not None:
         return _pairs_of(scene.coefficients)
     if scene.inertia is not None:
@@ -149,10 +150,10 @@ def _body(scene: Scene) -> list[float]:
 
 
 def _unit(values: Sequence[float]) -> list[float]:
-    """Return a quaternion over its length, in pairs."""
+    """Return the normalised quaternion as pairs."""
     exact = [Fraction(x) for x in values]
     square = sum(x * x for x in exact)
-    # The root to 40 digits, from whole numbers.
+    # The root to 40 digits, in integer arithmetic.
     scale = 10**40
     root = Fraction(math.isqrt(int(square * scale * scale)), scale)
     return _pairs([x / root for x in exact])
@@ -172,7 +173,7 @@ def _array(values: Sequence[float]) -> ctypes.Array[ctypes.c_double]:
 
 
 def compiler_here() -> bool:
-    """Whether there is a C compiler."""
+    """Return whether a C compiler is on the PATH."""
     return shutil.which(COMPILER) is not None
 
 
@@ -181,7 +182,7 @@ def _library() -> ctypes.CDLL:
     source = Path(__file__).with_name("pairs.c")
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "pairs.so"
-        # A sum contracted to a fused operation would lose what two-term sums are after.
+        # A fused multiply-add would lose the rounding errors that two-term sums recover.
         flags = ["-O3", "-march=native", "-ffp-contract=off", "-Wno-psabi", "-shared", "-fPIC"]
         command = [COMPILER, *flags, "-o", str(library), str(source), "-lm"]
         subprocess.run(command, check=True)

@@ -1,7 +1,7 @@
 """A campaign of random inputs: `python -m tests.fuzz --inputs 100000 --seed 1`.
 
-Every input is made from a seed, its kind and its number, and tried in a worker process, so that
-a crash or an endless loop is seen, counted and named like any other fault. One alone again:
+Every input is generated from a seed, its kind and its number. A worker process tries it, so that a
+crash or an endless loop is found, counted and named like any other fault. To repeat one input:
 `python -m tests.fuzz --seed 1 --kind method --number 123`.
 """
 
@@ -19,17 +19,17 @@ from random import Random
 
 from tests.fuzz.checks import KINDS, LONGEST, tried
 
-# Of a thousand inputs: cheap ones in great number, whole processes in small.
+# Of a thousand inputs: many cheap ones, and few whole processes.
 SHARES = {
     "scene-file": 350, "program": 200, "method": 10, "prepared": 180, "listing": 150,
     "command": 107, "process": 3,
 }  # fmt: skip
 _BLOCK = 250
-PATIENCE = 10.0 * LONGEST  # s, on a machine that may be busy with other things
+PATIENCE = 10.0 * LONGEST  # s, on a machine that may be busy with other work
 
 
 def main() -> int:
-    """Run the campaign, a block of it, or one input; 1 where there were faults."""
+    """Run the campaign, a block of it, or one input; return exit status 1 if there were faults."""
     parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--inputs", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=1)
@@ -50,12 +50,12 @@ def main() -> int:
 
 
 def made(kind: str, seed: int, number: int) -> object:
-    """Return an input: the same for the same kind, seed and number."""
+    """Return an input, which depends only on its kind, its seed and its number."""
     return KINDS[kind].make(Random(f"{kind} {seed} {number}"))
 
 
 def _work(kind: str, seed: int, begin: int, end: int) -> None:
-    """Try a block, and say on the pipe what is being tried and what was wrong."""
+    """Try a block of inputs; write the number of each, and its faults, to the pipe."""
     pipe = os.fdopen(os.dup(1), "w", buffering=1)
     with tempfile.TemporaryDirectory() as folder:
         for number in range(begin, end):
@@ -100,7 +100,7 @@ def _campaign(seed: int, inputs: int, only: str | None) -> int:
 
 
 def _watched(kind: str, seed: int, begin: int, end: int) -> tuple[int, list[str]]:
-    """Run a worker until it is done, dies or hangs; return where to go on, and the faults."""
+    """Run a worker until it ends, dies or hangs; return the next number, and the faults."""
     command = [sys.executable, "-m", "tests.fuzz", "--kind", kind, "--seed", str(seed)]
     worker = subprocess.Popen(
         [*command, "--number", str(begin), "--until", str(end)],

@@ -1,4 +1,4 @@
-"""What may come of a random input: each check tries one and raises AssertionError otherwise."""
+"""Checks of random inputs: each tries one input, and raises AssertionError if it finds a fault."""
 
 import contextlib
 import io
@@ -27,18 +27,18 @@ from pyharness.original.programs import PROGRAM_REGISTRY
 from tests.fuzz import strategies
 from tests.fuzz.command_lines import CommandLine, command_line, furnish
 
-LONGEST = 20.0  # s of processor time for one input: longer is taken for ever
+LONGEST = 20.0  # s of processor time for one input: a longer run counts as endless
 
 
 class Kind(NamedTuple):
-    """How an input is made of random numbers, and tried in a folder of its own."""
+    """A kind of input: how to generate it from random numbers, and how to try it in a folder."""
 
     make: Callable[[Random], Any]
     check: Callable[[Any, Path], None]
 
 
 def tried(kind: str, given: object, folder: Path) -> None:
-    """Try an input; AssertionError with what is wrong, and the input, where it is not right."""
+    """Try an input; raise AssertionError with the fault and the input if something is wrong."""
     begin = time.process_time()
     try:
         with warnings.catch_warnings():
@@ -139,7 +139,7 @@ def _listing(given: strategies.ListingInput, folder: Path) -> None:
 
 
 def _command(given: CommandLine, folder: Path) -> None:
-    """In this process: exit code, what is written where, and no exception."""
+    """Run a command in this process; judge its exit code and output, and allow no exception."""
     raw_out, raw_err = io.BytesIO(), io.BytesIO()
     out, err = (io.TextIOWrapper(each, "utf-8", newline="\n") for each in (raw_out, raw_err))
     with (
@@ -160,7 +160,7 @@ def _command(given: CommandLine, folder: Path) -> None:
 
 
 def _process(given: CommandLine, folder: Path) -> None:
-    """In a process of its own, as a user calls it, in one of several languages."""
+    """Run a command in its own process, as a user does, with one of several encodings."""
     command = [sys.executable, "-m", "pyharness"]
     arguments = [each.encode("utf-8", "surrogateescape") for each in given.arguments]
     encoding = ("utf-8", "ascii", "latin-1")[len(given.scene) % 3]
@@ -176,7 +176,7 @@ def _process(given: CommandLine, folder: Path) -> None:
 
 @contextlib.contextmanager
 def _judged(given: CommandLine, folder: Path) -> Iterator[list[Any]]:
-    """Furnish the folder; judge exit code, stdout and stderr that are put into the list."""
+    """Prepare the folder; judge the exit code, stdout and stderr that are put into the list."""
     furnish(folder, given.scene)
     before = _files(folder)
     found: list[Any] = []

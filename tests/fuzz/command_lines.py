@@ -1,4 +1,4 @@
-"""Random command lines: verbs and options as they are declared, values right, wrong and absurd."""
+"""Random command lines: declared verbs and options, with right, wrong and absurd values."""
 
 import os
 from collections.abc import Callable
@@ -14,11 +14,11 @@ from pyharness.methods.solver import PREPARED
 from pyharness.model.listing import PROGRAMS, names_of
 from tests.fuzz.strategies import mutated_word, number, scene_bytes, scene_text, tolerance
 
-# Verbs of which a valid command takes milliseconds. Any other, also one that is yet to come, gets
-# a mistake in every command line, and must find it.
+# Verbs of which a valid command takes milliseconds. Every command line of another verb, also of a
+# future one, gets a mistake, which the verb must report.
 QUICK_VERBS = ("run", "plan", "rotations", "defects", "doctor")
 
-# Files of every folder in which a command line is tried; what is not there is missing on purpose.
+# Files of every folder in which a command line is tried; the other paths are missing on purpose.
 GOOD, BAD, LONG_NAME = "good.toml", "bad.toml", "n" * 300
 _SPECIAL = (
     "", ".", "..", "folder", "missing/x", "\0", "a\0b", "-", "--", LONG_NAME, "\udcff.toml",
@@ -33,7 +33,7 @@ _NUMBERS = (
 
 @dataclass(frozen=True)
 class CommandLine:
-    """Arguments, the scene file that they may name, and whether they hold a sure mistake."""
+    """Arguments, the scene file that they may name, and whether they contain a certain mistake."""
 
     arguments: tuple[str, ...]
     scene: bytes
@@ -41,7 +41,7 @@ class CommandLine:
 
 
 def command_line(random: Random) -> CommandLine:
-    """Return a command line of a few options, most often of a verb that there is."""
+    """Return a command line with a few options, most often of an existing verb."""
     verb = random.choice(list(VERBS))
     if random.random() < 0.5:
         verb = random.choice(QUICK_VERBS)
@@ -64,15 +64,15 @@ def command_line(random: Random) -> CommandLine:
     mistaken = verb not in QUICK_VERBS
     if mistaken:
         arguments.append(random.choice(("--no-such-option", "--format=no-such-format")))
-    # A path of the machine's own is no place to write to by chance.
+    # Commands must not write by chance to other paths of the machine.
     harmless = [each for each in arguments if "/" not in each or each in _SPECIAL]
-    # Who asks for help gets it, whatever else is there.
+    # `--help` prints the help, whatever else is on the command line.
     mistaken = mistaken and harmless[-1] == arguments[-1] and "--help" not in harmless
     return CommandLine(tuple(harmless), content, mistaken)
 
 
 def furnish(folder: Path, content: bytes) -> None:
-    """Make the files that command lines name."""
+    """Create the files that command lines name."""
     (folder / GOOD).write_text("[body]\nmoments=[4,3,2]\n[initial]\nomega=[0,1,2]\n[run]\nsteps=3")
     (folder / BAD).write_bytes(content)
     if not (folder / "folder").exists():
@@ -82,7 +82,7 @@ def furnish(folder: Path, content: bytes) -> None:
 
 
 def _usual(random: Random, verb: str) -> list[str]:
-    """Return the options without which a verb has nothing to do."""
+    """Return the options that a verb needs to do anything."""
     usual = {
         "run": ["--scene", "--program"],
         "plan": ["--scene"],

@@ -1,7 +1,7 @@
-"""Random inputs of every kind, from one generator each: the test-suite and the campaign share them.
+"""Random inputs, by one generator for each kind, for the test suite and the campaign.
 
-A generator takes a `random.Random`: hypothesis hands in one that it can shrink, the campaign one
-that a seed and a number make again.
+A generator takes a `random.Random`. Hypothesis passes one that it can shrink; the campaign passes
+one that a seed and a number reproduce.
 """
 
 import math
@@ -52,7 +52,7 @@ def tame(random: Random) -> float:
 
 
 def number(random: Random, violence: float) -> float:
-    """Return a finite number, violent as often as `violence` says."""
+    """Return a finite number, violent with probability `violence`."""
     return violent(random) if random.random() < violence else tame(random)
 
 
@@ -71,7 +71,7 @@ def _waves(random: Random, violence: float) -> tuple[Wave, ...]:
 
 
 def scene(random: Random, most_steps: int = 12) -> Scene:
-    """Return a scene that is valid, tame or violent in part or altogether."""
+    """Return a valid scene, with numbers that are tame, partly violent or all violent."""
     while True:
         violence = random.choice((0.0, 0.1, 0.3, 1.0))
         law = TorqueLaw()
@@ -94,12 +94,12 @@ def scene(random: Random, most_steps: int = 12) -> Scene:
             continue
 
 
-# A run of a program, in both languages.
+# A run of a program in both languages.
 ProgramInput = Draw
 
 
 def program_input(random: Random) -> ProgramInput:
-    """Return a scene, any listing, and a stop test, most often more violent than those drawn."""
+    """Return a scene, any listing and a stop test, most often more violent than from `draw`."""
     drawn = draw("fuzz", random.randrange(10**6))
     if random.random() < 0.2:
         return drawn
@@ -149,7 +149,8 @@ def method_input(random: Random) -> MethodInput:
     rate = max(map(abs, found.euler_coefficients)) * max(map(abs, found.omega))
     longest = max(map(abs, wanted), default=0.0)
     if random.random() < 0.85 and 0.0 < rate * longest < float("inf"):
-        # Most often so short that no method gives up, which takes some of them ten seconds.
+        # Most often so short that no method exceeds its work limit, which takes some methods ten
+        # seconds.
         shrink = min(1.0, 10.0 ** random.uniform(-3.0, 3.0) / (rate * longest))
         wanted = tuple(t * shrink for t in wanted)
     found, attitude = _pointing(random, found)
@@ -157,7 +158,7 @@ def method_input(random: Random) -> MethodInput:
 
 
 def _pointing(random: Random, found: Scene) -> tuple[Scene, bool]:
-    """Return a scene that may point somewhere, with a torque in space too; and whether to ask."""
+    """Return the scene, perhaps with attitude or space torque, and whether to request attitudes."""
     if random.random() < 0.6:
         return found, False
     if random.random() < 0.5:
@@ -182,14 +183,14 @@ class PreparedInput:
 
 
 def prepared_input(random: Random) -> PreparedInput:
-    """Return a scene, any method that can be prepared, and what it is called with."""
+    """Return a scene, any method that can be prepared, and the arguments of its call."""
     found = scene(random)
     omega0 = found.omega if random.random() < 0.5 else _triple(random, 0.3)
     t_end = number(random, random.choice((0.0, 0.3, 1.0)))
     if random.random() < 0.05:
         odd = random.choice((float("nan"), float("inf"), -float("inf")))
         omega0, t_end = random.choice((((odd, 1.0, 2.0), t_end), (omega0, odd)))
-    # Sines of huge phases take ten times as long, and a build with every check five times that.
+    # Sines of huge phases take ten times as long, and in a build with every check 50 times.
     effort = random.choice((1e-6, 1e-3, 0.1))
     found, attitude = _pointing(random, found)
     method = random.choice(PREPARED)
@@ -198,7 +199,7 @@ def prepared_input(random: Random) -> PreparedInput:
 
 @dataclass(frozen=True)
 class ListingInput:
-    """What --program, --listing, --fix, --keep and --reading say."""
+    """Values of --program, --listing, --fix, --keep and --reading."""
 
     program: str
     base: str | None
@@ -231,7 +232,7 @@ def listing_input(random: Random) -> ListingInput:
 
 
 def mutated_word(random: Random, word: str) -> str:
-    """Return a word with a typing error, or another one; none has a path's separator."""
+    """Return a word with a typing error, or another one, never with a path separator."""
     kinds: tuple[Callable[[int], str], ...] = (
         lambda place: word[:place] + word[place + 1 :],
         lambda place: word[:place] + chr(random.choice((32, 0x2C, 0xFC, 27, 10, 0x2028))) + word,
@@ -292,7 +293,7 @@ _KEYS = (
 
 
 def scene_bytes(random: Random) -> bytes:
-    """Return a scene file with faults: in its values, its keys, its syntax, its bytes."""
+    """Return a scene file with faults in its values, its keys, its syntax or its bytes."""
     text = scene_text(random)
     for _ in range(random.choice((0, 1, 1, 1, 2, 4))):
         text = _mutated_text(random, text)

@@ -1,4 +1,4 @@
-"""Random input of every kind, and what it has found: no traceback, no hang, no crash."""
+"""Random input of every kind, and faults found by it: no traceback, no hang, no crash."""
 
 import math
 import os
@@ -35,7 +35,7 @@ BODY = "[body]\nmoments=[3,2,1]\n[initial]\nomega=[1,2,3]\n"
 def test_random_input_is_solved_or_refused_in_one_line(kind: str, tmp_path: Path) -> None:
     checks = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
-    # The same examples each time, so that what fails here fails again; the campaign varies.
+    # The same examples each time, so that a failure can be repeated; the campaign varies them.
     @settings(
         max_examples=EXAMPLES[kind], deadline=None, database=None, derandomize=True,
         suppress_health_check=checks,
@@ -79,7 +79,7 @@ def _not_a_number(scene: Scene, times: tuple[float, ...]) -> Trajectory:
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_fault_is_seen(fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every check fails where what it checks is wrong."""
+    """Every check fails if its subject is wrong."""
     kind, name, planted = FAULTS[fault]
     monkeypatch.setattr(name, planted)
     given_input = next(
@@ -96,7 +96,7 @@ def test_fault_is_seen(fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_worker_that_dies_or_hangs_is_a_fault_of_its_input(
     fault: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A campaign whose worker is replaced by one that does not come back."""
+    """Replace the campaign's worker by one that does not return."""
     worker = tmp_path / "python"
     code = f"import os, time; print('at 7', flush=True); {fault}"
     worker.write_text(f'#!/bin/sh\nexec {sys.executable} -c "{code}"\n')
@@ -110,12 +110,12 @@ def test_worker_that_dies_or_hangs_is_a_fault_of_its_input(
     assert words in faults[0]
 
 
-# What the campaign, or the reading before it, found.
+# Faults found by the campaign, or by reading the code before it.
 
 
 @pytest.mark.parametrize("steps", ["1" + "0" * 400, "0x" + "F" * 5000])
 def test_number_of_steps_beyond_every_float(steps: str, tmp_path: Path) -> None:
-    """OverflowError, and ValueError where Python would not write so many digits."""
+    """Regression test: OverflowError, and ValueError where Python would not write so many digits."""
     (tmp_path / "scene.toml").write_text(BODY + f"[run]\nsteps={steps}\n")
     with pytest.raises(InputError, match="a number of more than 18 digits"):
         read_scene(tmp_path / "scene.toml")
@@ -124,7 +124,7 @@ def test_number_of_steps_beyond_every_float(steps: str, tmp_path: Path) -> None:
 
 
 def test_message_is_one_line_that_a_terminal_can_show() -> None:
-    """Names with line feeds, escapes and 4000 letters were given back as they were."""
+    """Names with line feeds, escapes and 4000 letters were printed unchanged."""
     assert str(InputError("a\nb\x1b[1m\udcff")) == "a b\\x1b[1m\\udcff"
     assert len(str(InputError("where: " + "x" * 5000 + "; allowed: y"))) < 1000
     assert str(InputError("x" * 5000 + "; allowed: y")).endswith("; allowed: y")
@@ -134,7 +134,7 @@ def test_message_is_one_line_that_a_terminal_can_show() -> None:
 def test_pipe_without_another_end_is_not_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Both hung: a scene from a pipe that no one writes, a result to one that no one reads."""
+    """Both hung: a scene from a pipe that nobody writes, and a result to one that nobody reads."""
     monkeypatch.setattr("pyharness.model.pipes.PATIENCE", 0.05)
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -152,7 +152,7 @@ def test_scene_comes_through_a_pipe() -> None:
 
 
 def test_name_that_the_terminal_or_the_picture_can_not_write(tmp_path: Path) -> None:
-    """UnicodeEncodeError; and a name with dollars was read as a formula by the picture."""
+    """Regression test: UnicodeEncodeError; the picture read a name with dollars as a formula."""
     path = tmp_path / "\udcff ü.toml"
     path.write_text(BODY + "[run]\nsteps=3\n")
     command = [sys.executable, "-m", "pyharness", "run", "--program", "two-term", "--scene"]
@@ -169,7 +169,7 @@ def test_name_that_the_terminal_or_the_picture_can_not_write(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("method", PREPARED)
 def test_start_that_is_not_finite_is_not_complete(method: str) -> None:
-    """At time 0 it came back as it was, and the status was `complete`."""
+    """Regression test: the start was returned unchanged at time 0, with the status `complete`."""
     law = TorqueLaw() if method == "closed-form" else TorqueLaw((0.0, 0.0, 1.0))
     solver = prepare(Scene("", (1.0, 2.0, 3.0), moments=(0.5, 0.7, 1.0), torque=law), method, 1e-3)
     for start in (math.nan, math.inf):
@@ -178,7 +178,7 @@ def test_start_that_is_not_finite_is_not_complete(method: str) -> None:
 
 
 def test_many_steps_are_given_up_before_they_are_taken() -> None:
-    """A minute and more: the limits did not know what a wave costs."""
+    """Regression test: a minute and more, because the limits ignored the cost of a wave."""
     law = TorqueLaw(sines=[((1.0, 2.0, 3.0), 17.0 + 0.01 * n) for n in range(40)])
     scene = Scene("", (1.0, 2.0, 3.0), moments=(4.0, 3.0, 2.0), torque=law, step_size=1e-6)
     for method in ("rk4", "improved-euler", "gauss-2"):
@@ -207,23 +207,23 @@ LONG = Scene("", (0.01, 7.0, -9.7), (9.85, 2.99, 1800.0))
 @pytest.mark.parametrize(
     ("scene", "times", "method", "tolerance", "end"),
     [
-        # ValueError: the largest of no rows.
+        # ValueError: the maximum of no rows.
         *((RUNAWAY, [2.0, 3.0], f"gauss-{stages}", 1e-6, "overflow") for stages in (1, 3, 5)),
-        # Too far for it, and no blow-up; it told of infinity.
+        # The time is too long for the method, and there is no blow-up; it reported one.
         (GROWING, [3000.0], "gauss-1", 1e-2, "gave up"),
         # ZeroDivisionError: no step is small enough.
         (BEYOND, [0.0], "gauss-1", 1e-6, "complete"),
         (BEYOND, [1.0], "gauss-1", 1e-6, "gave up"),
-        # A row on the way was not finite.
+        # An intermediate row was not finite.
         (STEEP, [-0.0, -10.0], "taylor", 1e-10, "overflow"),
         # Radau: ValueError from a matrix of infinities; LSODA: a warning on stderr.
         (PUSHED, [0.09], "radau", 1e-7, "complete"),
         (PUSHED, [1e200], "radau", 1e-7, "overflow"),
         (RAMPED, [-0.48, -2353.0], "lsoda", 5e-7, "overflow"),
-        # NumPy warned of an overflow, on stderr.
+        # NumPy printed a warning of an overflow on stderr.
         (LIGHT, [1.0], "gauss-4", 1e-12, "not finite"),
         (LIGHT, [1.0], "taylor", 1e-12, "not finite"),
-        # Minutes; whoever asks `pyharness.truth.reference` may wait as long.
+        # It took minutes; callers of `pyharness.truth.reference` may still wait as long.
         (LONG, [1000.0], "reference", 1e-10, "more than 20000 Taylor steps"),
     ],
 )
@@ -247,7 +247,7 @@ def test_extreme_motion_ends_in_time_and_says_how(
 
 
 def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A right-hand side of Radau costs more than that of the others: half a minute and more."""
+    """Regression test: Radau took half a minute and more, since its right-hand sides cost more."""
     monkeypatch.setattr("pyharness.methods.scipy_ivp._MOST_EVALUATIONS", 3_000)
     waves = [((1.0, 2.0, 3.0), 1e4 + n) for n in range(8)]
     for law, method, most in (
@@ -261,7 +261,7 @@ def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_limits_of_a_scene_that_its_solver_can_not_begin() -> None:
-    """AttributeError: no rows are a list, not an array."""
+    """Regression test: AttributeError, because no rows are a list, not an array."""
     coefficients = (1.1e-16, 1.1e-16, 4.4e17)
     scene = Scene("", (0.005, -5.0, -1.6), coefficients=coefficients, step_size=0.6, steps=4)
     assert limit("two-term", scene, 1).order is None

@@ -39,7 +39,7 @@ def test_every_entry_is_complete() -> None:
 
 
 def test_effects_show_what_each_entry_says() -> None:
-    """Alone corrected and alone kept, in the case that shows it best."""
+    """Compare an entry that is alone corrected or alone kept, in the case that shows it best."""
 
     def at(name: str, case: int) -> CaseEffects:
         (first, *_) = (each for each in effects_of(name) if each.case == case)
@@ -59,17 +59,17 @@ def test_lattice_is_whole_and_sorted() -> None:
     scene = case_scene(2)
     found = lattice(scene, "runge-kutta")
     assert len({each.listing.defects for each in found}) == 64
-    # Of a torque that varies the conjecture counts too.
+    # With a torque that varies, the conjecture counts too.
     assert len(lattice(case_scene(7), "four-term")) == 8
     sizes = [float(f"{each.omega:.2e}") for each in found]
     assert sizes == sorted(sizes, reverse=True)
-    # Without the stop test's defects the run goes on and shows its whole error.
+    # Without the stop test's defects the run continues and shows its whole error.
     bases = {"stage-base", "base-not-restored"}
     assert found[0].listing.defects >= bases
     assert found[0].steps == 100
     best = [each for each in found if each.steps == 100][-1]
     assert not best.listing.defects & bases
-    # What stops at step 25 has the defects that make it.
+    # Runs that stop at step 25 have the defects that cause the stop.
     stopped = [each.listing.defects for each in found if each.stop and each.steps == 25]
     needed = {*bases, "lipschitz-tests-velocity", "lipschitz-per-component"}
     assert needed <= frozenset.intersection(*stopped)

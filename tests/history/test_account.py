@@ -165,19 +165,21 @@ def test_findings_have_the_numbers_of_the_claims() -> None:
     ratios = outcome(claim("vi-superior"), Laboratory(False)).numbers
     shares = [x for name, x in ratios.items() if name.startswith("case ")]
     told = f"Runge-Kutta is {min(shares):.0f} to {max(shares):,.0f} times more accurate"
-    assert told in _document("docs/findings.md")
+    assert told in _document("docs/explanation/findings.md")
     errors = outcome(claim("iv2-computer-error"), Laboratory(False)).numbers
     ours = max(x for name, x in errors.items() if "rounding error" in name)
     apart = max(x for name, x in errors.items() if "apart from binary64" in name)
-    assert f"their error is at most {ours:.0e} rad/s" in _document("docs/findings.md")
-    assert f"differ from ours by at most {apart:.0e} rad/s" in _document("docs/findings.md")
+    assert f"their error is at most {ours:.0e} rad/s" in _document("docs/explanation/findings.md")
+    assert f"differ from ours by at most {apart:.0e} rad/s" in _document(
+        "docs/explanation/findings.md"
+    )
     run = run_program(case_scene(2), original("runge-kutta"))
     away = np.abs(run.omega[:, 0] - 2.0 * np.sin(2.5 * run.time)).max()
-    assert f"its omega1 is within {away:.4f} rad/s" in _document("docs/findings.md")
+    assert f"its omega1 is within {away:.4f} rad/s" in _document("docs/explanation/findings.md")
 
 
 def test_reconstruction_names_the_entries_of_each_certainty() -> None:
-    text = (ROOT / "docs/reconstruction.md").read_text()
+    text = (ROOT / "docs/explanation/reconstruction.md").read_text()
     listed = text.partition("## What is certain")[2].partition("## Known issues")[0]
     known = {each["id"]: each["certainty"] for each in entries()}
     for certainty in ("probable", "conjecture", "undecidable"):
@@ -207,9 +209,9 @@ def test_the_machine_is_inferred_wherever_it_is_named(path: Path) -> None:
 
 
 def test_emulated_words_are_told_of_where_they_are_had() -> None:
-    assert "--word cdc48" in _document("docs/reconstruction.md")
+    assert "--word cdc48" in _document("docs/explanation/reconstruction.md")
     assert entry("dialect-cdc")["certainty"] == "probable"
-    assert (shipped("docs") / "words.md").exists()
+    assert (shipped("docs") / "explanation/words.md").exists()
 
 
 def test_numbers_of_readme_home_page_and_reconstruction_are_those_of_runs_and_cards() -> None:
@@ -222,11 +224,11 @@ def test_numbers_of_readme_home_page_and_reconstruction_are_those_of_runs_and_ca
     errors = [np.abs(r.omega - truth[: r.steps]).max(axis=0) for r in (printed, mended)]
     assert 0.5e6 < (errors[0] / errors[1]).min() < (errors[0] / errors[1]).max() < 2e6
     told = _document("README.md")
-    assert f"stops at step {printed.stop.step} because a translational *velocity*" in told
+    assert f"stops at step {printed.stop.step} because of a translational *velocity*" in told
     assert printed.stop.variable.startswith("V")
-    assert "with errors a million times those of the sixth" in told
+    assert "errors are a million times those of the corrected program" in told
     home = _document("pyharness/edition/templates/index.html")
-    for name in (told, home):
-        assert f"after {MECHANISM['stopped']['step']} steps" in name
+    for text in (told, home):
+        assert f"after {MECHANISM['stopped']['step']} steps" in text
     cards = sum(len(deck(each).cards) for each in PROGRAMS)
-    assert f"one row for each of {cards} cards" in _document("docs/reconstruction.md")
+    assert f"one row for each of {cards} cards" in _document("docs/explanation/reconstruction.md")

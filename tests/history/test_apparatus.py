@@ -1,4 +1,4 @@
-"""What the apparatus says of the programs is so, entry by entry."""
+"""Statements of the apparatus about the programs, checked entry by entry."""
 
 import re
 from dataclasses import replace
@@ -106,7 +106,7 @@ def test_what_is_redundant_or_unread_is_so_on_the_cards() -> None:
 
 
 def test_a_normalization_needs_no_emendation() -> None:
-    """As the scan has them both decks set, divide and print one name: nothing is unset."""
+    """In the scan both decks set, divide and print variables of one name, so that none is unset."""
     named = [c for c in chosen(()) if any(d.entry == "torque-names" for d in c.differences)]
     assert len(named) == 14
     for card in named:

@@ -1,4 +1,4 @@
-"""The atlas of history: a coarse one is made and told, and its parts are what they are called."""
+"""The atlas of history: a coarse version is computed and described, its parts have their names."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ from tests.conftest import Printed
 
 pytestmark = pytest.mark.claims
 ATLAS = Path(__file__).parents[2] / "docs" / "atlas"
-# Of 24 starts: reproduced, in part, not.
+# Counts of 24 starts: reproduced, in part, not reproduced.
 COARSE = {
     "v2-case-1-agree": (24, 0, 0),
     "v2-case-3-concur": (8, 8, 8),
@@ -61,7 +61,7 @@ def test_a_coarse_atlas_has_the_shares_that_were_seen(coarse: str, printed: Prin
 
 
 def _stored() -> dict[str, dict[float, float]]:
-    """Return the mean points beside the picture, by claim and magnitude."""
+    """Return the mean points stored beside the picture, by claim and magnitude."""
     found: dict[str, dict[float, float]] = {}
     for row in csv.DictReader((ATLAS / "history.csv").read_text().splitlines()):
         of_claim = found.setdefault(row["claim"], {})
@@ -81,14 +81,14 @@ def test_numbers_of_the_page_are_those_beside_its_picture() -> None:
 
 
 def test_a_chunk_of_the_atlas_has_the_stored_means() -> None:
-    """The directions of one magnitude, as adopted, over 100 steps."""
+    """Compute the directions of one magnitude, with the adopted assumptions, over 100 steps."""
     sweep = read_sweep(ATLAS / "history.toml", FUNCTIONS)
     magnitude = 10
     chunks = [solve_chunk(sweep, 2 * magnitude + half) for half in (0, 1)]
     for name, means in _stored().items():
         codes = np.concatenate([each[f"claim-{name}"] for each in chunks], axis=3)
         assert codes.shape == (1, 1, 1, 48, 96)
-        # A few verdicts may lie so near to a threshold that another processor turns them.
+        # A few verdicts may be so near to a threshold that another processor changes them.
         told = list(means.values())[magnitude]
         assert sum_of_points([codes]).mean() == pytest.approx(told, abs=1e-3)
 

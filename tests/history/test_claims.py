@@ -151,14 +151,13 @@ def test_kinds_are_counted_apart_and_judged_as_what_they_are(
     assert theory.by_sources(Laboratory(True), holds=True).verdict == REPRODUCED
 
 
-def test_counts_by_kind_are_in_the_readme_in_findings_and_on_the_home_page(
+def test_counts_by_kind_are_in_findings_and_on_the_home_page(
     judged: dict[str, Judgement], built_site: dict[str, bytes]
 ) -> None:
     table = kinds_table([*judged.values()])
     alone = Report("claims", [[table]], dict, page=[[table]])
-    assert render(alone, "markdown").strip() in (ROOT / "README.md").read_text()
     lines = render(alone, "table").strip()
-    assert lines in (ROOT / "docs/findings.md").read_text()
+    assert lines in (ROOT / "docs/explanation/findings.md").read_text()
     home = built_site["index.html"].decode()
     assert html.table(table, "verdicts by kind of claim") in home
     results = next(row for row in table.rows if row[0] == "result")

@@ -1,4 +1,4 @@
-"""Evidence: every combination is scored by the stated rule, and nothing else."""
+"""Evidence: every combination is scored by the stated rule, and by nothing else."""
 
 import json
 from typing import Any
@@ -47,7 +47,7 @@ def test_what_discriminates_and_what_remains() -> None:
 
 @pytest.mark.parametrize("identity", ["v2-case-3-concur", "v2-case-7-concur", "v2-case-2-stopped"])
 def test_verdict_of_a_combination_is_that_of_its_laboratory(identity: str) -> None:
-    """Though only what a claim hangs on is looked at."""
+    """The evidence computes only what the claim depends on, and still has the same verdict."""
     every = {each.assumptions: each.verdicts[identity] for each in evidence()}
     assert len(every) == len(combinations()) == 4 * 4 * 4 * 2
     for assumptions in list(every)[::17]:
@@ -66,7 +66,7 @@ def test_evidence_is_told(printed: Printed) -> None:
 
 
 def test_what_the_report_says_of_each_choice() -> None:
-    """docs/findings.md: what each choice does to the score, all others kept."""
+    """Compare docs/explanation/findings.md: each choice changes the score, with all others kept."""
     found = list(evidence())
     steps, held, last, c1 = (
         _effects(found, axis)

@@ -1,4 +1,4 @@
-"""The weighted residual family: its members, their orders, and what the thesis says of them."""
+"""The weighted residual family: its members, their orders, and statements of the thesis on them."""
 
 import itertools
 import json
@@ -24,11 +24,11 @@ from pyharness.truth.reference import reference
 
 Capture = pytest.CaptureFixture[str]
 
-PAGE = (Path(__file__).parent.parent.parent / "docs" / "family.md").read_text()
+PAGE = (Path(__file__).parent.parent.parent / "docs/explanation/family.md").read_text()
 GROWING = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))  # 1 / (1 - t)
 
-# A step rounds by some ten units in the last place of the largest omega, the motions of the cases
-# amplify it less than tenfold: 100 steps stay below 100 * 10 * 10 * 1.1e-16.
+# A step rounds by some ten units in the last place of the largest omega. The motions of the cases
+# amplify this less than tenfold, so that 100 steps stay below 100 * 10 * 10 * 1.1e-16.
 ROUNDING = 1.1e-12
 
 
@@ -45,7 +45,7 @@ def test_mended_programs_are_members(program: str, terms: int, case: int) -> Non
         assert getattr(found, name) == getattr(wanted, name)
 
 
-# Special scenes (no products, nearly linear, quick torque) may do better.
+# Special scenes (no products, nearly linear, quick torque) may have a higher order.
 ORDERS = {
     1: "0 of 200 orders within 0.25 of those derived; 200 not measurable",
     3: " above (in this scene the term that",
@@ -59,14 +59,14 @@ ORDERS = {
 def test_orders_are_those_derived_or_better(case: int, capsys: Capture) -> None:
     assert main(["family", "--case", str(case)]) == 0
     captured = capsys.readouterr()
-    assert captured.err.count("\n") == (case == 6)  # no rigid body has its moments
+    assert captured.err.count("\n") == (case == 6)  # no rigid body has the moments of Case 6
     assert ORDERS[case] in captured.out
     assert max(map(len, captured.out.splitlines())) <= 100
     assert captured.out.count("\ncollocation ") == 20
 
 
 def test_derived_orders() -> None:
-    """For n = 1 ... 5, after as many corrections as it takes; docs/family.md states the same."""
+    """Orders for n = 1 ... 5, after as many corrections as necessary; family.md states the same."""
     wanted = {
         ("collocation", "thesis"): [2, 2, 4, 4, 6],
         ("collocation", "gauss"): [2, 4, 6, 8, 10],
@@ -110,8 +110,8 @@ def test_long_and_short_scenes_have_orders_too(changes: dict[str, Any]) -> None:
 def _conditions(member: Member, h: float, columns: int) -> Array:
     """Return the weighted integrals of j t**(j-1), j = 1 ... columns, over a step of length h.
 
-    In powers of t in seconds, as one would punch them: the first n columns are the matrix of the
-    c's; eq. 36a is that of collocation.
+    Powers are of t in seconds, as one would punch them. The first n columns are the matrix of the
+    c's; eq. 36a is this matrix for collocation.
     """
     n = member.terms
     i, j = np.arange(1.0, n + 1)[:, None], np.arange(1.0, columns + 1)[None, :]
@@ -127,10 +127,11 @@ def _conditions(member: Member, h: float, columns: int) -> Array:
 def _multiplied_out(scene: Scene, member: Member, precision: type[np.floating]) -> Array:
     """Run one correction under constant torque as IV.2 describes it, in 53 bits or in 24.
 
-    Products of trial functions are written out and integrated term by term, and the c's solved for.
+    Products of trial functions are written out and integrated term by term, and the system is
+    solved for the c's.
     """
     n, h = member.terms, scene.step_size
-    # The conditions of the c's, of products, whose powers go up to 2n, and of the constant.
+    # The conditions of the c's, of the products, whose powers go up to 2n, and of the constant.
     moments = _conditions(member, float(precision(h)), 2 * n + 1).astype(precision)
     matrix = moments[:, :n]
     moments = moments / np.arange(1, 2 * n + 2).astype(precision)
@@ -154,7 +155,7 @@ def _multiplied_out(scene: Scene, member: Member, precision: type[np.floating]) 
 @pytest.mark.parametrize("terms", range(1, 6))
 @pytest.mark.parametrize("weighting", WEIGHTINGS)
 def test_tableau_solves_the_conditions_of_the_thesis(weighting: str, terms: int) -> None:
-    """Against eq. 23-26 in powers of t, which share no code with it, for f = s**j."""
+    """Compare with eq. 23-26 in powers of t, which share no code with the tableau, for f = s**j."""
     member = Member(weighting, terms)
     matrix = _conditions(member, 1.0, terms)
     moments = _conditions(member, 1.0, 2 * terms + 1)
@@ -177,7 +178,7 @@ def test_no_correction_is_eulers_method() -> None:
 
 
 def test_torque_is_taken_at_true_times() -> None:
-    """Twice Gauss's order is reached under torques that turn by one radian a step."""
+    """Gauss's order 2n is reached under torques whose phase advances by one radian a step."""
     scene = case_scene(7)
     members = Member("collocation", 5, "gauss", 8), Member("least-squares", 5, None, 8)
     assert np.abs(march(scene, members) - reference(scene, scene.times()).omega).max() < 1e-14
@@ -202,7 +203,7 @@ def test_side_by_side_is_as_alone() -> None:
 @pytest.mark.claims
 @pytest.mark.parametrize("case", range(1, 7))
 def test_three_four_and_five_terms_are_one_method_after_one_correction(case: int) -> None:
-    """Under constant torque f is a parabola after one estimate, which three terms can follow."""
+    """Under constant torque f is a parabola after one estimate, which three terms can represent."""
     omega = march(case_scene(case), family_members(terms=(3, 4, 5), corrections=(1,)))
     assert np.ptp(omega, axis=0).max() < ROUNDING * np.abs(omega).max()
 
@@ -234,7 +235,7 @@ def test_singularity_test_fires_only_for_five_terms_at_small_steps() -> None:
 
 @pytest.mark.claims
 def test_numbers_of_the_page_are_current() -> None:
-    """Those of rounding (below 1e-12) may differ by machine, and are not compared."""
+    """Numbers of rounding (below 1e-12) may differ by machine, and are not compared."""
     for case, corrections in itertools.product((5, 6), (1, 8)):
         scene = case_scene(case)
         members = [Member("collocation", n, None, corrections) for n in (2, 3, 4, 5)]
@@ -290,7 +291,7 @@ def test_mistake_is_one_line(arguments: list[str], words: str, capsys: Capture) 
 
 
 def test_solution_that_leaves_every_bound_is_refused() -> None:
-    with pytest.raises(InputError, match=r"leaves every bound after 0\.9"):
+    with pytest.raises(InputError, match=r"grows without bound after 0\.9"):
         order_table(replace(GROWING, step_size=0.3, steps=4))
 
 

@@ -23,19 +23,19 @@ from pyharness.views.pictures import saved
 
 Capture = pytest.CaptureFixture[str]
 STEMS = ["06", "07", "08", "09", "10a", "10b", "11", "12"]
-RUNGE_KUTTA = (100, 25, 24, 23)  # where it stopped
+RUNGE_KUTTA = (100, 25, 24, 23)  # the steps at which it stopped
 ALL = [f"figure-{stem}{part}" for part in ("", "-corrected") for stem in STEMS]
 
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, FigureFinding]:
-    """All figures by their stems, computed once; nothing is drawn."""
+    """Return all figures by their stems, computed once; nothing is drawn."""
     return {each.plan.stem: each for each in figures.findings()}
 
 
 @pytest.fixture
 def fast(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw nothing: for the tests of what is written where."""
+    """Draw nothing, for tests of which files are written."""
     monkeypatch.setattr(figures, "figure_picture", lambda finding: finding)
     monkeypatch.setattr(
         pictures, "saved", lambda finding, *paths: dict.fromkeys(finding.plan.files, b"x")
@@ -43,7 +43,7 @@ def fast(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _rows(finding: FigureFinding, curve: str) -> np.ndarray:
-    """Return time and omega of a curve, as its table has them."""
+    """Return time and omega of a curve from its table."""
     table = curve_numbers(finding).rows
     return np.array([[row[2], *row[4:]] for row in table if row[0] == curve], dtype=float)
 
@@ -110,7 +110,7 @@ def test_numbers_are_those_of_the_trajectories(found: dict[str, FigureFinding]) 
 
 
 def test_lines_are_drawn_to_their_end_which_is_marked(found: dict[str, FigureFinding]) -> None:
-    """What matplotlib is given: the curve's own points, a cross at the last one, the label."""
+    """Check what matplotlib receives: the curve's points, a cross at the last one, the label."""
     run = compiled.run(case_scene(2), original("runge-kutta"))
     for row, axes in enumerate(figures.figure_picture(found["figure-07"]).figure.axes):
         (stopped,) = (each for each in axes.lines if "runge-kutta (" in str(each.get_label()))
@@ -119,7 +119,7 @@ def test_lines_are_drawn_to_their_end_which_is_marked(found: dict[str, FigureFin
         np.testing.assert_array_equal(stopped.get_data(), curve)
         np.testing.assert_array_equal(cross.get_data(), [run.time[-1:], run.omega[-1:, row]])
         assert stopped.get_label() == "runge-kutta (stopped at step 25 by V2)"
-        # Without colour: no two lines share marker and width.
+        # The lines differ without colour: no two share marker and width.
         looks = {(each.get_marker(), each.get_linewidth()) for each in axes.lines}
         assert len(looks) == len(axes.lines) == 6
 
@@ -130,7 +130,7 @@ def test_limit_of_figure_7_is_twice_a_slow_sine(found: dict[str, FigureFinding])
 
 
 def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding]) -> None:
-    """The two-term program of Case 6 original, to 1e111, beside curves that stay legible."""
+    """The two-term program of Case 6 original reaches 1e111; the other curves stay legible."""
     finding = found["figure-11"]
     wild = Curve(original("two-term"), compiled.run(finding.scene, original("two-term")))
     assert np.abs(wild.trajectory.omega).max() > 1e100

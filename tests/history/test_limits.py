@@ -1,4 +1,4 @@
-"""What the listings compute: each comes near its own limit, and stays away from the truth."""
+"""Limits of the listings: each program approaches its own limit, and stays away from the truth."""
 
 import json
 import math
@@ -15,7 +15,7 @@ from pyharness.original import compiled
 
 
 def _tends_elsewhere(found: Limit) -> bool:
-    """Whether the program comes near its limit while its distance from the truth stays."""
+    """Whether the program approaches its limit while its distance from the truth stays."""
     first, last = found.halvings[0], found.halvings[-1]
     return last.from_limit < first.from_limit / 8.0 and last.from_truth > first.from_truth / 2.0
 
@@ -39,7 +39,7 @@ def test_four_term_tends_to_the_truth(case: int) -> None:
 
 
 def test_runge_kutta_in_case_2_is_twice_a_slow_sine() -> None:
-    """2 y(t/2) - y(0) = (2 sin 2.5 t, 2 cos 2.5 t - 1, 10): beyond the sine, as V.2 saw."""
+    """2 y(t/2) - y(0) = (2 sin 2.5 t, 2 cos 2.5 t - 1, 10) exceeds the sine, as V.2 saw."""
     scene = replace(case_scene(2), step_size=1e-4, steps=10_000)
     run = compiled.run(scene, original("runge-kutta"), may_stop=False)
     t = run.time
@@ -48,14 +48,14 @@ def test_runge_kutta_in_case_2_is_twice_a_slow_sine() -> None:
 
 
 def test_two_term_in_case_6_follows_its_limit_into_the_blow_up() -> None:
-    """The limit equation leaves every bound before t = 1; before that the program follows it."""
+    """The solution of the limit equation grows without bound before t = 1; the program follows it."""
     assert _tends_elsewhere(limit("two-term", replace(case_scene(6), steps=30)))
     found = limit("two-term", case_scene(6), 2)
     assert math.isinf(found.halvings[0].from_limit)
     coarse = limit("two-term", replace(case_scene(6), step_size=0.07, steps=14), 2)
     for each in (found, coarse):
         assert each.blow_up == pytest.approx(0.4929, abs=1e-4)
-        assert "leaves every bound at t = 0.493 s" in each.approach
+        assert "grows without bound at t = 0.493 s" in each.approach
 
 
 @pytest.mark.parametrize("program", ["two-term", "four-term"])
@@ -68,7 +68,7 @@ def test_collocation_in_case_7_tends_to_nothing(program: str) -> None:
 
 
 def test_defects_that_the_known_solutions_hide() -> None:
-    """Cases 1 and 2 could not have shown the two-term program's defects, nor one of the third's."""
+    """Cases 1 and 2 can't show the two-term program's defects, or one of the third program's."""
     assert invisible(case_scene(2)) == {
         "two-term": ("dt-accumulates", "x3-reads-acl2", "three-masses"),
         "four-term": ("dt-accumulates", "three-masses"),
@@ -77,7 +77,7 @@ def test_defects_that_the_known_solutions_hide() -> None:
     hidden = invisible(case_scene(1))
     assert hidden["two-term"] == ("dt-accumulates", "x3-reads-acl2", "three-masses")
     assert "stage-base" not in hidden["runge-kutta"]
-    for case in (3, 4, 5, 6):  # four terms follow f from anywhere, two do not
+    for case in (3, 4, 5, 6):  # four terms represent f at any points, two do not
         hidden = invisible(case_scene(case))
         assert "dt-accumulates" in hidden["four-term"]
         assert "dt-accumulates" not in hidden["two-term"]

@@ -1,4 +1,4 @@
-"""A printed page held against the pages of every word; the pages that the project ships."""
+"""A printed page, compared with the pages of every machine word; the pages that we ship."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def printed(folder: Path, program: str, case: int, word: str, *, mended: bool = 
     scene = case_scene(case)
     run = run_program(scene, listing, "python", word=word)
     path = folder / "page.txt"
-    # As a printer has it: a banner, carriage control, a dayfile.
+    # As a printer prints it: with a banner, carriage control and a dayfile.
     text = page(scene, program, run)
     path.write_text("1JACOBS\n\n" + text.replace("\n", "  \n") + "\n 12.30.07.LGO.\n")
     return str(path)

@@ -24,7 +24,7 @@ def test_without_a_mistake_they_work(found: dict[str, Ranked]) -> None:
 
 
 def test_mistake_in_the_products_cannot_fail_case_1(found: dict[str, Ranked]) -> None:
-    """There A, B and C are 0, and all products with them."""
+    """In Case 1, A, B and C are 0, and so are all products with them."""
     assert case_scene(1).euler_coefficients == (0.0, 0.0, 0.0)
     for attempt in found["base-left-out"].attempts:
         assert attempt.failed == (2,)
@@ -44,7 +44,7 @@ def test_symmetric_matrix_does_not_mind_being_transposed() -> None:
 
 
 def test_rounding_of_the_machine_makes_none_of_them_fail() -> None:
-    """In 24 bits the error is what such a word has; the CDC's is far below what was printed."""
+    """In 24 bits the error has the size of their rounding; on the CDC it is far below the print."""
     for weighting in WEIGHTINGS:
         for case in CASES:
             floats = march(case_scene(case), weighting)
@@ -58,7 +58,7 @@ def test_rounding_of_the_machine_makes_none_of_them_fail() -> None:
 
 
 def test_mistakes_fail_in_a_word_where_they_fail() -> None:
-    """One case is enough: what a mistake does is no matter of rounding."""
+    """One case is enough, because the effect of a mistake does not depend on rounding."""
     scene = scene_in(replace(case_scene(2), steps=20), WORDS["cdc48"])
     floats = replace(case_scene(2), steps=20)
     for mistake in ("matrix-used-up", "base-left-out", "unscaled-solver", "unit-interval"):

@@ -1,4 +1,4 @@
-"""Claims over many starts have the verdicts of the ledger, start by start."""
+"""Claims over many starts: their verdicts are those of the ledger, start by start."""
 
 from dataclasses import replace
 from typing import Any
@@ -34,7 +34,7 @@ STARTS = [*starts(), *_random(20)]
 def _solved(
     omega0: list[Triple] | Array, listing: Listing | None, steps: int = 100, **more: Any
 ) -> Batch:
-    """Return what a sweep hands over."""
+    """Return a batch as a sweep passes it to a claim."""
     scene = replace(case_scene(4), steps=steps)
     starts = {"omega0": np.array(omega0)}
     batch = Batch(scene, Solver(), listing, np.full(len(omega0), 1.0), starts)
@@ -42,7 +42,7 @@ def _solved(
 
 
 def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[int]:
-    """Return the ledger's verdicts."""
+    """Return the codes of the ledger's verdicts."""
     found = []
     for start in omega0:
         one = replace(laboratory, assumptions=replace(laboratory.assumptions, start=start))
@@ -68,7 +68,7 @@ def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
 
 @pytest.mark.parametrize("identity", [each for each in JUDGED if each.startswith("v2")])
 def test_verdicts_are_those_of_the_ledger_elsewhere(identity: str) -> None:
-    """Corrected, with another reading, over more steps; a few starts of each."""
+    """Test corrected programs and other readings, with a few starts of each."""
     few = STARTS[:6]
     for program, reading in (("runge-kutta", "do-variable"), ("two-term", "c1-for-c")):
         listing = subset(program, "original", readings=[reading])

@@ -1,4 +1,4 @@
-"""The thesis sentence by sentence: none is forgotten, each is judged or says why not, all run."""
+"""Sentences of the thesis: none is missing, each is judged or says why not, all commands run."""
 
 import re
 import shlex
@@ -23,7 +23,7 @@ KEYS = {
 
 
 def _lies_in(sentence: Sentence, place: str) -> bool:
-    """Whether a sentence lies in a place of claims.toml, such as `V.3 and VI`."""
+    """Whether a sentence is in a place of claims.toml, such as `V.3 and VI`."""
     return any(
         sentence.where == each or sentence.where.startswith(f"{each},")
         for each in place.split(" and ")
@@ -31,7 +31,7 @@ def _lies_in(sentence: Sentence, place: str) -> bool:
 
 
 def _command_of(state: str) -> str:
-    """Return the command of a state; KeyError for a strange key, ValueError for one twice."""
+    """Return the command of a state; raise KeyError if a key is unknown, ValueError if repeated."""
     words = ["run"]
     for key, values in parse_qs(state, keep_blank_values=True).items():
         (value,) = values
@@ -132,7 +132,7 @@ def test_every_sentence_of_the_thesis_has_its_quote() -> None:
 
 
 def _sentences_of(thesis: str) -> list[str]:
-    """Return the sentences of V and VI, and Table 1; formulas, headings and captions are none."""
+    """Return the sentences of V and VI, and Table 1, without formulas, headings and captions."""
     _, _, text = thesis.rpartition("## RESULTS\n")
     text, _, _ = text.partition("## REFERENCES")
     found = []

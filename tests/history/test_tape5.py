@@ -25,7 +25,7 @@ def test_tape_is_read_back_bit_for_bit(program: str, tmp_path: Path) -> None:
         rows = [tape.read_reals("<f8") for _ in wanted]
     assert np.array(rows).tobytes() == wanted.tobytes()
     assert out.stat().st_size == len(wanted) * (7 * 8 + 2 * 4)
-    if program == "two-term":  # TIME of the collocation programs runs away from n h
+    if program == "two-term":  # TIME of the collocation programs differs more and more from n h
         assert rows[9][0] == pytest.approx(0.01 * 55)
 
 

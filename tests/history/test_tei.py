@@ -1,4 +1,4 @@
-"""The edition as TEI: valid, whole, and the scan can be had from it again."""
+"""The edition as TEI: it is valid and complete, and the scan can be reconstructed from it."""
 
 import lzma
 import tomllib
@@ -32,7 +32,7 @@ TEXT = tei_document().decode()
 
 @pytest.fixture(scope="module")
 def schema() -> Any:
-    """Return the schema, which takes some seconds to read."""
+    """Return the schema; reading it takes some seconds."""
     text = lzma.decompress((HERE / "tei_all.rng.xz").read_bytes())
     assert sha256(text).hexdigest() == SOURCE["sha256"]
     begin = " ".join(text[:1000].decode().split())
@@ -50,13 +50,13 @@ def _blocks(root: xml.Element) -> list[xml.Element]:
 
 
 def _reading(element: xml.Element, without: str) -> str:
-    """Return the text of an element but for what stands in `without`: in `lem` or in `rdg`."""
+    """Return the text of an element without the text in `without`, which is `lem` or `rdg`."""
     own = "" if element.tag == TEI + without else element.text or ""
     return own + "".join(_reading(each, without) + (each.tail or "") for each in element)
 
 
 def _line(block: xml.Element) -> str | None:
-    """Return the line of the scan without blanks, as a card's `scan` is."""
+    """Return the line of the scan without blanks, like a card's `scan`; None if it is supplied."""
     if block.find(TEI + "supplied") is not None:
         return None
     number, text = block
@@ -116,7 +116,7 @@ def test_every_line_of_the_scan_can_be_had_again(root: xml.Element) -> None:
 
 
 def test_every_page_of_the_scan_can_be_had_again(root: xml.Element) -> None:
-    """Cards, furniture and phantoms, in the order of the pages."""
+    """Compare cards, furniture and phantoms, in the order of the pages."""
     pages: dict[int, list[str]] = {}
     for div in root.iter(TEI + "div"):
         number = 0
@@ -154,7 +154,7 @@ def test_every_difference_stands_there_once_with_its_entry(root: xml.Element) ->
 
 
 def _records(root: xml.Element) -> Iterator[dict[str, Any]]:
-    """Make the JSON of every card of what stands in the document."""
+    """Yield the JSON record of every card, made from the document."""
     notes = list(root.iter(TEI + "note"))
     named: dict[tuple[str | None, str], list[xml.Element]] = {}
     for each in notes:

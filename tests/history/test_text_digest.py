@@ -1,4 +1,4 @@
-"""The digest of the text: cards and apparatus alone move it."""
+"""The digest of the text: only cards and apparatus change it."""
 
 import copy
 import re
@@ -18,7 +18,7 @@ from pyharness.original import cards
 
 @pytest.fixture
 def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Give a copy of the port that the cards are held against."""
+    """Yield a copy of the port with which the cards are compared."""
     folder = tmp_path / "original"
     shutil.copytree(shipped("fortran/original"), folder)
     monkeypatch.setattr(cards, "shipped", lambda _: folder)
@@ -39,7 +39,7 @@ def test_a_comment_in_the_port_moves_the_places_and_not_the_text(port: Path) -> 
 
 
 def _changed(name: str, content: Any) -> Iterator[Any]:
-    """Give copies of a table, each with one change."""
+    """Yield copies of a table, each with one change."""
     rows = content["entry"] if name == "apparatus" else list(content["cards"].values())
     for index in (0, len(rows) // 2, len(rows) - 1):
         for key, value in rows[index].items():

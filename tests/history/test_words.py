@@ -1,4 +1,4 @@
-"""What word length does: pages, stops, errors and IER, by the bits of a word and its rule."""
+"""Effects of word length on pages, stops, errors and IER, by bits and rounding rule."""
 
 import json
 from dataclasses import asdict
@@ -43,7 +43,7 @@ def test_double_is_the_run_in_53_bits(found: Found) -> None:
 
 
 def test_rounding_takes_over_where_words_are_short(found: Found) -> None:
-    """The corrected Runge-Kutta program leaves out 2.5e-7; 16 bits cost a thousand times that."""
+    """The corrected Runge-Kutta program has an error of 2.5e-7; with 16 bits, a thousand times more."""
     cell = found[2, "runge-kutta", "corrected"]
     floor = cell.widest.error
     assert floor == pytest.approx(2.5e-7, rel=0.05)
@@ -73,7 +73,7 @@ def test_stops_and_singular_matrices(found: Found) -> None:
 
 
 def test_pages_of_another_length_differ_in_every_number_that_is_missing(found: Found) -> None:
-    """Two-term Case 6 leaves every bound: where, the exponents of a word decide."""
+    """Two-term Case 6 overflows at a step that depends on the exponent range of a word."""
     cell = found[6, "two-term", "original"]
     assert cell.double.stop.startswith("overflow at ")
     rows = {int(run.stop.split()[-1]) - 1 for run in (*cell.runs, cell.double) if run.stop}
@@ -91,7 +91,7 @@ def test_report_has_every_run(found: Found) -> None:
     assert report.record()["runs"] == [asdict(run) for run in cell.runs]
     assert report.data is not None
     assert len(csv_text(report.data).splitlines()) == 1 + len(cell.runs)
-    # Without 48 bits there is nothing to say of the machine's own words.
+    # Without 48 bits the report has no section on the machine's own words.
     assert len(report.text) == 4
     short = [*cells([2], ["runge-kutta"], (24,))]
     assert len(words_report(short).text) == 3

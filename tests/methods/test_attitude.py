@@ -1,4 +1,4 @@
-"""Attitude by the joint series, and beside any rows: against integrators of its own equations."""
+"""Attitude by the joint series, and from rows of omega, compared with independent integrators."""
 
 import pickle
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.random_scenes import draw
 
 TURNED = (0.5, -0.1, 0.7, 0.5)
-# A spin hardly changes omega, and turns the body all the same.
+# A spin hardly changes omega, but the body rotates all the same.
 SPIN = Scene("", (0.0, 0.0, 10.0), moments=(40.0, 30.0, 20.0), torque=TorqueLaw((0.0, 0.0, 1e-3)))
 SCENES = {
     **{f"case {n}": replace(case_scene(n), attitude=TURNED) for n in range(1, 8)},
@@ -38,11 +38,11 @@ SCENES = {
     "rest": Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=TorqueLaw((1.0, 0.0, 2.0))),
 }
 
-TOO_LONG = (29,)  # of the draws, for the finest tolerance
+TOO_LONG = (29,)  # draws that take too long for the finest tolerance
 
 
 def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
-    """Return omega and attitude by DOP853 on seven unknowns."""
+    """Return omega and attitude by DOP853 for all seven unknowns."""
     slope = scene.right_hand_side()
 
     def rates(t: float, y: Array) -> list[float]:
@@ -70,7 +70,7 @@ def test_series_agrees_with_seven_unknowns(name: str, time: float, level: int) -
     assert found.attitude is not None
     omega, attitude = by_scipy(scene, times)
     assert np.abs(found.omega - omega).max() < 1e-11 * max(1.0, np.abs(omega).max())
-    # The signs too: they are continuous.
+    # The signs are compared too, because they are continuous.
     assert np.abs(found.attitude - attitude).max() < 2e-11
     assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
 
@@ -183,7 +183,7 @@ def test_estimate_tells_the_error() -> None:
             assert found.attitude is not None
             assert fine is not None
             ratios.append(angle_between(found.attitude, fine)[0] / (found.error or 0.0))
-    # What is known of it was taken off.
+    # The estimated error has been subtracted from the result.
     assert 1e-3 < min(ratios) <= max(ratios) < 2.5
     assert sorted(ratios)[len(ratios) // 2] < 0.22
     assert sorted(ratios)[-2] < 1.0
@@ -219,7 +219,7 @@ def test_rows_of_a_program_have_an_attitude() -> None:
     found = attitude_from_rows(scene, rows.time, rows.omega)
     fine = solve(scene, rows.time.tolist(), attitude=True).attitude
     assert fine is not None
-    # The program's own error, and no more.
+    # The error comes from the program's omega alone.
     error = np.abs(rows.omega - solve(scene, rows.time.tolist()).omega).max()
     assert 1e-6 < angle_between(found, fine).max() < 2.0 * error * rows.time[-1]
 
@@ -354,7 +354,7 @@ def test_rows_come_in_the_order_of_their_times() -> None:
 
 
 def test_growth_has_the_way_in_it() -> None:
-    """An error of omega turns the body all the way."""
+    """An error of omega rotates the body further during the whole integration."""
     bare = solve(case_scene(4), [50.0], "taylor", 1e-9)
     found = solve(case_scene(4), [50.0], "taylor", 1e-9, attitude=True)
     largest = float(np.abs(solve(case_scene(4), np.linspace(0.0, 5.0, 200).tolist()).omega).max())

@@ -1,6 +1,6 @@
-"""Attitude without torque, in closed form: against series in whole numbers, and by what it keeps.
+"""Attitude without torque in closed form: compared with exact series, and by invariants.
 
-Invariants are no proof: a wrong rate of the turn keeps all of them but Montgomery's.
+Invariants are no proof: a wrong rate of rotation keeps all of them except Montgomery's.
 """
 
 import itertools
@@ -77,7 +77,7 @@ def test_any_body_at_any_time(kind: str) -> None:
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 def test_any_order_and_sign_of_axes(order: tuple[int, ...], turned: bool) -> None:
-    """Both regions of the motion, starts in all octants, times in all quarters of the period."""
+    """Test both regions of the motion, all octants of the start, all quarters of the period."""
     moments = [(0.7, 1.9, 2.3)[axis] for axis in order]
     start = (1.9, -0.6, 0.4) if turned else (0.4, -0.6, 1.9)
     for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -88,7 +88,7 @@ def test_any_order_and_sign_of_axes(order: tuple[int, ...], turned: bool) -> Non
 
 @pytest.mark.parametrize("start", [(1.0, 2.0, 0.3), (0.2, 1.9, -1.0), (1e-7, -3.0, 2e-7)])
 def test_montgomery_s_angle(start: tuple[float, float, float]) -> None:
-    """After a period of omega the body has turned about L by 2 T t/L less the solid angle of L."""
+    """After a period of omega the body has rotated about L by 2 T t/L less the solid angle of L."""
     moments = np.array(_BODY)
     with mpmath.workdps(30):
         d12, d13, d23 = (abs(_BODY[a] - _BODY[b]) for a, b in ((0, 1), (0, 2), (1, 2)))
@@ -111,7 +111,7 @@ def test_montgomery_s_angle(start: tuple[float, float, float]) -> None:
     x, y, z = m[:, (axis + 1) % 3], m[:, (axis + 2) % 3], m[:, axis]
     sign = np.sign(z[0])
     around = sign * (x * slope[:, (axis + 2) % 3] - y * slope[:, (axis + 1) % 3]) / (x * x + y * y)
-    # The trapezoidal rule has all digits of a periodic function.
+    # For a periodic function the trapezoidal rule has all digits.
     solid = period * np.mean(((1.0 - sign * z) * around)[:-1])
     energy = float(np.sum(moments * np.array(start) ** 2))
     wanted = energy * period / size - solid
@@ -127,7 +127,7 @@ def test_nothing_jumps_and_what_stays_stays(start: tuple[float, float, float]) -
     times = np.linspace(-60.0, 60.0, 40001)
     omega, attitude = closed_form_attitude(_BODY, start, (0.1, 0.2, -0.7, 0.3), times)
     np.testing.assert_allclose(np.linalg.norm(attitude, axis=1), 1.0, rtol=0, atol=1e-15)
-    # q' = q omega/2, so that a change of sign would be seen, and a kink.
+    # q' = q omega/2, so that a change of sign or a kink would be seen.
     step = np.linalg.norm(np.diff(attitude, axis=0), axis=1)
     speed = np.linalg.norm(omega, axis=1)
     np.testing.assert_allclose(step, (speed[1:] + speed[:-1]) * 0.003 / 4.0, rtol=1e-4)
@@ -142,7 +142,7 @@ def test_nothing_jumps_and_what_stays_stays(start: tuple[float, float, float]) -
 def test_forth_and_back(kind: str) -> None:
     source = random.Random(kind)
     moments, omega, attitude, _ = draw(source, kind)
-    # A small part of a turn: what the motion makes of rounding is not asked here.
+    # A short time, so that the amplification of rounding errors plays no role.
     time = 0.5 / math.hypot(*omega)
     there, turned = closed_form_attitude(moments, omega, attitude, [time])
     back, unturned = closed_form_attitude(moments, there[0], turned[0], [-time])
@@ -209,7 +209,7 @@ def test_phase_of_any_length(radians: float) -> None:
     for _ in range(8):
         moments, omega, attitude, _ = draw(source, "generic")
         time = radians / max(map(abs, omega)) / 10.0
-        # The attitude turns by some multiple of this.
+        # The angle of the attitude is some multiple of this.
         assert errors((moments, omega, attitude, time))[0] <= 2e-15 + 1e-29 * radians
 
 
@@ -253,7 +253,7 @@ def test_refusals_name_the_reason() -> None:
 
 
 def test_errors_are_found() -> None:
-    """The measure itself: a quaternion whose last digit but two is wrong."""
+    """Test the measure itself, by a quaternion with a wrong third-last digit."""
     _, wanted = exact(list(_BODY), list(_START), [1.0, 0.0, 0.0, 0.0], 1.0)
     found = np.array([float(x) for x in wanted])
     assert largest_error(found, wanted) < 1.2e-16
@@ -263,7 +263,7 @@ def test_errors_are_found() -> None:
 
 @pytest.mark.parametrize("power", [1, 4, 7, 9, 14, 15])
 def test_flips_beside_the_separatrix_are_where_they_are(power: int) -> None:
-    """The start of a flip is 35 of its radians away: a phase of one word would miss it by 1e-14."""
+    """A flip starts 35 of its radians away: a phase in double precision would miss it by 1e-14."""
     omega = (10.0**-power, 1.0, 0.0)
     scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=(0.5, -0.1, 0.7, 0.5))
     time = quarter(10.0**-power)

@@ -1,7 +1,7 @@
-"""The error that the series reports of an attitude, where omega has none: spins about one axis.
+"""The reported error of an attitude if omega has no error: spins about one axis.
 
-There the attitude is elementary: a turn about that axis by the integral of omega, taken here in
-many digits. The scenes are drawn at random.
+The attitude is then an elementary rotation about that axis by the integral of omega, computed here
+to many digits. The scenes are drawn at random.
 """
 
 import math
@@ -17,7 +17,8 @@ from tests.random_scenes import moments, triple
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 ROUNDING = 2.0**-53
-# Relative to what the body turns (rad): below it the error of a double is no error of the method.
+# Relative to the angle of rotation (rad): a smaller error is the rounding of a double, not an error
+# of the method.
 _DOUBT = 1e-15
 KINDS = ("steady", "constant", "ramp", "wave", "ramp from rest", "slow")
 
@@ -54,7 +55,7 @@ def _drawn(kind: str, generator: np.random.Generator) -> tuple[Scene, float]:
 
 
 def _angle_errors(scene: Scene, times: Array | list[float], attitudes: Array) -> list[float]:
-    """Return the angle (rad) from the true attitude at each time, of a spin about one axis."""
+    """Return the angle (rad) from the true attitude at each time, for a spin about one axis."""
     assert scene.attitude is not None
     assert scene.moments is not None
     law = scene.torque
@@ -102,7 +103,7 @@ def test_reported_error_is_no_less_than_a_tenth_of_the_true_one(kind: str) -> No
         assert found.error is not None
         error = max(_angle_errors(scene, times, found.attitude))
         turned = 1.0 + float(np.abs(found.omega).max()) * abs(time)
-        # About the axis of the middle moment perturbations grow: here none begins to.
+        # About the axis of the middle moment perturbations grow, but here there are none.
         assert found.ended == "sensitive" or max(error, found.error) <= tolerance
         assert found.error >= 0.1 * (error - _DOUBT * turned), (number, tolerance)
         judged += error > 10.0 * _DOUBT * turned
@@ -124,32 +125,32 @@ def test_prepared_solver_reports_it_too() -> None:
 
 
 def test_steady_spin_of_a_brick(level: int) -> None:
-    """Twenty thousand times the reported error, once."""
+    """Regression test: the error was twenty thousand times the reported one."""
     scene = Scene("", (0.0, 0.0, 1.0), moments=(4.0, 3.0, 2.0), attitude=(1.0, 0.0, 0.0, 0.0))
     found = solve(scene, [40.0], "taylor", 1e-3, attitude=True)
     assert found.attitude is not None
     assert found.error is not None
     (error,) = _angle_errors(scene, [40.0], found.attitude)
-    # It is taken off, all but a part of it.
+    # Most of the estimated error has been subtracted.
     assert 1e-7 < error < 0.5 * found.error < 1e-4
     assert found.digits == pytest.approx(-math.log10(found.error), abs=0.1)
 
 
 def test_error_is_accumulated_from_step_to_step() -> None:
-    """Turns left out add, about the axes of space: the error is the number of steps times one."""
+    """Missing rotations add up about the axes of space: the error is proportional to the steps."""
     scene = Scene("", (0.0, 0.0, 1.0), moments=(4.0, 3.0, 2.0), attitude=(0.5, -0.5, 0.5, 0.5))
     errors = []
     for time in (40.0, 400.0):
         found = solve(scene, [time], "taylor", 1e-3, attitude=True)
         errors.append((found.error or 0.0) / found.steps)
         assert found.evaluations == found.steps
-    # The local tolerance is less for the longer way.
+    # The local tolerance is smaller for the longer integration.
     assert 0.0 < errors[1] < errors[0]
     assert 400.0 * errors[1] > 1e-7
 
 
 def test_intermediate_rows_have_the_error_of_their_own_times() -> None:
-    """Within the first step the series errs by far less than at its end, or at the last time."""
+    """Within the first step the error is far smaller than at its end, or at the last time."""
     generator = np.random.default_rng(2502)
     for _ in range(20):
         scene, _ = _drawn("steady", generator)

@@ -1,7 +1,7 @@
 """Torques whose terms nearly cancel: solved where that is possible, and sensitive where it is not.
 
-Each term, divided by a moment, is rounded by itself. Waves of one frequency are added before; what
-is left of other terms is in the error estimate, at every entry point.
+Each term, divided by a moment, is rounded by itself. Waves of one frequency are added before. The
+rounding of the other terms is in the error estimate, at every entry point.
 """
 
 import math
@@ -28,7 +28,7 @@ def _times(values: Triple, factor: float) -> Triple:
 
 
 def _scene(kind: str, number: int) -> Scene:
-    """Return a body from rest or nearly, whose torques leave 1e-2 to 1e-11 of themselves."""
+    """Return a body at rest or nearly, whose torques cancel to 1e-2 to 1e-11 of their size."""
     source = random.Random(f"cancelling/{kind}/{number}")
     frequency, left = source.uniform(0.5, 4.0), 10.0 ** -source.uniform(2.0, 11.0)
     amplitude = _triple(source, source.uniform(0.3, 1.0) / left)
@@ -165,9 +165,9 @@ def test_noise_is_what_the_terms_give_over_what_they_give_together() -> None:
     amplitude = (1.0, 0.0, 0.0)
     law = TorqueLaw(sines=[(amplitude, 1.0), ((-1.0, 0.0, 0.0), 1.0 + 1e-8)])
     scene = Scene("", (0.0, 1e-6, 0.0), moments=(1.0, 2.0, 2.5), torque=law)
-    # Each gives half of t**2, over the largest omega.
+    # Each wave contributes half of t**2, relative to the largest omega.
     assert torque_noise(scene, scene.omega, 0.1) == pytest.approx(0.01 / 1e-6, rel=0.1)
-    # Steps round it too, at random; and a scale that is given is the one that counts.
+    # Steps round at random too; and if a scale is given, it replaces the largest omega.
     walk = torque_noise(scene, scene.omega, 0.1, 100.0) / torque_noise(scene, scene.omega, 0.1)
     assert walk == pytest.approx(1.0 + 2.0 * 0.1, rel=0.05)
     assert torque_noise(scene, scene.omega, 0.1, scale=1e-4) == pytest.approx(100.0, rel=0.1)

@@ -1,7 +1,7 @@
-"""Closed forms: against mpmath, against the reference, and against their own symmetries.
+"""Closed forms: compared with mpmath and the reference, and checked by their own symmetries.
 
-The bound is on the evaluation: sixteen roundings of the largest angular velocity of the motion,
-at any time.
+The bound is on the evaluation: sixteen roundings of the largest angular velocity of the motion, at
+any time.
 """
 
 import math
@@ -35,7 +35,7 @@ def _at(coefficients: Triple, omega: Triple, time: float) -> Array:
 
 
 def _error(found: Array, exact: list[mpmath.mpf], omega: Triple) -> float:
-    """Return the largest error over the largest angular velocity that was met."""
+    """Return the largest error relative to the largest angular velocity seen."""
     largest = max(*map(abs, exact), *map(abs, omega))
     return float(max(abs(float(x) - y) for x, y in zip(found, exact, strict=True)) / largest)
 
@@ -76,7 +76,7 @@ def test_any_top_at_any_time(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["generic", "near symmetry", "near separatrix", "needle"])
 def test_moments_count_to_all_their_digits(kind: str) -> None:
-    """A, B, C rounded to one word cost 1e-11 by 1e6 s; a prepared solver has both words too."""
+    """A, B, C rounded to doubles cost 1e-11 by 1e6 s; a prepared solver has double-doubles too."""
     source = random.Random(kind)
     for _ in range(10):
         moments, omega, _, _ = draw(source, kind)
@@ -84,7 +84,7 @@ def test_moments_count_to_all_their_digits(kind: str) -> None:
         scene = Scene("", omega, moments=moments)
         exact = [mpmath.mpf(str(x)) for x in torque_free(scene, time)]
         rows = solve(scene, [time], "closed-form", 1e-9).omega
-        # Of a needle omega1 may be large at other times.
+        # For a needle, omega1 may be large at other times.
         bound = _BOUND * (10 if kind == "needle" else 1)
         assert _error(rows[0], exact, scene.omega) <= bound, scene
         np.testing.assert_array_equal(prepare(scene, "closed-form")(omega, time), rows[0])
@@ -136,7 +136,7 @@ def test_a_single_coefficient_is_linear(coefficients: Triple, wanted: Triple) ->
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("signs", [(1.0, -1.0), (-1.0, 1.0)])
 def test_symmetric_body_about_every_axis(axis: int, signs: tuple[float, float]) -> None:
-    """Unequal sizes too, which no body has: an ellipse."""
+    """Test unequal coefficients too, which no body has: the orbit is an ellipse."""
     a, w = [0.0, 0.0, 0.0], (0.7, -1.3, 2.1)
     j, k = (axis + 1) % 3, (axis + 2) % 3
     a[j], a[k] = 0.75 * signs[0], 0.3 * signs[1]
@@ -176,7 +176,7 @@ def test_what_can_not_be_done_is_said(
 
 
 def _packed_end(coefficients: Triple, omega: Triple, time: float) -> tuple[Array, int]:
-    """One time by a prepared solver's door, past the checks of `prepare`; and the status."""
+    """Return omega and status at one time by the kernel of a solver, without `prepare`."""
     packed = np.zeros(20)
     packed[0] = 1.0
     packed[5:8] = coefficients
@@ -202,7 +202,7 @@ def test_sphere_under_every_kind_of_torque(time: float) -> None:
     )  # fmt: skip
     scene = Scene("", (0.3, -1.1, 2.2), moments=(2.0, 2.0, 2.0), torque=law)
     found = solve(scene, [time], "closed-form", 1e-9)
-    # Terms of the sum may cancel: half a rate of 1 over the moment 2, times the time squared.
+    # The terms of the sum may cancel. The last is half a rate of 1 over the moment 2, times t**2.
     terms = 2.2 + 1.5 * abs(time) + 0.25 * time * time
     np.testing.assert_allclose(
         found.omega, reference(scene, [time]).omega, rtol=0, atol=4 * _UNIT * terms
@@ -227,7 +227,7 @@ def test_end_alone_and_rows_give_the_same_bits_in_any_thread() -> None:
 
 @pytest.mark.parametrize("radians", [1e9, 1e11, 1e12, 1e13, 1e14, 4e14])
 def test_error_does_not_depend_on_the_phase(radians: float) -> None:
-    """Up to 1e15 radians, where the phase itself has no digit left: frequencies have two words."""
+    """Up to 1e15 rad, where the phase itself has no digit left: frequencies are double-doubles."""
     source = random.Random(str(radians))
     for _ in range(8):
         a = (source.uniform(0.1, 1.0), -source.uniform(0.1, 1.0), source.uniform(0.1, 1.0))
@@ -235,7 +235,7 @@ def test_error_does_not_depend_on_the_phase(radians: float) -> None:
         time = source.choice((-1.0, 1.0)) * radians
         exact = exact_top(a, w, time)
         assert _error(_at(a, w, time), exact, w) <= _BOUND, (a, w, time)
-    # Further on it is refused, and not before.
+    # Later times are refused, and no earlier ones.
     scene = Scene("", w, coefficients=a)
     with pytest.raises(TimedError, match=r"at t = 1e\+16 s the phase"):
         solve(scene, [radians, 1e16, 1e17], "closed-form", 1e-9)
@@ -243,9 +243,9 @@ def test_error_does_not_depend_on_the_phase(radians: float) -> None:
 
 @pytest.mark.parametrize("time", [1e-3, 0.5, -2.0, 30.0, 300.0, -1000.0])
 def test_small_components_beside_the_separatrix_keep_their_digits(time: float) -> None:
-    """A = C, omega1 = omega3: omega2 = r tanh, the others r sech, over the roots of 2 and 1.
+    """For A = C and omega1 = omega3, omega2 is r tanh; the others are r sech over the root of 2.
 
-    These fall by exp(-phase), whose rounding they would multiply.
+    The sech falls by exp(-phase), which would amplify the rounding of the phase.
     """
     omega = (1.0, 0.3, 1.0)
     found = _at((0.25, -0.5, 0.25), omega, time)
@@ -261,7 +261,7 @@ def test_small_components_beside_the_separatrix_keep_their_digits(time: float) -
 @pytest.mark.parametrize("disturbance", [1e-20, 1e-50, 1e-100, 1e-119])
 @pytest.mark.parametrize("time", [0.5, -7.0])
 def test_faint_disturbances_grow_as_they_should(disturbance: float, time: float) -> None:
-    """D cosh and d sinh: what is left out is of third order."""
+    """The components grow as D cosh and d sinh; the neglected terms are of third order."""
     a, c = 1.0, 0.5
     rate = math.sqrt(a * c)
     found = _at((a, -1.0, c), (disturbance, 1.0, 0.0), time)
@@ -271,7 +271,7 @@ def test_faint_disturbances_grow_as_they_should(disturbance: float, time: float)
 
 
 def test_component_that_hardly_moves_is_rounded_once() -> None:
-    """Of a nearly round body only what omega3 has fallen by is reckoned, not 1 less a little."""
+    """For a nearly round body only the decrease of omega3 is computed, not 1 less a little."""
     source = random.Random(9)
     for _ in range(200):
         difference = 10 ** source.uniform(-12, -1)
@@ -283,7 +283,7 @@ def test_component_that_hardly_moves_is_rounded_once() -> None:
 
 
 def test_what_the_sum_of_a_sphere_can_not_hold_is_added_at_the_end() -> None:
-    """Sixteen pushes, each a twentieth of a unit in the last place: two thirds of one."""
+    """Sixteen increments, each a twentieth of a unit in the last place, make two thirds of one."""
     pushes = tuple(((0.0, 1e-17, 0.0), 0.0) for _ in range(16))
     scene = Scene("", (0.0, 1.0, 0.0), moments=(1.0,) * 3, torque=TorqueLaw(cosines=pushes))
     found = solve(scene, [1.0], "closed-form", 1e-9)

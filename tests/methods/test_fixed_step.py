@@ -1,4 +1,4 @@
-"""The methods of III.2: the formulas written out, steps that do not divide the time."""
+"""The methods of III.2: their formulas, and steps that do not divide the time."""
 
 import math
 from collections.abc import Callable
@@ -34,7 +34,7 @@ def _formula(method: str, scene: Scene) -> Callable[[float, Array, float], Array
         if method == "improved-euler":
             return np.asarray(y + h / 2 * (k1 + f(t + h, y + h * k1)))
         if method == "taylor-3":
-            # The torque's own derivative, by central differences of high order.
+            # The derivative of the torque, by central differences of high order.
             d = 1e-3
             torque = [np.array(scene.normalized_torque(t + i * d)) for i in (-2, -1, 1, 2)]
             slope = (torque[0] - 8 * torque[1] + 8 * torque[2] - torque[3]) / (12 * d)
@@ -52,7 +52,7 @@ def _formula(method: str, scene: Scene) -> Callable[[float, Array, float], Array
 @pytest.mark.parametrize("torque", [TorqueLaw(), TorqueLaw((100.0, 50.0, 20.0)), _LAW])
 @pytest.mark.parametrize("method", FIXED_STEP)
 def test_formulas_and_the_shortened_step(method: str, torque: TorqueLaw) -> None:
-    """Times 0.25 and 0.55 in steps of 0.1: each time is hit by a shorter one."""
+    """Times 0.25 and 0.55 with steps of 0.1: a shorter step ends at each time."""
     scene = _scene(torque, 0.1)
     step = _formula(method, scene)
     y, t = np.array(scene.omega), 0.0
@@ -69,7 +69,7 @@ def test_formulas_and_the_shortened_step(method: str, torque: TorqueLaw) -> None
 
 @pytest.mark.parametrize("method", FIXED_STEP)
 def test_torque_goes_on_where_many_steps_pause(method: str) -> None:
-    """A kernel looks now and then whether Ctrl-C came; the torque is then that of its time."""
+    """A kernel pauses now and then to check for Ctrl-C; the torque must then be at its own time."""
     law = TorqueLaw(cosines=(((0.0, 0.0, 1.0), 1.0),))
     scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law, step_size=1e-5)
     found = solve(scene, [5.0], method, 1.0)
@@ -82,7 +82,7 @@ def test_torque_goes_on_where_many_steps_pause(method: str) -> None:
 def test_prepared_takes_the_same_steps_in_any_thread(
     method: str, torque: TorqueLaw, time: float
 ) -> None:
-    """Whole steps or not: a prepared solver and `solve` give the same bits."""
+    """With or without a shorter last step, a prepared solver and `solve` give the same bits."""
     scene = _scene(torque, 0.125)
     wanted = solve(scene, [time], method, 1.0)
 

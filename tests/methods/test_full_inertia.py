@@ -1,7 +1,7 @@
-"""Bodies about tilted axes, thin ones and nearly round ones too, against solutions that are exact.
+"""Bodies about tilted axes, also thin and nearly round ones, compared with exact solutions.
 
-The axes are rational, of rotations by 3/5 and 4/5, and the moments multiples of 625: so every entry
-of the matrix is a float, and every component of omega about the principal axes is one.
+The axes are rational, of rotations by 3/5 and 4/5, and the moments are multiples of 625. So every
+entry of the matrix is a float, and so is every component of omega about the principal axes.
 """
 
 import itertools
@@ -16,9 +16,9 @@ from pyharness.model.inertia import Matrix
 from pyharness.model.scene import Triple
 from pyharness.truth.reference import reference
 
-# Times 25; the columns are the principal axes.
+# The principal axes as columns, times 25.
 _AXES = ((15, -16, 12), (20, 12, -9), (0, 15, 20))
-# Moments, over 625.
+# The moments over 625.
 _BODIES: dict[str, tuple[float, float, float]] = {
     "plain": (1.0, 2.0, 2.5),
     "thin": (2.0**-30, 1.0, 1.0 + 2.0**-31),
@@ -30,7 +30,7 @@ _SPIN: Triple = (25.0 / 32.0, -50.0 / 32.0, 75.0 / 64.0)  # about the principal 
 
 
 def _turned(vector: Triple) -> Triple:
-    """Return a vector of the principal axes about those of the body."""
+    """Return the components about the body's axes of a vector about the principal axes."""
     exact = [
         sum(Fraction(a, 25) * Fraction(x) for a, x in zip(row, vector, strict=True))
         for row in _AXES
@@ -53,7 +53,7 @@ def _matrix(moments: Triple) -> Matrix:
 
 
 def _scenes(body: str, torque: Triple = (0.0, 0.0, 0.0)) -> tuple[Scene, Scene]:
-    """Return a scene about tilted axes, and the same about its principal ones."""
+    """Return a scene about tilted axes, and the same scene about its principal axes."""
     moments = _BODIES[body]
     law = TorqueLaw(torque)
     bare = Scene(body, _SPIN, moments=[625.0 * each for each in moments], torque=law)
@@ -88,7 +88,7 @@ def test_each_body_is_solved_to_the_tolerance(body: str, method: str) -> None:
 
 
 def test_a_faint_torque_about_the_thin_axis_is_what_it_is() -> None:
-    """Along that axis the components of a torque nearly cancel, and its moment is 1e-9."""
+    """Along the thin axis the components of the torque nearly cancel, and the moment is 1e-9."""
     tilted, bare = _scenes("thin", (25.0 * 2.0**-28, 25.0, -25.0 * 2.0**-3))
     _check_error(tilted, bare, 3.0, "auto", 1e-12)
 
@@ -97,7 +97,7 @@ def test_attitude_of_a_nearly_round_body() -> None:
     tilted, bare = _scenes("nearly round")
     about_principal, axes = principal(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)))
     found = solve(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)), [300.0], attitude=True)
-    # `principal` orders the axes as it likes: the truth follows it, but for the moments.
+    # `principal` may order the axes in any way: the truth uses this order.
     exact = reference(replace(about_principal), [300.0])
     assert found.attitude is not None
     assert exact.attitude is not None
@@ -134,5 +134,5 @@ def test_what_rounding_takes_off_a_moment_is_kept() -> None:
         float((i3 - i1) / i2),
         float((i1 - i2) / i3),
     )
-    # Another start, say, is of the same body.
+    # A copy with another start has the same body.
     assert replace(bare, omega=(3.0, 2.0, 1.0)).exact_moments == exact

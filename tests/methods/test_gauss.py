@@ -1,4 +1,4 @@
-"""Gauss collocation: its table, its order, what it conserves, and the steps it chooses."""
+"""Gauss collocation: its coefficients, its order, its invariants, and the steps it chooses."""
 
 import math
 import runpy
@@ -27,7 +27,7 @@ _SPHERE = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), torque=TorqueLaw((
 
 
 def _run(scene: Scene, times: list[float], stages: int, step: float, effort: float = 1.0) -> Any:
-    """Return rows, omega after the last good step with its time, how many, status, evaluations."""
+    """Return rows, omega after the last good step, its time, row count, status, evaluations."""
     return extension().gauss_solution(
         *normalized(scene), scene.omega, times, stages, step, effort=effort
     )
@@ -51,18 +51,18 @@ def test_coefficients_agree_with_mpmath(stages: int) -> None:
             assert abs(mpmath.legendre(stages, 2 * mpmath.mpf(str(node)) - 1)) < 1e-50
         weights = maker.integrals(nodes, Decimal(0), Decimal(1))
         rows = [maker.integrals(nodes, Decimal(0), c) for c in nodes]
-        # Integrals of 1 ... c**(s-1) are exact; that fixes the matrix.
+        # The integrals of 1 ... c**(s-1) are exact, which determines the matrix.
         for power in range(stages):
             for row, end in zip([*rows, weights], [*nodes, Decimal(1)], strict=True):
                 total = sum(a * c**power for a, c in zip(row, nodes, strict=True))
                 assert abs(total - end ** (power + 1) / (power + 1)) < Decimal("1e-50")
-        # What makes it conserve quadratic invariants.
+        # With this condition the method conserves quadratic invariants.
         for i, j in np.ndindex(stages, stages):
             left = weights[i] * rows[i][j] + weights[j] * rows[j][i]
             assert abs(left - weights[i] * weights[j]) < Decimal("1e-50")
 
 
-# Steps in which the error is far above rounding, and its first term rules.
+# Steps for which the error is far above rounding, and its leading term dominates.
 _STEPS = {
     4: ((40, 80), (40, 80), (20, 40), (10, 20), (10, 20), (6, 12), (5, 9), (5, 8)),
     7: ((40, 80), (20, 40), (8, 16), (5, 10), (3, 6), (2, 4), (2, 3), (2, 4)),
@@ -101,7 +101,7 @@ def test_tolerance_is_met(stages: int, case: int) -> None:
 
 
 def test_body_at_rest_is_driven_to_a_relative_error() -> None:
-    """The scale is the largest omega on the way, however small, and not 1."""
+    """The scale is the largest omega of the trajectory, however small, and not 1."""
     law = TorqueLaw(sines=(((1e-9, 2e-9, -3e-9), 20.0),))
     scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), torque=law)
     truth = reference(scene, [1.0])
@@ -114,7 +114,7 @@ def test_body_at_rest_is_driven_to_a_relative_error() -> None:
     [("from rest", 16), *(("nearly symmetric", seed) for seed in (8, 10, 18))],
 )
 def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
-    """Two solutions whose steps are too long for the order to show say less than it promises."""
+    """If both steps are too long for the order to show, their difference is too small an estimate."""
     generator = np.random.default_rng(seed)
     for _ in range(25):
         scene, t_end = NASTY[kind](generator)
@@ -126,19 +126,20 @@ def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
 
 @pytest.mark.parametrize("stages", [4, 5])
 def test_what_rounding_takes_off_is_carried_in_long_steps(stages: int) -> None:
-    """60 000 steps of a third of a radian: without any of the second words energy drifts."""
+    """60 000 steps of a third of a radian: without all parts of double-doubles energy drifts."""
     scene = case_scene(4)
     moments = np.array(scene.moments)
     rows = _end(scene, [300.0 * k for k in range(1, 61)], stages, 0.3)
     for weight in (moments, moments**2):
         start = weight @ np.array(scene.omega) ** 2
-        # Truncation of 8 stages' half the order is conserved too; what is left is rounding.
+        # The method conserves these invariants whatever its truncation error; only rounding is
+        # left.
         assert np.abs(rows**2 @ weight / start - 1.0).max() <= 6e-15
 
 
 @pytest.mark.parametrize("stages", _STAGES)
 def test_right_hand_sides_are_counted_at_every_node(stages: int) -> None:
-    """A rate that does not change is found, given its second word, and seen to stand."""
+    """A constant rate is found, gets its low part, and is confirmed."""
     *_, status, evaluations = _run(_SPHERE, [0.5], stages, 0.5)
     assert status == 0
     assert evaluations in (2 * stages, 3 * stages)
@@ -151,7 +152,7 @@ def test_iterations_that_do_not_end_are_counted_and_no_more(stages: int, step: f
 
 
 def test_rates_of_the_last_step_spare_iterations() -> None:
-    """Every time asked for begins with a step of its own."""
+    """Every requested time starts anew, without the rates of the last step."""
     together, apart = (
         _run(case_scene(5), times, 4, 0.01)[-1]
         for times in ([1.0], [0.01 * k for k in range(1, 101)])
@@ -160,7 +161,7 @@ def test_rates_of_the_last_step_spare_iterations() -> None:
 
 
 def test_time_that_was_reached_is_told() -> None:
-    """Omega = 1/(1 - t): after a first result at 0.5 the steps go on until near 1."""
+    """For omega = 1/(1 - t), the steps continue after a first result at 0.5 until near 1."""
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
     _, reached, _, status, _ = _run(scene, [0.5, 2.0], 4, 0.01)
     assert status != 0
@@ -169,7 +170,7 @@ def test_time_that_was_reached_is_told() -> None:
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
-    """Return the step and the evaluations of every call of the kernel, as they come."""
+    """Return a list to which every call of the kernel appends its step and its evaluations."""
     solution = extension().gauss_solution
     calls: list[tuple[float, int]] = []
 
@@ -197,17 +198,19 @@ def test_time_and_right_hand_sides_of_a_refusal(
     with pytest.raises(InputError) as refusal:
         solve(case_scene(3), [10.0, 20.0], "gauss-2", 1e-11)
     spent = sum(evaluations for _, evaluations in calls)
-    assert f"gauss-2 gave up at t = 20 s after {spent} right-hand sides;" in str(refusal.value)
+    assert f"gauss-2 exceeded its work limit at t = 20 s after {spent} right-hand sides;" in str(
+        refusal.value
+    )
     assert spent > 25_000
 
 
 @pytest.mark.parametrize("parts", [3, 7, 10])
 def test_step_that_divides_the_time_but_for_rounding_is_not_cut_once_more(parts: int) -> None:
-    """A tenth is no binary fraction: 0.3/0.1 is below 3, and times over steps just above."""
+    """A tenth is no binary fraction: 0.3/0.1 is below 3, and other quotients are just above."""
     for time in (0.1 * parts, sum([0.1] * parts)):
         one = _run(_SPHERE, [time], 1, time)[-1]
         assert _run(_SPHERE, [time], 1, 0.1)[-1] <= one * parts
-    # Nor is a step longer than it may be.
+    # No step is longer than the given one.
     scene = case_scene(3)
     for whole, count in ((0.35, 4), (0.301, 4), (0.3, 3)):
         found = _end(scene, [whole], 3, 0.1)

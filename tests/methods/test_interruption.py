@@ -24,7 +24,7 @@ from pyharness.model.scene import Scene, TorqueLaw, Wave
 from pyharness.original.compiled import run
 from pyharness.original.many import run_many
 
-# An idle machine needs some hundredths of a second; each call would take many seconds.
+# An idle machine needs some hundredths of a second; uninterrupted, each call takes many seconds.
 PATIENCE = 1.5
 
 FREE = Scene("free", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0))
@@ -96,12 +96,12 @@ LONG: dict[str, Callable[[], object]] = {
     "radau": _method(PUSHED, "radau", 1e4, 1e-3),
     "reference": _method(PUSHED, "reference", 1e4),
 }
-# Of SciPy, in Python, or prepared before: their kernels are not called through the door.
+# Methods of SciPy, in Python, or prepared before: they do not call kernels through `extension`.
 DOORLESS = ["dop853", "lsoda", "radau", "reference", "quick", "quick-waves", "prepared-series"]
 
 
 class _Keyboard:
-    """Presses Ctrl-C once, a while after it was first told to."""
+    """A keyboard that presses Ctrl-C once, a while after the first call of `press`."""
 
     pressed = 0.0
 
@@ -111,7 +111,7 @@ class _Keyboard:
             signal.setitimer(signal.ITIMER_REAL, 0.1)
 
     def door(self) -> ModuleType:
-        """Stand for the extension: what is done before a kernel is called does not count."""
+        """Return the extension, and press: the time before the call of a kernel does not count."""
         self.press()
         return extension()
 
@@ -139,7 +139,7 @@ def test_kernel_ends_at_once(
 
 
 def test_interpreter_and_solver_go_on(keyboard: _Keyboard) -> None:
-    """The same bits afterwards, from the very solver that was interrupted."""
+    """The interrupted solver returns the same bits afterwards."""
     solver, start = prepare(PUSHED, "taylor", effort=1e6), np.array(PUSHED.omega)
     wanted = solver(start, 2.0)
     keyboard.press()
@@ -150,7 +150,7 @@ def test_interpreter_and_solver_go_on(keyboard: _Keyboard) -> None:
 
 
 def test_other_threads_are_not_disturbed(keyboard: _Keyboard) -> None:
-    """A signal is the main thread's: a kernel elsewhere runs on to its end."""
+    """Python raises the signal in the main thread: a kernel in another thread runs to its end."""
     wanted = solve(PUSHED, [5e3], "taylor")
     with ThreadPoolExecutor(1) as pool:
         found = pool.submit(solve, PUSHED, [5e3], "taylor")
@@ -171,7 +171,7 @@ def test_handler_that_does_not_raise_runs_on_the_way(keyboard: _Keyboard) -> Non
 
 
 def test_command_line_says_so_in_a_line() -> None:
-    """All of them side by side, each some time after it has begun."""
+    """Run all commands side by side, and interrupt each some time after its start."""
     commands = (
         "run --case 5 --method taylor --times 1e5 --effort 1e6",
         "compare --case 5 --steps 100000 --effort 1e6",
@@ -199,7 +199,7 @@ def test_command_line_says_so_in_a_line() -> None:
 
 
 def test_interrupted_while_the_command_line_is_read_in() -> None:
-    """An import may run text, where Python remembers the signal and would die by it."""
+    """An import may call `exec`, after which Python remembers the signal and would die by it."""
     code = (
         "import sys, pyharness.__main__ as m; from types import ModuleType\n"
         "def main(): exec('raise KeyboardInterrupt')\n"

@@ -1,4 +1,4 @@
-"""Many bodies in one call: the promise of the single calls, whatever the others and the threads."""
+"""Many bodies in one call: as accurate as single calls, whatever the other bodies and threads."""
 
 import tracemalloc
 from dataclasses import replace
@@ -18,12 +18,12 @@ TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
 
 
 def only(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
-    """Return some of them."""
+    """Return the arrays of some of the bodies."""
     return {name: values[rows] for name, values in drawn.items()}
 
 
 def errors(drawn: dict[str, Any], found: Ensemble) -> Array:
-    """Return errors over the largest omega of start and end; NaN where growth is large."""
+    """Return errors relative to the largest omega of start and end; NaN where growth is large."""
     relative = np.full(len(found.omega), np.nan)
     for row, omega in enumerate(found.omega):
         truth = solve(scene_of(drawn, row), [drawn["t_end"][row]], "taylor", 1e-15)
@@ -42,7 +42,7 @@ def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
     assert np.count_nonzero(np.isfinite(off)) > 50
     assert np.nanmax(off) <= tolerance + 4e-12
     assert found.has_result.all()
-    # Found side by side, not one by one: that would be the single solver's bits.
+    # The results come from lanes: one by one they would have the single solver's bits.
     alone = [prepare(scene_of(drawn, row), tolerance=tolerance) for row in range(60)]
     same = [
         np.array_equal(solver(drawn["omega0"][row], drawn["t_end"][row]), found.omega[row])
@@ -53,10 +53,10 @@ def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-6, 1e-8, 1e-10])
 def test_the_tolerance_holds_where_the_motion_magnifies_errors(tolerance: float) -> None:
-    """Bodies that leave their middle axis under a faint torque: what a step errs grows e2 to e16.
+    """Bodies leave their middle axis under a faint torque: local errors grow by e2 to e16.
 
-    Of thousands the error is below half of the tolerance. If estimates were trusted fifty times
-    further, some would exceed it.
+    For thousands of bodies the error is below half of the tolerance. If estimates were trusted
+    fifty times further, some errors would exceed it.
     """
     n = 8000
     rng = np.random.default_rng(1)
@@ -183,7 +183,7 @@ def test_a_bad_body_spoils_no_other() -> None:
 
 
 def test_bodies_near_the_ends_of_the_range_and_on_edges() -> None:
-    """Middle axis, separatrix, symmetry, spheres, rest, extreme scales: as the single solver."""
+    """Middle axis, separatrix, symmetry, spheres, rest, extreme scales: as by the single solver."""
     edges = [
         ((0.0, 1.0, 0.0), (40.0, 30.0, 20.0)), ((1e-9, 1.0, 0.0), (40.0, 30.0, 20.0)),
         ((1.0, 1.0, np.sqrt(0.75)), (3.0, 2.0, 1.0)), ((1.0, 2.0, 3.0), (2.0, 2.0, 1.0)),
@@ -203,10 +203,10 @@ def test_bodies_near_the_ends_of_the_range_and_on_edges() -> None:
 
 
 def test_spins_that_turn_over_after_long(level: int) -> None:
-    """So little beside the middle axis that the mean takes more levels than blocks have."""
+    """The starts are so near the middle axis that the mean takes more levels than blocks have."""
     tilts = np.logspace(-3, -15, 97)
     starts = np.column_stack([tilts, np.ones_like(tilts), -0.5 * tilts])
-    # Somewhere on the turn.
+    # A time during the flip.
     times = (np.log(4.0 / tilts) + np.tile([-1.0, 0.0, 1.0], 33)[:97]) * np.sqrt(3.0)
     scene = replace(TOP, moments=(3.0, 2.0, 1.0))
     solver = prepare(scene)
@@ -217,7 +217,7 @@ def test_spins_that_turn_over_after_long(level: int) -> None:
 
 
 def test_orbits_next_to_the_separatrix(level: int) -> None:
-    """What rounding makes of the distance, it makes of the time of a turn."""
+    """The rounding of the distance from the separatrix changes the time of a flip."""
     apart = 1.0 + np.logspace(-2, -14, 97) * np.tile([1.0, -1.0], 49)[:97]
     starts = np.column_stack([apart / np.sqrt(3.0), np.full(97, 0.4), np.ones(97)])
     scene = replace(TOP, moments=(3.0, 2.0, 1.0))
@@ -227,7 +227,7 @@ def test_orbits_next_to_the_separatrix(level: int) -> None:
 
 
 def test_coefficients_of_one_sign(level: int) -> None:
-    """No body, yet equations: neither kernel of lanes has them."""
+    """No body has such coefficients, and neither kernel of lanes takes them."""
     starts = np.random.default_rng(4).standard_normal((40, 3))
     for coefficients in ((0.3, 0.5, 0.2), (-0.3, -0.5, -0.2)):
         scene = Scene("", starts[0], coefficients=coefficients, step_size=0.05)
@@ -243,7 +243,7 @@ def test_coefficients_of_one_sign(level: int) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_campaign_finds_what_exceeds(kind: str) -> None:
-    """One body is spoilt; a body that is too far off by itself as well is no fault of many."""
+    """One body is spoilt; a body whose single solution is too far off as well does not count."""
     drawn = bodies(kind, 40, 3)
     found, truth = (solve_many(TOP, tolerance=each, **drawn) for each in (1e-6, 1e-15))
     assert exceeding(drawn, 1e-6, found, truth)[0] == []
@@ -302,7 +302,7 @@ def test_results_go_where_the_caller_says() -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert again is first
-    assert peak < 20000  # bytes: not one for a body
+    assert peak < 20000  # bytes: no object for each body
     assert np.array_equal(again.omega, solve_many(TOP, 2.0, omega0=starts).omega)
 
 
@@ -319,7 +319,7 @@ def test_any_array_will_do() -> None:
 @pytest.mark.external
 @pytest.mark.skipif(not compiler_here(), reason="no compiler")
 def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path, level: int) -> None:
-    """The plain text is what unroll.py writes out: the same steps, other roundings."""
+    """The loops as written take the same steps as those of unroll.py, with other roundings."""
     loops = many_as_written(tmp_path)
     for kind, method, tolerance in (
         ("constant", 0, 1e-12), ("waves", 0, 1e-9), ("waves", 0, 1e-6), ("ramp", 0, 1e-3),

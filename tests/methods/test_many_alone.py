@@ -1,4 +1,4 @@
-"""A result in a batch: its bits depend on that body alone, its status is a single solver's."""
+"""Results in a batch: their bits depend on the body alone, their status is a single solver's."""
 
 from dataclasses import replace
 from typing import Any
@@ -29,7 +29,7 @@ def test_no_bit_depends_on_other_bodies_with_attitudes_or_many_waves(tolerance: 
     drawn = mixed(200, 8)
     drawn["attitude0"] = np.random.default_rng(1).standard_normal((200, 4))
     assert differing(drawn, 2, alone=20, tolerance=tolerance, effort=1e-4) == {}
-    drawn = mixed(200, 9, waves=9)  # some have more than 16, which lanes do not take
+    drawn = mixed(200, 9, waves=9)  # some bodies have more than 16 waves, which lanes do not take
     assert differing(drawn, 3, alone=20, tolerance=tolerance, effort=1e-4) == {}
 
 
@@ -83,7 +83,7 @@ def test_a_torque_that_is_no_number_refuses_its_body() -> None:
 
 
 def unstable(n: int, seed: int, with_torque: bool) -> dict[str, Any]:
-    """Draw bodies beside steady rotations: about the middle axis, or any that a torque holds."""
+    """Draw bodies near steady rotations: about the middle axis, or about any axis with a torque."""
     rng = np.random.default_rng([seed, with_torque])
     moments = 10.0 ** rng.uniform(-0.5, 0.5, (n, 3))
     omega = rng.standard_normal((n, 3))
@@ -133,7 +133,7 @@ def test_collocation_says_sensitive_where_a_single_solver_does() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-14, 1e-12, 1e-6])
 def test_what_amplifies_errors_is_left_to_the_single_kernel(tolerance: float, level: int) -> None:
-    """Above the guards of the lanes a result has the bits of the single kernel."""
+    """Above the limits of the lanes, a result has the bits of the single kernel."""
     drawn = unstable(300, 5, with_torque=True)
     found = solve_many(BASE, method="taylor", tolerance=tolerance, effort=1e-2, **drawn)
     left = 0
@@ -142,7 +142,7 @@ def test_what_amplifies_errors_is_left_to_the_single_kernel(tolerance: float, le
         scene = Scene("", drawn["omega0"][row], moments=drawn["moments"][row], torque=law)
         solver = prepare(scene, "taylor", tolerance, effort=1e-2)
         alone = solver(drawn["omega0"][row], drawn["t_end"][row])
-        # Lanes measure the growth from time 0 on, a single solver from later instants too.
+        # Lanes measure the growth from time 0 on, a single solver also from later times.
         if (solver.growth or 0.0) > 3.0 * min(1000.0, 0.1 * tolerance / ROUNDING):
             left += 1
             assert np.array_equal(found.omega[row], alone, equal_nan=True)
@@ -150,7 +150,7 @@ def test_what_amplifies_errors_is_left_to_the_single_kernel(tolerance: float, le
 
 
 def test_estimates_of_lanes_are_trusted_less_where_errors_grow(level: int) -> None:
-    """Of 200 000 random bodies one that lanes alone would bring near the tolerance."""
+    """Test one of 200 000 random bodies, whose error by lanes alone would be near the tolerance."""
     drawn = unstable(5000, 108, with_torque=True)
     body = {name: values[946:947] for name, values in drawn.items()}
     truth = solve_many(BASE, method="taylor", tolerance=1e-13, **body).omega
@@ -160,7 +160,7 @@ def test_estimates_of_lanes_are_trusted_less_where_errors_grow(level: int) -> No
 
 
 def test_the_bound_of_the_growth_is_above_the_growth() -> None:
-    """Whoever is below it is not measured: `solve_many` says sensitive by the same limit."""
+    """A body below the bound is not measured: `solve_many` reports sensitive by the same limit."""
     rng = np.random.default_rng(7)
     for _ in range(400):
         moments = 10.0 ** rng.uniform(-1.0, 1.0, 3)
@@ -257,7 +257,7 @@ def test_solve_many_takes_torques_in_space_with_attitudes() -> None:
         assert np.allclose(listed.omega[row], truth.omega[-1], rtol=0, atol=1e-11)
         assert np.allclose(listed.attitude[row], truth.attitude[-1], rtol=0, atol=1e-11)
         assert same_bits(listed, solve_many([each], 1.5), [row]).all()
-        if row != 2:  # whose torque turns with the body
+        if row != 2:  # the torque of row 2 turns with the body
             assert np.array_equal(found.omega[row], listed.omega[row])
     starts[1] = np.nan
     spoilt = solve_many(scene, 1.5, omega0=starts, attitude0=attitudes, torque_constant=torques)

@@ -1,4 +1,4 @@
-"""What `solve_many`, `run_many` and a solver's `many` refuse, in one line each."""
+"""Arguments that `solve_many`, `run_many` and a solver's `many` refuse, in one line each."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -16,7 +16,7 @@ READ_ONLY = np.zeros((2, 3))
 READ_ONLY.flags.writeable = False
 
 
-# The same mistake has the same words, whoever is asked.
+# The same mistake has the same message at every entry point.
 ALIKE: list[tuple[dict[str, Any], str]] = [
     ({"omega0": np.ones((5, 2))}, "omega0: shape (5, 2); allowed: (3,) or (n, 3)"),
     ({"omega0": np.ones((5, 1, 3))}, "omega0: shape (5, 1, 3); allowed: (3,) or (n, 3)"),

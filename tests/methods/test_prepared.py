@@ -1,4 +1,4 @@
-"""Prepared solvers and the plan: right, checked once, cheap to call, bits the same."""
+"""Prepared solvers and the plan: right results, one check of arguments, cheap calls, equal bits."""
 
 import copy
 import doctest
@@ -79,7 +79,7 @@ def test_results_are_new_arrays_unless_out_is_given(solver: Solver) -> None:
     assert solver(out=row, t_end=1.0, omega0=start) is row
     assert solver(start, 1.0, **{"".join("out"): row}) is row
     assert solver(start, 1.0, out=None).tolist() == wanted
-    assert solver(start, 1.0, out=start) is start  # where it began
+    assert solver(start, 1.0, out=start) is start  # into the array of the start
     assert start.tolist() == wanted
 
 
@@ -135,7 +135,7 @@ def test_what_is_no_time_is_refused(t_end: Any, solver: Solver) -> None:
     for named in ({}, {"out": out}):
         with pytest.raises(InputError, match=r"^t_end: .*(a number belongs|large for binary64)$"):
             solver(np.ones(3), t_end, **named)
-    # What was refused is not counted.
+    # A refused call is not counted.
     assert not out.any()
     assert solver.steps == steps > 0
 
@@ -195,14 +195,14 @@ def test_call_leaks_no_reference() -> None:
     tracemalloc.start()
     left = [left_behind() for _ in range(5)]
     tracemalloc.stop()
-    # An object a call would be ten thousand bytes at least; others leave some at times.
+    # An object for each call would be ten thousand bytes at least; other code leaves some at times.
     assert min(after - before for before, after in pairwise(left)) < 6000
     assert [sys.getrefcount(each) for each in watched] == counts
 
 
 @pytest.fixture
 def _hasty() -> Iterator[None]:
-    """Let the interpreter change threads at every opportunity."""
+    """Let the interpreter switch threads at every opportunity."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     yield
@@ -210,7 +210,7 @@ def _hasty() -> Iterator[None]:
 
 
 def _in_threads(count: int, work: Callable[[int], Any]) -> list[Any]:
-    """Work in as many threads, each its own, and all at once."""
+    """Call `work` in `count` threads, all at once, each with its own number."""
     gate = threading.Barrier(count)
 
     def begin(number: int) -> Any:
@@ -224,9 +224,9 @@ def _in_threads(count: int, work: Callable[[int], Any]) -> list[Any]:
 @pytest.mark.usefixtures("_hasty")
 @pytest.mark.parametrize("shared", [True, False])
 def test_threads_at_once_get_their_own_answers(shared: bool) -> None:
-    """Status, steps and results; of 18 000 calls 134 were wrong."""
+    """Test status, steps and results; of 18 000 calls 134 were once wrong."""
     scene = Scene("", (1.0, 1.0, 1.0), moments=(3.0, 2.0, 1.0), step_size=0.01)
-    # Long enough for two kernels to run at once.
+    # The times are long enough for two kernels to run at once.
     calls = [(np.full(3, 1.0 + k), t) for k in range(4) for t in (0.05, 10.0, 40.0, 1e300)]
 
     def answer(solver: Solver, call: tuple[Array, float]) -> tuple[bytes, str, int]:
@@ -260,7 +260,7 @@ def test_status_is_of_the_threads_own_last_call() -> None:
         solver(_omega(RUNAWAY), 0.01)
         return *before, solver.status
 
-    # Threads come and go, and their addresses come again: none is told of one before it.
+    # A new thread may have the address of an ended one, and must not get its status.
     for _ in range(20):
         assert _in_threads(4, work) == [("complete", 0, "complete")] * 4
     assert (solver.status, solver.steps) == ("overflow", steps)
@@ -295,7 +295,7 @@ def test_copies_are_prepared_as_the_solver_was(method: str) -> None:
 
 
 def test_another_kernel_may_stand_in_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As the plants' does; what it raises is raised, and what it returns is looked at."""
+    """Planted faults replace the kernel: its exceptions are raised, and its results are checked."""
     answers: list[Any] = []
 
     def kernel(packed: Array, omega0: Array, t_end: float) -> Any:
@@ -327,7 +327,7 @@ def test_another_kernel_may_stand_in_its_place(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_quick_call_is_inherited() -> None:
-    """Or a keyword costs as much as an easy solve: the class has a vectorcall, as the type has."""
+    """Without it a keyword costs as much as an easy solve: classes inherit the vectorcall."""
     assert Solver.__flags__ & 1 << 11
     assert type("Other", (Solver,), {}).__flags__ & 1 << 11
     assert not type("Own", (Solver,), {"__call__": lambda self: 1}).__flags__ & 1 << 11
@@ -346,7 +346,7 @@ def test_quick_call_is_inherited() -> None:
 def test_preparation_checks_once(arguments: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         prepare(PUSHED, **arguments)
-    if arguments.get("method") not in ("dop853", "quick"):  # which `solve` has other words for
+    if arguments.get("method") not in ("dop853", "quick"):  # for these `solve` has another message
         with pytest.raises(ValueError, match=r"allowed|can't"):
             solve(PUSHED, [1.0], **arguments)
 
@@ -384,7 +384,7 @@ def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize("case", [1, 3, 7])
 def test_everyone_does_what_the_plan_says(case: int) -> None:
-    """A plan that says otherwise is followed."""
+    """Both entry points follow a changed plan."""
     scene = case_scene(case)
 
     def other(scene: Scene, method: str = "auto", *rest: Any, **named: Any) -> Plan:
@@ -395,7 +395,7 @@ def test_everyone_does_what_the_plan_says(case: int) -> None:
     solver(_omega(scene), 1.0)
     assert found.steps == solve(scene, [1.0], "taylor", 1e-6).steps > 0
     assert (solver.plan.method, solver.steps > 0) == ("taylor", True)
-    # What no one reads is not worked out.
+    # A property that no one reads is not computed.
     assert "decisions" not in vars(solver.plan)
 
 
@@ -411,7 +411,7 @@ def test_scipy_and_the_reference_are_not_even_imported() -> None:
 
 
 _LONE = Scene("", PUSHED.omega, coefficients=(0.0, 0.0, 1.0), torque=PUSHED.torque)
-# A disturbance of the middle axis whose square is no number.
+# A perturbation of the middle axis whose square underflows.
 _FAINT = Scene("", (1e-200, 1.0, 0.0), moments=(6.0, 5.0, 2.0))
 
 
@@ -420,7 +420,7 @@ _FAINT = Scene("", (1e-200, 1.0, 0.0), moments=(6.0, 5.0, 2.0))
     [
         (PUSHED, "auto", 1e-3, RK4_OR_TAYLOR, "quick"),
         (PUSHED, "quick", 1e-3, "quick", "quick"),
-        # For six digits the series takes fewer operations; one product alone, and quick refuses.
+        # For six digits the series takes fewer operations; with a single product `quick` refuses.
         (PUSHED, "auto", 1e-6, RK4_OR_TAYLOR, "taylor"),
         (_LONE, "auto", 1e-3, RK4_OR_TAYLOR, "taylor"),
         (case_scene(3), "auto", 1e-6, "closed-form", "closed-form"),
@@ -437,7 +437,7 @@ def test_what_the_kernel_chose_comes_back(
 
 
 def test_wave_without_effect_is_not_packed(solver: Solver) -> None:
-    """However fast it is: the bits are those of a scene that has none."""
+    """However fast the wave is, the bits are those of a scene without it."""
     idle = (((0.0, 0.0, 0.0), 1e200),)
     same = replace(PUSHED, torque=TorqueLaw(PUSHED.torque.constant, sines=idle, cosines=idle))
     wanted = solver(_omega(PUSHED), 3.0)
@@ -460,7 +460,7 @@ def test_plan_savings_are_measured() -> None:
 
 
 def test_error_of_the_series_grows_as_the_conditioning_of_the_motion() -> None:
-    """A few roundings of time, no more; measured to 1e5 s by `bench --growth`."""
+    """The error is a few roundings at most; `bench --growth` measures it to 1e5 s."""
     for case in (3, 4):
         for found in growth(case_scene(case), (10.0, 100.0, 1000.0)):
             assert found.error <= 8.0 * max(found.conditioning, 2.0**-53)
@@ -483,7 +483,7 @@ def test_plan_and_growth_on_the_command_line(command: str) -> None:
 
 
 def test_auto_solves_what_the_closed_form_refuses() -> None:
-    """A disturbance of the middle axis whose square is no number."""
+    """A perturbation of the middle axis that is too faint for the closed form."""
     scene = Scene("", (1e-130, 1.0, 0.0), moments=(3.0, 2.0, 1.0))
     with pytest.raises(InputError, match="too faint"):
         solve(scene, [5.0], "closed-form")
@@ -496,13 +496,13 @@ def test_auto_solves_what_the_closed_form_refuses() -> None:
     np.testing.assert_allclose(solver(_omega(scene), 5.0), wanted, rtol=1e-11)
     assert solver.status == "complete"
     np.testing.assert_allclose(solver.trajectory(scene.omega, [5.0]).omega[0], wanted, rtol=1e-11)
-    # And where both refuse, the reason is that of the closed form.
+    # If both refuse, the reason is the closed form's.
     with pytest.raises(InputError, match="the phase is beyond"):
         solve(case_scene(4), [1e18])
 
 
 def test_what_the_closed_form_gives_up_no_series_is_asked() -> None:
-    """It would need more steps than there may be: only what is refused is worth a series."""
+    """Only a refusal leads to the series, which would here need more steps than are allowed."""
     scene = case_scene(4)
     solver = prepare(scene)
     assert np.isnan(solver(_omega(scene), 1e18)).all()

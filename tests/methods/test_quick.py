@@ -1,4 +1,4 @@
-"""Runge-Kutta for few digits: within its tolerance, also on scenes that it was not tuned on."""
+"""Runge-Kutta for few digits: it keeps its tolerance, also on scenes that it was not tuned on."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from tests.random_scenes import NASTY, plain
 def _ratios(
     scene: Scene, t_end: float, tolerance: float, truth: Array
 ) -> dict[str, tuple[float, str]]:
-    """Return error over tolerance, and status; the last row of the truth is the end."""
+    """Return error over tolerance, and status, by method; the last row of the truth is the end."""
     scale = max(np.abs(truth).max(), max(map(abs, scene.omega))) or 1.0
     found = {}
     for method in ("quick", "auto"):
@@ -37,13 +37,13 @@ def test_tolerance_holds_on_random_scenes() -> None:
                 assert status == "complete"
                 ratios.append(ratio)
     assert max(ratios) <= 1.0
-    # And it is no series in disguise: errors are not far below what was asked for.
+    # Errors are not far below the requested tolerance, as they would be with the series.
     assert np.percentile(ratios, 90) > 1e-3
 
 
 @pytest.mark.parametrize("kind", NASTY)
 def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
-    """Against the series to 1e-14: where the two agree, neither is wrong by what they share."""
+    """Compare with the series at 1e-14, which is an independent method."""
     generator = np.random.default_rng([1982, list(NASTY).index(kind)])
     complete = runs = 0
     for number in range(80):
@@ -76,10 +76,10 @@ def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
 def test_gaps_that_are_small_by_chance_are_not_believed(
     kind: str, number: int, tolerance: float
 ) -> None:
-    """Of 15 000 draws those where one gap, or too large a share, would have been believed first.
+    """Of 15 000 draws, those that fail first if one gap alone, or too large a gap, is trusted.
 
-    The share that the gap may have is a third of the tolerance, and the result is better than the
-    gap by its extrapolation: so a fifth of the tolerance is much.
+    A gap is the difference of results with steps of h and 2 h. It may be a third of the tolerance,
+    and extrapolation makes the result better than the gap: a fifth of the tolerance is much.
     """
     generator = np.random.default_rng([7, list(NASTY).index(kind)])
     scene, t_end = [NASTY[kind](generator) for _ in range(number + 1)][-1]
@@ -93,7 +93,7 @@ def test_gaps_that_are_small_by_chance_are_not_believed(
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
 @pytest.mark.parametrize("case", [3, 4, 5, 6])
 def test_result_is_extrapolated(case: int, tolerance: float) -> None:
-    """Without its leading term the error is far below that of as many plain steps (eq. 31)."""
+    """Without its leading term the error is far smaller than with as many plain steps (eq. 31)."""
     scene = case_scene(case)
     solver = prepare(scene, "quick", tolerance)
     found = solver(np.array(scene.omega), 3.0).copy()
@@ -105,7 +105,7 @@ def test_result_is_extrapolated(case: int, tolerance: float) -> None:
 
 
 def test_more_steps_than_were_planned_by_far_are_no_way_out() -> None:
-    """Small differences grow here until rounding rules: it is said, and soon."""
+    """Perturbations grow here until rounding dominates, which the status soon reports."""
     law = TorqueLaw(sines=(((3.0, 1.0, -2.0), 4.0),), cosines=(((0.0, 2.0, 1.0), 1.3),))
     scene = Scene("", (0.3, 1.0, 0.2), moments=(3.0, 2.0, 1.2), torque=law)
     solver = prepare(scene, "quick", 1e-6)
@@ -115,7 +115,7 @@ def test_more_steps_than_were_planned_by_far_are_no_way_out() -> None:
 
 
 def test_steps_that_tell_nothing_are_not_trusted() -> None:
-    """Long steps damp this motion to nothing, steps of four times the length run away."""
+    """Long steps damp this motion to nothing, and steps of four times the length diverge."""
     torque = TorqueLaw(
         cosines=(((-50000.0, 2000.0, 50000.0), 93.9),), sines=(((0.0, 0.0, -300.0), 148.0),)
     )
@@ -135,7 +135,7 @@ def test_every_instruction_set(level: int) -> None:
 
 
 def test_fast_weak_waves_are_averaged_and_their_integral_is_exact() -> None:
-    """Case 7 to 1e-3: a few steps for 300 radians of torque."""
+    """Case 7 to 1e-3: a few steps suffice for 300 radians of torque."""
     scene = case_scene(7)
     solver, finer = (prepare(scene, "quick", each) for each in (1e-3, 1e-7))
     found = solver(np.array(scene.omega), 3.0)

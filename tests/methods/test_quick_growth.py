@@ -1,4 +1,4 @@
-"""Few digits where perturbations grow: `quick`, and `auto` which may take it, beside the series.
+"""Few digits where perturbations grow: `quick`, and `auto` which may take it, against the series.
 
 At an unstable steady rotation under torque nothing happens until rounding has grown, and steps of
 all three lengths of `quick` agree. The scenes are drawn at random.
@@ -15,17 +15,17 @@ from pyharness.methods.solver import Solver
 from tests.random_scenes import NASTY, moments, plain, triple
 
 ROUNDING = 2.0**-53
-_UNSURE = 0.3  # rounding times growth, in tolerances, from which on the series says sensitive
+_UNSURE = 0.3  # rounding times growth, in tolerances, above which the series reports sensitive
 
 
 def _unstable(generator: np.random.Generator) -> tuple[Scene, float]:
-    """Return a steady rotation under torque, and a time in which perturbations grow 1 to 1e18."""
+    """Return a steady rotation under torque, and a time for a growth of perturbations to 1e18."""
     while True:
         body = moments(generator)
         middle = int(np.argsort(body)[1])
         omega = 10.0 ** generator.uniform(-8.0, -0.3, 3) * generator.choice([-1.0, 1.0], 3)
         omega[middle] = generator.choice([-1.0, 1.0]) * 10.0 ** generator.uniform(-0.5, 0.5)
-        # So that I omega' = N - omega x I omega is 0, but for rounding.
+        # The torque makes I omega' = N - omega x I omega zero, except for rounding.
         torque = TorqueLaw(triple(np.cross(omega, body * omega)))
         scene = Scene("", triple(omega), triple(body), torque=torque)
         x, y, z = omega
@@ -68,7 +68,8 @@ def test_complete_is_not_said_where_the_series_says_sensitive(
             assert error <= tolerance + doubt, number
             assert solver.error >= 0.1 * error - doubt, number
             assert solver.error <= tolerance
-    # Neither says it of all, nor is `auto` the series throughout: for more digits hardly ever less.
+    # Neither method reports all scenes as sensitive, and `auto` is not always the series. For more
+    # digits it nearly always is.
     if method == "quick" or tolerance == 1e-3:
         assert seen["quick complete"] > 20
     assert sum(seen[f"{name} sensitive"] for name in ("quick", "taylor")) > 20
@@ -76,7 +77,7 @@ def test_complete_is_not_said_where_the_series_says_sensitive(
 
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-12])
 def test_rounding_of_many_steps_is_seen(tolerance: float) -> None:
-    """Where `quick` was asked for more digits than it is for."""
+    """Request more digits from `quick` than it is made for."""
     generator = np.random.default_rng(252)
     for number in range(60):
         scene, time = _unstable(generator)
@@ -109,7 +110,7 @@ def test_scene_of_the_first_report() -> None:
 
 
 def test_bound_of_the_amplification_is_one() -> None:
-    """In calm and rough motions the error has rounding times the growth that the series finds."""
+    """In calm and rough motions the reported error includes rounding times the series' growth."""
     generator = np.random.default_rng(253)
     seen = 0
     for make in (plain, *NASTY.values()):

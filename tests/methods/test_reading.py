@@ -1,11 +1,11 @@
-"""Prepared solvers read the numbers of an array, and nothing behind its end."""
+"""Prepared solvers read the numbers of an array, and nothing beyond its end."""
 
 import subprocess
 import sys
 
 import pytest
 
-# The arrays end where memory begins that nobody may read: who reads on is ended by the system.
+# The arrays end where inaccessible memory begins: a read beyond the end kills the process.
 SCRIPT = """
 import ctypes, mmap
 import numpy as np

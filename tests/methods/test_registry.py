@@ -1,4 +1,4 @@
-"""The registry: what it says of its methods is so, and they take times and tolerances alike."""
+"""The registry: its statements about methods are true, and all take times and tolerances alike."""
 
 import math
 import re
@@ -38,7 +38,7 @@ def test_times_may_run_either_way_on_either_side(method: str) -> None:
         assert getattr(back, name) == getattr(forth, name)
     assert back.time.tolist() == back.recorded_time.tolist() == times[::-1]
     np.testing.assert_array_equal(forth.omega[2], scene.omega)
-    # Torque-free and omega1(0) = 0: reversing time only turns the sign of omega1.
+    # Without torque and with omega1(0) = 0, reversing time only changes the sign of omega1.
     turned = back.omega[:2] * np.array([-1.0, 1.0, 1.0])
     np.testing.assert_allclose(forth.omega[:2], turned, rtol=0, atol=1e-7)
 
@@ -79,21 +79,21 @@ def test_tolerance_is_checked(tolerance: float) -> None:
 @pytest.mark.parametrize(
     ("method", "words"),
     [
-        ("dop853", r"gave up at t = ([\d.e+-]+) s after 2000 right-hand sides"),
+        ("dop853", r"exceeded its work limit at t = ([\d.e+-]+) s after 2000 right-hand sides"),
         ("closed-form", r"at t = ([\d.e+-]+) s the phase"),
-        ("taylor", r"gave up before t = ([\d.e+-]+) s after"),
+        ("taylor", r"exceeded its work limit before t = ([\d.e+-]+) s after"),
         ("rk4", r"steps of ([\d.e+-]+) s are too many"),
     ],
 )
 def test_time_of_a_refusal_is_in_the_seconds_of_the_scene(
     method: str, words: str, power: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And it is that of the result that could not be had, not the first, nor the last."""
+    """The time belongs to the result that could not be reached, neither the first nor the last."""
     monkeypatch.setattr("pyharness.methods.scipy_ivp._MOST_EVALUATIONS", 2000)
     plain = Scene("", (1.0, 1.0, 2.0), moments=(3.0, 2.0, 1.0))
     factor = math.ldexp(1.0, power)
     scene = scaled(plain, factor)
-    # The last two are out of reach of all of them.
+    # No method can reach the last two.
     times = [1.0 / factor, 1e19 / factor, 1e20 / factor]
     tolerance = max(1e-6, METHODS[method].finest)
     with pytest.raises(TimedError) as refusal:
@@ -126,7 +126,7 @@ def test_every_call_of_the_right_hand_side_is_counted(
     scene = case_scene(5)
     slope = Mock(side_effect=scene.right_hand_side())
     monkeypatch.setattr(Scene, "right_hand_side", lambda _: slope)
-    # Those of the look ahead too; SciPy's own count leaves out Radau's Jacobians.
+    # The count includes the forecast's calls; SciPy's own count leaves out Radau's Jacobians.
     assert solve(scene, [0.5, 1.0], method, 1e-6).evaluations == slope.call_count
 
 

@@ -1,4 +1,4 @@
-"""Growth of small differences, estimated errors, and the ending that tells of them."""
+"""Error amplification, estimated errors, and the ending `sensitive`."""
 
 import math
 from collections.abc import Callable
@@ -27,7 +27,7 @@ SPHERE = Scene("", (1.0, 2.0, 3.0), moments=(2.0,) * 3, torque=TorqueLaw((1.0, 0
 
 
 def _along(scene: Scene, time: float) -> float:
-    """Return the growth by the linearised flow along the closed form."""
+    """Return the amplification by the linearised flow along the closed form."""
     times = np.linspace(0.0, time, 6000)
     path = solve(scene, times[1:].tolist(), "closed-form", 1e-9)
     omega = np.vstack([scene.omega, path.omega])
@@ -37,7 +37,7 @@ def _along(scene: Scene, time: float) -> float:
 @pytest.mark.parametrize("time", [0.5, 3.0, -3.0, 30.0, -100.0])
 @pytest.mark.parametrize("scene", [case_scene(2), case_scene(3), case_scene(4), BESIDE])
 def test_growth_is_that_of_the_linearised_flow(scene: Scene, time: float) -> None:
-    """At sixteen instants: what lies between them, at the worst, is a third of it."""
+    """Sampled at sixteen times: the largest value between them is at worst three times as large."""
     ratio = (motion_growth(scene, time) or 0.0) / _along(scene, time)
     assert 1.0 / 3.0 <= ratio <= 1.3
 
@@ -48,7 +48,7 @@ def test_growth_of_a_spin_about_the_middle_axis_is_that_of_what_leaves_it() -> N
     rate = 2.0 * math.sqrt(abs(a * c))
     grown = math.cosh(10.0 * rate) * (1.0 + max(abs(a / c), abs(c / a)) ** 0.5)
     assert 0.3 * grown <= (motion_growth(scene, 10.0) or 0.0) <= 1.01 * grown
-    # As far as a difference of 2**-48 can grow.
+    # This is how far a perturbation of 2**-48 can grow.
     assert 2.0**46 <= (motion_growth(scene, 200.0) or 0.0) <= 2.0**51
 
 
@@ -62,15 +62,15 @@ def test_growth_is_one_where_nothing_grows_and_unknown_where_no_method_tells() -
     assert motion_growth(BESIDE, 0.0) == motion_growth(AT_REST, 5.0) == 1.0
     assert motion_growth(SPHERE, 1e6) == 1.0
     assert closed_form_estimate(RUNAWAY, (1.0, 1.0, 1.0), 0.5) == (None, None)
-    # Without bound before the end.
+    # The solution grows without bound before the end.
     assert motion_growth(RUNAWAY, 2.0) is None
 
 
 @pytest.mark.parametrize("time", [1.0, 30.0, 300.0, -1000.0])
-# A tenth of the speed of Case 3: its reference takes a tenth of the time.
+# Case 3 at a tenth of its speed: its reference takes a tenth of the time.
 @pytest.mark.parametrize("scene", [scaled(case_scene(3), 0.1), BESIDE, SPHERE])
 def test_error_of_a_closed_form_is_what_it_may_be(scene: Scene, time: float) -> None:
-    """Within a few units of rounding A, B and C, which grow like any other difference."""
+    """The error is within a few units of rounding A, B and C, which grow like any perturbation."""
     found, truth = solve(scene, [time], "closed-form", 1e-9), reference(scene, [time]).omega[-1]
     scale = max(np.abs(truth).max(), max(map(abs, scene.omega)))
     assert found.error is not None
@@ -92,7 +92,7 @@ def test_ending_is_sensitive_where_rounding_exceeds_the_tolerance() -> None:
             assert (solver.growth, solver.error) == (found.growth, found.error)
             assert solver.digits == found.digits == digits_left(found.error)
             assert found.growth == growth
-    # More than a closed form claims may be asked for, and is told of.
+    # A finer tolerance than a closed form claims may be requested, and is reported.
     assert solve(case_scene(3), [30.0], tolerance=1e-15).ended == "sensitive"
     assert solve(case_scene(3), [0.01], tolerance=1e-15).ended == "complete"
 
@@ -107,11 +107,11 @@ def test_gauss_collocation_knows_the_growth_of_the_motion() -> None:
         assert (found.ended, found.growth) == (word, growth)
         assert found.error is not None
         assert ROUNDING * growth <= found.error <= share * tolerance + ROUNDING * growth
-        # In the scene's steps it has no estimate of its own.
+        # With the scene's own steps it has no estimate of its own.
         solver = prepare(BESIDE, "gauss-8", share * tolerance)
         solver(BESIDE.omega, 12.0)
         assert (solver.status, solver.error, solver.growth) == (word, None, growth)
-    # From the start and to the time of the call.
+    # The growth is from the start and to the time of the call.
     solver(case_scene(3).omega, -3.0)
     assert solver.growth == motion_growth(replace(BESIDE, omega=case_scene(3).omega), -3.0)
     at_rest = solve(AT_REST, [1.0], "gauss-2", 1e-6)
@@ -151,7 +151,7 @@ def test_quick_tells_its_own_error(tolerance: float) -> None:
 
 
 def _grown(status: int, error: float, growth: float) -> Callable[..., Any]:
-    """Return a series that ends with a status, and says what it found."""
+    """Return a series that ends with a status, and reports an error and a growth."""
 
     def rows(*given: Any, effort: Any, **_: Any) -> Any:
         effort[2:4] = error, growth
@@ -184,7 +184,7 @@ def test_what_the_series_finds_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> 
     solver = prepare(PUSHED, "taylor")
     assert solver(PUSHED.omega, 2.0).tolist() == [1.0] * 3
     assert (solver.status, solver.error, solver.growth) == ("sensitive", 1e-6, 3e9)
-    # Gauss collocation asks the series, to three digits, where there is no closed form.
+    # Without a closed form, Gauss collocation gets the growth from the series, to three digits.
     kernel = SimpleNamespace(taylor_rows=_grown(Statuses.COMPLETE, 1e-4, 3e9))
     monkeypatch.setattr(room, "extension", lambda: kernel)
     assert motion_growth(PUSHED, 2.0) == 3e9

@@ -1,4 +1,4 @@
-"""Small waves, starts at rest and waves of any speed: the tolerance is of what omega gets to be."""
+"""Small waves, starts at rest, waves of any speed: the scale is the largest omega reached."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ def _errs(found: np.ndarray, scene: Scene, time: float) -> float:
 @pytest.mark.parametrize("frequency", [1e-108, 1e-12, 1e-8, 1e-7, 1e-5, 1e-3, 0.1])
 @pytest.mark.parametrize("t_end", [1.0, -2.5])
 def test_slow_sine_from_rest(frequency: float, t_end: float) -> None:
-    """1 - cos(f t) has no digit where f t is small; a prepared `auto` answered 0."""
+    """1 - cos(f t) has no digit where f t is small; a prepared `auto` once returned 0."""
     amplitude = max(20.0, 1e-9 / frequency)
     scene = _driven(sines=(((0.0, 0.0, amplitude), frequency),))
     for tolerance in (1e-6, 1e-8):
@@ -38,7 +38,7 @@ def test_slow_sine_from_rest(frequency: float, t_end: float) -> None:
 
 
 def test_slow_waves_beside_faster_ones() -> None:
-    """Steps that follow the fast wave carry the slow ones along by rotations of a tiny angle."""
+    """Steps that follow the fast wave advance the slow ones by rotations of a tiny angle."""
     for slow in (1e-9, 1e-6, 1e-4):
         waves = (((40.0, -30.0, 20.0), slow), ((0.2 * slow, slow, -slow), 30.0))
         scene = _driven(sines=waves, cosines=(((0.0, slow, 0.0), slow),))
@@ -47,7 +47,7 @@ def test_slow_waves_beside_faster_ones() -> None:
 
 
 def test_fast_waves_keep_their_phase() -> None:
-    """A wave that is averaged may turn 1e12 times: the product f t is kept in two words."""
+    """An averaged wave may turn 1e12 times: the product f t is kept as a double-double."""
     for frequency, time, tolerance in ((1e9, 7.3, 1e-9), (1e12, 0.7, 1e-9), (1e20, 0.7, 1e-9)):
         scene = _driven((0.0, 0.0, 1.0), cosines=(((0.0, 0.0, 2.0 * frequency), frequency),))
         found = prepare(scene, "auto", tolerance)(np.array(scene.omega), time)
@@ -63,14 +63,14 @@ def test_collocation_keeps_the_phase_of_a_wave_over_many_turns() -> None:
 
 
 def test_series_takes_a_slow_sine_for_what_it_comes_to() -> None:
-    """It began with a step for the amplitude, 1e-20 s, and gave up."""
+    """Regression test: the first step fitted the amplitude, 1e-20 s, and the work limit was exceeded."""
     scene = _driven(sines=(((0.0, 0.0, 20e40), 1e-40),))
     assert solve(scene, [3.0], "taylor", 1e-12).omega[0, 2] == pytest.approx(4.5, rel=1e-12)
 
 
 _FAR, _PUSH = 1e162, 1e-252
 _FAINT = ((120 * _PUSH, -60 * _PUSH, 80 * _PUSH), 2.0 / _FAR / (_PUSH * _FAR * _FAR))
-# A scene, the time, a tolerance, and methods; the names say what some of them once fell for.
+# A scene, the time, a tolerance, and methods; the names describe former faults of some of them.
 HELD: dict[str, tuple[Scene, float, float, str]] = {
     **{
         f"the scale of a start at rest, {size:g}": (
@@ -104,7 +104,7 @@ def test_tolerance_is_of_what_omega_gets_to_be(name: str, method: str) -> None:
 
 @pytest.mark.parametrize("method", SCIPY_METHODS)
 def test_scipy_refuses_what_it_can_not_meet(method: str) -> None:
-    """Beside the middle axis a step of 2e-14 is multiplied by more than a tolerance allows."""
+    """Near the middle axis a local error of 2e-14 is amplified beyond the tolerance."""
     scene = Scene("middle", (1e-6, 3.0, 1e-6), BODY)
     claimed, least = METHODS[method].finest, finest(method, scene, 8.0)
     assert least > 20.0 * claimed
@@ -121,7 +121,7 @@ def test_rest_that_nothing_moves_stays(method: str) -> None:
 
 @pytest.mark.parametrize("method", SCIPY_METHODS)
 def test_spin_that_turns_too_often_is_no_overflow(method: str) -> None:
-    """Nothing grows without bound: it is the phase that has no digit left."""
+    """Nothing grows without bound, but the phase has no digit left."""
     steady, spun_up = Scene("", (0.0, 0.0, 1.0), BODY), _driven(constant=(0.0, 0.0, 1.0))
     for scene, time, words in ((steady, 1e15, "at t = .*radians the phase"), (spun_up, 1e8, "")):
         with pytest.raises(InputError, match=f"gave up {words}"):
@@ -129,7 +129,7 @@ def test_spin_that_turns_too_often_is_no_overflow(method: str) -> None:
 
 
 def test_rows_on_the_way_keep_the_tolerance_too() -> None:
-    """They are read off a polynomial in a step, which errs more than the step's end."""
+    """Intermediate rows are read off a polynomial, which is less accurate than the step's end."""
     generator = np.random.default_rng(7)
     for _ in range(6):
         law = TorqueLaw(tuple(generator.normal(size=3) * 60.0))

@@ -1,4 +1,4 @@
-"""Torque about the axes of space: against other integrators, and what it does to the momentum."""
+"""Torque about the axes of space: other integrators, and its effect on the angular momentum."""
 
 import pickle
 from collections.abc import Callable, Sequence
@@ -61,12 +61,12 @@ PUSHED = SCENES["constant"]
 
 
 def matrix(scene: Scene) -> Array:
-    """Return the matrix of inertia."""
+    """Return the inertia matrix."""
     return np.array(scene.inertia) if scene.inertia is not None else np.diag(scene.moments or ())
 
 
 def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
-    """Return omega and attitude by DOP853 on seven unknowns, with SciPy's own rotations."""
+    """Return omega and attitude by DOP853 for seven unknowns, with SciPy's own rotations."""
     inertia = matrix(scene)
 
     def rates(t: float, y: Array) -> Array:
@@ -82,7 +82,7 @@ def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
 
 
 def momentum(scene: Scene, times: Array) -> Array:
-    """Return the momentum in space, which the torque alone changes, at times (s)."""
+    """Return the angular momentum in space at `times` (s), which the torque alone changes."""
     start = matrix(scene) @ np.array(scene.omega)
     law, t = scene.torque, times[:, None]
     attitude = np.array([scene.attitude or IDENTITY])
@@ -102,7 +102,7 @@ def test_series_agrees_with_seven_unknowns(name: str, time: float) -> None:
     assert found.attitude is not None
     omega, attitude = by_scipy(SCENES[name], times)
     assert np.abs(found.omega - omega).max() < 2e-12 * np.abs(omega).max()
-    # The signs too: they are continuous.
+    # The signs are compared too, because they are continuous.
     assert np.abs(found.attitude - attitude).max() < 2e-12
     assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
 
@@ -125,7 +125,7 @@ def test_momentum_on_random_scenes() -> None:
         scene = replace(scene, torque=replace(scene.torque, frame="space"), attitude=TURNED)
         found = solve(scene, [drawn.time], tolerance=1e-13, attitude=True)
         true = momentum(scene, np.array([drawn.time]))
-        # A wave's angle may be rounded.
+        # The angle of a wave may be rounded.
         error = np.abs(found.angular_momentum("space") - true).max()
         largest = max(np.abs(true).max(), np.abs(momentum(scene, np.zeros(1))).max())
         ways.append(error / largest)
@@ -165,7 +165,7 @@ def test_torque_along_the_axis_of_a_spin_is_one_of_the_body(axis: int) -> None:
     )  # fmt: skip
     assert body.attitude is not None
     assert space.attitude is not None
-    # About the middle axis what rounding leaves grows.
+    # Near the middle axis rounding errors grow.
     assert space.omega == pytest.approx(body.omega, rel=1e-12, abs=1e-12)
     assert angle_between(space.attitude, body.attitude).max() < 1e-12
 
@@ -203,11 +203,11 @@ def test_tolerance_holds_on_random_scenes() -> None:
                 np.abs(found.omega - true.omega).max() / largest,
                 angle_between(found.attitude, true.attitude).max(),
             )
-            # Between two marches as fine as can be there is what rounding has become.
+            # Two integrations at the finest tolerance still differ by amplified rounding.
             assert error <= tolerance + 10.0 * (true.error or 0.0), (number, tolerance)
             ratios.append(error / ((found.error or 0.0) + (true.error or 0.0)))
     assert held > 900
-    # Two marches may err alike, here far below the tolerance.
+    # Two integrations may have the same error, here far below the tolerance.
     assert max(ratios) < 10.0
     assert sorted(ratios)[len(ratios) * 99 // 100] < 1.0
     assert sorted(ratios)[len(ratios) // 2] < 0.2
@@ -223,7 +223,7 @@ def test_tolerance_is_no_finer_than_asked_for() -> None:
         for tolerance in (1e-3, 1e-6, 1e-9, 1e-12)
     ]
     assert max(steps) < 120
-    # Two marches do, or three.
+    # Two integrations suffice, or three.
     assert max(e / s for e, s in zip(evaluations, steps, strict=True)) < 3.5
 
 
@@ -287,11 +287,13 @@ def test_what_rounding_has_become_is_told() -> None:
 
 
 def test_giving_up_says_what_would_do() -> None:
-    with pytest.raises(InputError, match=r"taylor gave up before t = 1000 s .*--effort"):
+    with pytest.raises(
+        InputError, match=r"taylor exceeded its work limit before t = 1000 s .*--effort"
+    ):
         solve(PUSHED, [1.0, 1000.0], attitude=True, effort=1e-3)
     with pytest.raises(InputError, match="after 1 step; "):
         solve(PUSHED, [1e9], attitude=True)
-    # The speed grows with time, and so do the steps of a second.
+    # The speed grows with time, and with it the number of steps for a second.
     with pytest.raises(InputError, match=r"--effort") as refused:
         solve(PUSHED, [1000.0], attitude=True, effort=1e-2)
     advised = float(str(refused.value).split("--effort ")[1].split(" ")[0])
@@ -300,7 +302,7 @@ def test_giving_up_says_what_would_do() -> None:
 
 
 def test_giving_up_in_the_first_integration_counts_the_second() -> None:
-    """Here the steps of a second stay as they are, so that the work is known from the first."""
+    """Here each second takes as many steps, so that the first integration tells the work."""
     calm = replace(
         PUSHED, omega=(0.0, 1.0, 10.0), torque=replace(PUSHED.torque, constant=(0.0, 0.0, 1e-9))
     )
@@ -382,7 +384,7 @@ def test_attitude_must_be_asked_for(method: str) -> None:
 
 
 def test_full_inertia_takes_the_torque_as_it_is() -> None:
-    """The same body about its principal axes, with its attitude, moves alike in space."""
+    """The same body about its principal axes, with its attitude, has the same motion in space."""
     scene = SCENES["full, axes of space"]
     assert scene.inertia is not None
     moments, axes = principal_axes(scene.inertia)
@@ -398,9 +400,9 @@ def test_full_inertia_takes_the_torque_as_it_is() -> None:
 
 @pytest.mark.parametrize("time", [40.0, 120.0])
 def test_the_scale_is_the_largest_omega_on_the_way(time: float) -> None:
-    """A torque makes omega from almost nothing: a coarse tolerance takes no more steps than a fine.
+    """A torque makes omega from almost nothing, and a coarse tolerance takes no more steps.
 
-    It would, were the tolerance relative to the omega of the start.
+    It would take more than a fine one, if the tolerance were relative to the initial omega.
     """
     law = TorqueLaw((0.3, -0.2, 0.1), frame="space")
     scene = Scene("", (1e-9, 0.0, 0.0), moments=(3.0, 2.0, 4.0), torque=law)

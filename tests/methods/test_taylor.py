@@ -1,4 +1,4 @@
-"""The Taylor kernel: its tolerance, both directions, its rows, its ends, every instruction set."""
+"""The Taylor kernel: its tolerance, both directions, rows, endings, every instruction set."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -95,7 +95,7 @@ def test_any_torque_law_either_way(name: str, time: float) -> None:
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-6, 1e-9, 1e-12, 1e-14])
 @pytest.mark.parametrize(("frequency", "time"), [(242.25, 70.5), (1000.3, 60.0)])
 def test_thousands_of_turns_of_a_wave(frequency: float, time: float, tolerance: float) -> None:
-    """What each step errs adds up, and so does what the rounding of a phase costs."""
+    """The errors of all steps add up, and so do the rounding errors of a phase."""
     law = TorqueLaw(sines=(((2.0, -1.0, 6.0), frequency),))
     scene = Scene("", (0.3, -1.0, 0.5), moments=(2.0, 2.0, 2.0), torque=law)
     omega, status, _ = _end(scene, time, tolerance)
@@ -106,7 +106,10 @@ def test_thousands_of_turns_of_a_wave(frequency: float, time: float, tolerance: 
 def _held_to_fine_rows(
     scene: Scene, time: float, tolerances: Sequence[float], share: float
 ) -> None:
-    """Hold the end to a share of each tolerance, by a finer series; not where that gives up."""
+    """Check that the error at the end is at most `share` of each tolerance.
+
+    The truth is a finer series; if it has not all rows, nothing is checked.
+    """
     times = np.linspace(0.0, time, 33)[1:]
     truth, n_rows, _, _ = extension().taylor_rows(*normalized(scene), scene.omega, times, 1e-15)
     if n_rows == len(times):
@@ -118,7 +121,7 @@ def _held_to_fine_rows(
 
 @pytest.mark.parametrize("kind", NASTY)
 def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
-    """Where a small difference grows the series takes smaller errors by itself."""
+    """Where a perturbation grows, the series takes smaller local errors by itself."""
     generator = np.random.default_rng([3, list(NASTY).index(kind)])
     for _ in range(60):
         _held_to_fine_rows(*NASTY[kind](generator), (1e-3, 1e-6, 1e-9), 1.0)
@@ -155,7 +158,7 @@ def test_blow_up_ends_the_rows(level: int) -> None:
     ],
 )
 def test_steps_are_few(name: str, time: float, counts: tuple[int, ...]) -> None:
-    """No more by a quarter than what they were, and in one march."""
+    """Take at most a quarter more steps than recorded here, and one integration."""
     for count, tolerance in zip(counts, (1e-3, 1e-6, 1e-9, 1e-12, 1e-14), strict=True):
         found = solve(SCENES[name], [time], "taylor", tolerance)
         assert found.evaluations == found.steps <= 1.25 * count + 1.0
@@ -166,7 +169,7 @@ def test_steps_are_few(name: str, time: float, counts: tuple[int, ...]) -> None:
     reason="without optimisation nothing is fused, and natively the plain kernel is",
 )
 def test_levels_agree_to_rounding() -> None:
-    """And not to the bit: with fused multiply-adds they would only if one kernel ran twice."""
+    """The bits differ: with fused multiply-adds they would agree only if one kernel ran twice."""
     found = []
     for number in range(level_here() + 1):
         assert extension().choose_instructions(number) == number
@@ -179,7 +182,7 @@ def test_levels_agree_to_rounding() -> None:
 @pytest.mark.external
 @pytest.mark.skipif(not compiler_here(), reason="no compiler")
 def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
-    """The source is the definition; unroll.py only writes its loops out."""
+    """The source is the definition; unroll.py only writes out its loops."""
     loops = as_written(tmp_path)
     for name, scene in SCENES.items():
         found = loops(scene, [2.0], 1e-12)
@@ -202,14 +205,14 @@ def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
     ("kind", "number"), [("near the separatrix", 127), ("other units", 190), ("resonant", 153)]
 )
 def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number: int) -> None:
-    """Of 1500 draws those where a difference that is carried wrongly would have cost the most."""
+    """Of 1500 draws, those where a wrongly propagated perturbation would have cost the most."""
     generator = np.random.default_rng([11, list(NASTY).index(kind)])
     scene, time = [NASTY[kind](generator) for _ in range(number + 1)][-1]
     _held_to_fine_rows(scene, time, [1e-3], 0.4)
 
 
 def test_the_error_is_the_largest_of_all_rows() -> None:
-    """Rows within the steps have errors of their own, which the last row's do not show."""
+    """Rows within the steps have errors of their own, which the last row does not show."""
     generator = np.random.default_rng(3)
     ratios = []
     for _ in range(8):

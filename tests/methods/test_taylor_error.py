@@ -1,4 +1,4 @@
-"""What the Taylor kernel says of its error and of the growth of differences, held to the truth."""
+"""Error and error amplification that the Taylor kernel reports, compared with the truth."""
 
 from functools import cache
 
@@ -19,9 +19,9 @@ WAVES = TorqueLaw(
     (0.3, -0.2, 0.1), sines=[((0.5, 0.1, -0.4), 3.0)], cosines=[((-0.3, 0.6, 0.2), 5.0)]
 )
 SCENES = {"case 5": case_scene(5), "waves": Scene("", (1.0, -2.0, 0.5), BODY, torque=WAVES)}
-# No size is small enough: no error is taken off.
+# No size is small enough for linear theory, so that no error is subtracted.
 UNTAKEN = {"taylor_rows": ("LINEAR = 0.1_dp", "LINEAR = -1.0_dp")}
-CALM = 1e4  # growth
+CALM = 1e4  # error amplification
 pytestmark = [
     pytest.mark.external,
     pytest.mark.skipif(
@@ -32,7 +32,7 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def untaken(tmp_path_factory: pytest.TempPathFactory) -> as_written.Solve:
-    """Return the kernel that measures its error, and leaves it in the rows."""
+    """Return the kernel that estimates its error without subtracting it from the rows."""
     return as_written.as_written(tmp_path_factory.mktemp("untaken"), UNTAKEN)
 
 
@@ -88,12 +88,12 @@ def test_march_made_again_knows_it_well() -> None:
 
 @pytest.mark.parametrize("number", [2359, 2555, 3755])
 def test_growth_of_several_times_is_the_largest_of_any(number: int) -> None:
-    """Beside the middle axis: at the last time an earlier perturbation is smaller again."""
+    """Near the middle axis, an earlier perturbation is smaller again at the last time."""
     of = drawn("20263", number)
     each = [solve(of.scene, [time], "taylor", of.tolerance).growth or 0.0 for time in of.times]
     assert max(each) > 20.0 * each[-1]
     together = solve(of.scene, of.times, "taylor", of.tolerance).growth or 0.0
-    # At the end of the block of steps that the time is in.
+    # The growth is measured at the end of the block of steps that contains the time.
     assert 0.8 * max(each) < together < 2.5 * max(each)
 
 
@@ -131,7 +131,7 @@ def test_says_where_no_digit_is_left() -> None:
 def test_rows_within_steps_have_their_error_taken_off(
     name: str, tolerance: float, factor: float, untaken: as_written.Solve
 ) -> None:
-    """They are as good as at the end."""
+    """The rows within steps are as accurate as the last one."""
     scene = SCENES[name]
     times = np.linspace(0.0, 3.0, 301)[1:].tolist()
     known = reference(scene, times).omega
@@ -149,7 +149,7 @@ def test_rows_within_steps_have_their_error_taken_off(
 
 
 def _beside(small: float) -> Scene:
-    """Return a body that spins a little beside the axis in the middle."""
+    """Return a body that rotates nearly about its middle axis."""
     return Scene("", (small, 2.0, 0.3 * small), BODY)
 
 
@@ -169,7 +169,7 @@ def _beside(small: float) -> Scene:
     ],
 )
 def test_growth_over_thousands_of_steps(small: float, time: float, tolerance: float) -> None:
-    """Whose blocks are merged; and where what grew is more than binary64 can hold beside it."""
+    """Blocks of steps are merged, also if the growth exceeds the precision of binary64."""
     known = truth.truth_of(_beside(small), time).growth
     found = solve(_beside(small), [time], "taylor", tolerance)
     assert found.growth == pytest.approx(known, rel=0.4)
@@ -180,7 +180,7 @@ def test_growth_over_thousands_of_steps(small: float, time: float, tolerance: fl
     [((0.0, 0.0, 2.0), 0.1, 5.0), ((0.0, 0.0, 2.0), 0.1, 20.0), ((0.0, 0.0, 2.0), 0.0, 500.0)],
 )
 def test_growth_beside_a_spin_is_none(omega: Triple, torque: float, time: float) -> None:
-    """Its series has hardly a term, and its steps are long."""
+    """The series of a spin has hardly a term, and its steps are long."""
     law = TorqueLaw((0.0, 0.0, torque))
     found = solve(Scene("", omega, BODY, torque=law), [time], "taylor", 1e-9)
     assert found.steps < 20
@@ -204,7 +204,7 @@ def test_growth_of_what_hardly_turns_is_one() -> None:
 
 
 def test_steps_are_counted_over_all_marches() -> None:
-    """The march that is made again takes more of them, since differences grow."""
+    """The repeated integration takes more steps, because perturbations grow."""
     twice = solve(_beside(1e-3), [20.0], "taylor", 1e-6)
     assert twice.ended == "complete"
     assert 1.3 * twice.steps <= twice.evaluations < 2 * twice.steps

@@ -1,4 +1,4 @@
-"""Attitudes as given and as shown; full inertia matrices."""
+"""Attitudes as given and as printed; full inertia matrices."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The build: what the binary needs, what f2py may not guess, and what the set-up says."""
+"""The build: what the binary needs, what f2py may not guess, and the messages of the set-up."""
 
 import importlib.util
 import os
@@ -53,7 +53,7 @@ def test_kind_that_f2py_would_guess_fails_the_build(tmp_path: Path) -> None:
 
 
 def _hook(*folders: Path) -> subprocess.CompletedProcess[str]:
-    """Ask the build backend what an editable install needs, with these folders on the path."""
+    """Run the build backend's hook for an editable install, with these folders on the path."""
     code = "import build_backend as b; print(b.get_requires_for_build_editable())"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, folders))}
     command = [sys.executable, "-c", code]
@@ -61,7 +61,7 @@ def _hook(*folders: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_an_editable_install_in_build_isolation_is_refused(tmp_path: Path) -> None:
-    """Pip puts the build tools into a folder, on the path of the build alone, and removes it."""
+    """Pip puts the build tools into a folder on the path of the build alone, and removes it."""
     backend = ROOT / ".ci"
     kept = _hook(backend)
     assert kept.returncode == 0, kept.stderr
@@ -109,8 +109,8 @@ def test_a_build_without_a_fortran_compiler_says_so_in_one_line(tmp_path: Path) 
 def test_setup_that_can_not_go_on_says_what_to_do(
     python: str, compiler: str, words: str, tmp_path: Path
 ) -> None:
-    """No compiler, and none may be installed: a message with four commands, nothing else."""
-    # A path with the tools that the script needs, and no compiler.
+    """Without a compiler, and if none may be installed, print a message with four commands only."""
+    # A PATH with the tools that the script needs, and no compiler.
     tools = tmp_path / "bin"
     tools.mkdir()
     for tool in ("sh", "id", "mkdir", "rm", "grep", "tail", "env"):

@@ -20,7 +20,7 @@ def _symmetric(a: float, b: float, c: float, d: float, e: float, f: float) -> Ma
 
 
 def _drawn(source: random.Random) -> Matrix:
-    """Return a matrix about axes that are tilted, its moments as unlike as 1 and 1e-15."""
+    """Return a matrix about tilted axes, whose moments may differ as much as 1 and 1e-15."""
     values = [10.0 ** -source.uniform(0.0, 15.0), 1.0, 1.0 + 10.0 ** -source.uniform(0.0, 16.0)]
     source.shuffle(values)
     turn, _ = np.linalg.qr([[source.gauss(0.0, 1.0) for _ in range(3)] for _ in range(3)])
@@ -46,7 +46,7 @@ def test_each_eigenvalue_is_good_to_its_own_size(matrix: Matrix) -> None:
     for value, vector in zip(found.values, found.vectors, strict=True):
         for row, x in zip(exact, vector, strict=True):
             rest = sum((a * v for a, v in zip(row, vector, strict=True)), -value * x)
-            # So far from an eigenvalue is `value` at the most, of a symmetric matrix.
+            # For a symmetric matrix, `value` is at most this far from an eigenvalue.
             assert abs(rest) <= _ACCURATE * least
     for i, j in itertools.product(range(3), repeat=2):
         pairs = zip(found.vectors[i], found.vectors[j], strict=True)
@@ -87,7 +87,7 @@ def test_the_moments_are_rounded_to_nearest_and_the_axes_are_a_frame() -> None:
 def test_what_is_not_positive_definite_is_seen_without_rounding(matrix: Matrix, told: str) -> None:
     with pytest.raises(InputError, match=f"its least principal {told} allowed: a positive"):
         Scene("", (1.0, 2.0, 3.0), inertia=matrix)
-    # The next float is a body, though a thin one.
+    # The next float gives a possible body, though a thin one.
     thin = _symmetric(1.0, 1.0 - 2.0**-53, 0.0, 1.0, 0.0, 1.0)
     assert min(principal_frame(thin).moments) == 2.0**-53
 

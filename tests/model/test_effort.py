@@ -1,4 +1,4 @@
-"""Limits count the work, and each names the one option that lifts it, and how far."""
+"""Work limits: they count the work, and each message names the one option that raises the limit."""
 
 import copy
 import pickle
@@ -25,7 +25,7 @@ from pyharness.truth.reference import reference
 
 WAVES: tuple[Wave, ...] = (((1.0, 0.0, 2.0), 5.0), ((0.0, 2.0, 2.0), 3.0))
 FREE = Scene("free", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), steps=100)
-# Its motion speeds up: the mean pace of the beginning says too little.
+# Its motion speeds up, so that the mean pace of the beginning predicts too little work.
 PUSHED = replace(FREE, torque=TorqueLaw(constant=(1.0, 2.0, 3.0)))
 DRIVEN = replace(FREE, torque=TorqueLaw(sines=WAVES))
 SPHERE = replace(DRIVEN, moments=(40.0, 40.0, 40.0))
@@ -47,7 +47,7 @@ def _program(scene: Scene, name: str, implementation: str) -> tuple[Run, str]:
     return run, f"{name} \\({implementation}\\)"
 
 
-# What the limit is to bite on, and an effort with which it does.
+# Runs that exceed a work limit, and an effort for which they do.
 LIMITED: dict[str, tuple[tuple[Run, str], float]] = {
     "taylor": (_method(PUSHED, "taylor", 400.0), 1e-4),
     "taylor-waves": (_method(DRIVEN, "taylor", 400.0), 1.5e-4),
@@ -84,7 +84,7 @@ def _advised(message: str) -> float:
 
 @pytest.mark.parametrize("name", LIMITED)
 def test_limit_is_lifted_as_far_as_it_says(name: str) -> None:
-    """What it advises is enough, and not three times too much nor six with its own slack of two."""
+    """The advised effort suffices; without its slack of two it is at most three times too large."""
     (run, who), effort = LIMITED[name]
     message = _refusal(run, effort)
     assert re.match(f"(?i){who}[: ]", message)
@@ -95,8 +95,8 @@ def test_limit_is_lifted_as_far_as_it_says(name: str) -> None:
 
 @pytest.mark.parametrize(("count", "span"), [(0, 1000.0), (50, 50.0)])
 def test_waves_count(count: int, span: float) -> None:
-    """Sines that do next to nothing make each step dearer, and so fewer steps are allowed."""
-    # Of one frequency they would be one.
+    """Sines of negligible size make each step more expensive, so that fewer steps are allowed."""
+    # Sines of one frequency would be merged.
     waves = [((0.0, 0.0, 1e-30), 1.0 + 0.001 * n) for n in range(count)]
     scene = replace(FREE, torque=TorqueLaw(sines=waves))
     steps = {"taylor": 1e7 / (1.0 + 0.5 * count), "dop853": 5e5 * 8.0 / (8.0 + count)}
@@ -139,7 +139,10 @@ def test_effort_is_a_number_above_0(effort: float) -> None:
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("run --case 5 --method taylor --times 400 --effort 1e-6", "taylor gave up before t = 400"),
+        (
+            "run --case 5 --method taylor --times 400 --effort 1e-6",
+            "taylor exceeded its work limit before t = 400",
+        ),
         ("run --case 5 --program two-term --effort 1e-8", "two-term (fortran): 600 steps with"),
         ("compare --case 5 --effort 1e-5", "two-term (python): "),
         ("compare --case 5 --effort 1e-7 --ablate", "two-term (fortran): "),
@@ -157,7 +160,7 @@ def test_command_line_has_the_option(
 
 
 def test_compare_refuses_at_once_what_takes_long(capsys: pytest.CaptureFixture[str]) -> None:
-    """By the pace of the reference's first steps; it took a minute to find out."""
+    """The pace of the reference's first steps shows it; the refusal once took a minute."""
     begin = time.process_time()
     command = "compare --case 5 --omega0 0.3,1.1,2.7 --step-size 1 --steps 100000"
     assert main(command.split()) == 2
@@ -168,7 +171,7 @@ def test_compare_refuses_at_once_what_takes_long(capsys: pytest.CaptureFixture[s
 
 
 def test_forecast_of_the_reference_is_not_taken_in_by_a_blow_up() -> None:
-    """Steps that shrink end soon, where the solution leaves every bound."""
+    """Shrinking steps end soon, because the solution grows without bound."""
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
     found = reference(scene, [0.5, 1000.0], effort=0.1)
     np.testing.assert_allclose(found.omega, [[2.0] * 3], rtol=1e-15)
@@ -187,9 +190,9 @@ def test_huge_advice_is_a_number() -> None:
 
 
 def test_refusal_comes_back_from_another_process() -> None:
-    """What can't be unpickled leaves a pool waiting for ever."""
-    known = TimedError("gave up at t = {time} s", 2.5)
+    """An error that can't be unpickled leaves a pool waiting for ever."""
+    known = TimedError("exceeded its work limit at t = {time} s", 2.5)
     back = pickle.loads(pickle.dumps(known))
     assert (str(back), back.time, str(back.slower(2.0))) == (
-        "gave up at t = 2.5 s", 2.5, "gave up at t = 5 s",
+        "exceeded its work limit at t = 2.5 s", 2.5, "exceeded its work limit at t = 5 s",
     )  # fmt: skip

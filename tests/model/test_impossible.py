@@ -1,4 +1,4 @@
-"""Bodies that can not exist: one warning, at the line of the user who makes one."""
+"""Impossible bodies: one warning, at the line of the user who makes one."""
 
 import warnings
 from collections.abc import Callable
@@ -55,7 +55,7 @@ def test_a_body_that_can_exist_and_what_is_made_of_a_scene_warn_of_nothing() -> 
         scene = case_scene(6)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # A flat body is the limit.
+        # A flat body is the limit of the possible ones.
         Scene("", (1.0, 2.0, 3.0), (5.0, 3.0, 2.0))
         Scene("", (1.0, 2.0, 3.0), coefficients=(9.0, 1.0, 1.0))
         solve(scene, [1.0])

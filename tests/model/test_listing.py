@@ -45,7 +45,7 @@ def test_labels() -> None:
 
 
 def test_conjectures_are_known_among_defects() -> None:
-    """Whoever lists what is active need not know which of it stands on a card."""
+    """Code that lists what is active need not know which of it is on a card."""
     found = Listing("two-term", ["dt-accumulates", "torque-held"])
     assert found.defects == {"dt-accumulates"}
     assert found.conjectures == {"torque-held"}
@@ -67,7 +67,7 @@ def test_options_of_the_command_line() -> None:
 
 
 def test_no_reading_or_conjecture_changes_a_corrected_listing() -> None:
-    """Its statements use the intended name and index; what is to stay uncorrected is kept."""
+    """Its statements use the intended name and index; an entry that is kept stays active."""
     given: dict[str, Any] = {
         "readings": ["do-variable"], "conjectures": ["torque-held", "initial-torque"],
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Scenes and scene files: what is read, and what is refused with what words."""
+"""Scenes and scene files: what is read, what is refused, and the messages."""
 
 import math
 from dataclasses import replace
@@ -88,7 +88,7 @@ def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> 
     full = Scene("", (1, 2, 3), inertia=((4, 1, 0), (1, 5, 0), (0, 0, 6)), torque=law)
     about_principal, axes = principal(full)
     assert about_principal.torque == law
-    # Without a word it starts in the axes of space: its principal axes do not.
+    # By default the body starts along the axes of space, and its principal axes do not.
     assert about_principal.attitude is not None
     assert matrices(np.array([about_principal.attitude]))[0] == pytest.approx(axes)
     faster = scaled(scene, 4.0).torque
@@ -179,7 +179,7 @@ def test_cases_are_those_of_table_1() -> None:
 
 
 def test_right_hand_side_is_the_normalized_form() -> None:
-    """Equations 16-18 against equations 5-7 with an inertia tensor and a cross product."""
+    """Compare equations 16-18 with equations 5-7 by an inertia tensor and a cross product."""
     scene = case_scene(7)
     inertia = np.array(scene.moments)
     for t, omega in ((0.0, (1.0, 2.0, 3.0)), (0.7, (-0.3, 5.0, 0.1))):

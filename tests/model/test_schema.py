@@ -1,4 +1,4 @@
-"""Versions: every file that is written and read again refuses another schema in one line."""
+"""Schema versions: every file that is written and read again refuses another one in one line."""
 
 import json
 import re
@@ -30,7 +30,7 @@ EXTERNAL = ROOT / "pyharness" / "data" / "external" / "nasa-brick.toml"
 
 
 class Reader:
-    """A file with a number, and what reads it."""
+    """A file with a schema number, and the function that reads it."""
 
     def __init__(self, path: Path, read: Callable[[], object], may_lack: bool = False) -> None:
         self.path, self.read, self.may_lack = path, read, may_lack
@@ -51,7 +51,7 @@ def sweep_store(folder: Path) -> Reader:
     sweep = read_sweep(written(folder, text(TILT)))
     store = folder / "store"
     run_sweep(sweep, str(store))
-    # A store of another version has checksums of its own: none that this one can read.
+    # A store of another version has its own checksums, which this version can't read.
     shutil.rmtree(store / "checksums")
     return Reader(store / "zarr.json", lambda: run_sweep(sweep, str(store)))
 
@@ -129,7 +129,7 @@ def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
         engine()
     reader = FILES[kind](tmp_path)
     content = reader.path.read_text()
-    if kind != "sweep store":  # its checksums are gone
+    if kind != "sweep store":  # its checksums were removed
         reader.read()
     known = SCHEMAS[kind]
     for number in (str(known + 1), str(known - 1), "-1", f"{known}.0", '"1"', "true", None):
@@ -137,7 +137,7 @@ def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
         reader.replace(number)
         assert reader.path.read_text() != content
         if kind == "port request" and number == "1.0":
-            continue  # the same number to JavaScript
+            continue  # the same number in JavaScript
         if number is None and reader.may_lack:
             reader.read()
             continue
@@ -151,7 +151,7 @@ def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
 
 
 def test_numbers_are_those_of_the_document() -> None:
-    page = (ROOT / "docs" / "formats.md").read_text()
+    page = (ROOT / "docs/reference/formats.md").read_text()
     rows = re.findall(r"^\| ([a-z ]+) \| (\d+) \|", page, flags=re.M)
     assert {kind: int(number) for kind, number in rows} == SCHEMAS
 

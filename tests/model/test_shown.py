@@ -1,4 +1,4 @@
-"""Representations of results: short, whatever the size, and of use."""
+"""Representations of results: short whatever the size, and useful."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_a_trajectory_of_any_size(rows: int) -> None:
     text = " ".join(lines)
     assert f"omega=<float64 ({rows}, 3)>" in text
     assert "ended='complete'" in text
-    assert "velocity" not in text  # it has none
+    assert "velocity" not in text  # this run has none
 
 
 def test_a_comparison() -> None:

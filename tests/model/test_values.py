@@ -1,4 +1,4 @@
-"""What users give from Python: taken in every form that is one, refused in one line otherwise."""
+"""Values from Python: every valid form is accepted, and any other is refused in one line."""
 
 import dataclasses
 import itertools
@@ -43,7 +43,7 @@ PLAIN = Scene(
     steps=7,
 )
 
-# Each makes of three numbers, and of one, something else that says the same.
+# Each pair converts three numbers, and one number, to another form of the same value.
 FORMS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
     "list": (list, float),
     "array": (np.array, np.float64),
@@ -212,7 +212,7 @@ def test_zero_costs_nothing(method: str) -> None:
 
 @pytest.mark.parametrize("method", ["auto", "dop853", "gauss-4"])
 def test_rows_around_zero_are_kept_where_a_march_overflows(method: str) -> None:
-    """Omega = 1 / (1 - t) on all axes: infinite at t = 1, or backward at -1 from the other sign."""
+    """omega = 1 / (1 - t) on all axes is infinite at t = 1, or with the other sign at t = -1."""
     for sign in (1.0, -1.0):
         runaway = Scene("", (sign, sign, sign), coefficients=(1.0, 1.0, 1.0))
         times = [-2.0, -0.5, 0.0, 0.5, 2.0]
@@ -223,7 +223,7 @@ def test_rows_around_zero_are_kept_where_a_march_overflows(method: str) -> None:
             assert found.time.tolist() == wanted
             exact = [[sign / (1.0 - sign * t)] * 3 for t in wanted]
             np.testing.assert_allclose(found.omega, exact, rtol=1e-5)
-    # Nothing is left of a march that ends before its first row.
+    # An integration that ends before its first row leaves no row.
     found = solve(runaway, [-2.0, 0.5], method, 1e-6)
     assert (found.time.tolist(), found.ended) == ([0.5], "overflow")
 
@@ -328,7 +328,7 @@ def test_a_name_that_steers_a_terminal_is_shown_escaped(tmp_path: Path) -> None:
 def test_a_saved_scene_is_read_back_whatever_its_name(
     name: str, mark: bytes, tmp_path: Path
 ) -> None:
-    """A byte order mark is no part of a file."""
+    """A byte order mark is ignored."""
     path = tmp_path / "scene.toml"
     scene = dataclasses.replace(PLAIN, name=name)
     path.write_bytes(mark + scene_text(scene).encode())

@@ -1,4 +1,4 @@
-"""Waves of one frequency are one wave, whose amplitude is rounded once."""
+"""Waves of one frequency: they are one wave, whose amplitude is rounded once."""
 
 import math
 
@@ -80,7 +80,7 @@ def test_rows_without_a_common_frequency_are_handed_back() -> None:
     assert found[0] is constant
     assert found[1] is sines
     assert found[2] is cosines
-    # Fillers of shorter laws are no waves.
+    # Zero rows that fill up shorter laws are no waves.
     padded = np.concatenate([sines, np.zeros((1, 3, 4))], axis=1)
     assert with_merged_rows(constant, padded, cosines)[1] is padded
 

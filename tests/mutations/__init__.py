@@ -1,1 +1,1 @@
-"""Single changes to the sources, and which check catches each: run by `make mutate`."""
+"""Single changes to the sources, and the check that catches each: `make mutate`."""

@@ -1,4 +1,4 @@
-"""`make mutate`: change one line at a time in a copy of the checkout, and see what catches it.
+"""`make mutate`: change one line at a time in a copy of the checkout, and see which check fails.
 
 Exit status 0 if enough mutations were caught, 1 if not, 2 for wrong usage, 130 if interrupted.
 """
@@ -25,7 +25,7 @@ COUNTED = ("caught", "lives", "equivalent", "same binary")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Try a sample of mutations and report what became of each."""
+    """Try a sample of mutations and report the outcome of each."""
     options = _options(arguments)
     processes = Processes()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
@@ -62,7 +62,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _all(options: argparse.Namespace, processes: Processes, verdicts: list[Verdict]) -> None:
-    """Try the sample; verdicts of the same draw that are on record are taken from there."""
+    """Try the sample; use the recorded verdicts of the same draw."""
     checks = reach(processes, options.jobs)
     known = equivalent()
     record = Record(PLACE / f"seed-{options.seed}.json", options.again)
@@ -71,7 +71,7 @@ def _all(options: argparse.Namespace, processes: Processes, verdicts: list[Verdi
     lock = Lock()
 
     def next_one() -> Mutation | None:
-        # A draw that does not count is replaced: so many begin as are still missing.
+        # A draw that does not count is replaced: as many start as are still missing.
         with lock:
             counted = sum(each.outcome in COUNTED for each in verdicts) + len(running)
             if counted >= options.sample:
@@ -110,7 +110,7 @@ def _all(options: argparse.Namespace, processes: Processes, verdicts: list[Verdi
 
 
 class Record:
-    """The verdicts of a seed, in a file: an interrupted run continues where it was."""
+    """The recorded verdicts of a seed, so that an interrupted run continues where it ended."""
 
     def __init__(self, path: Path, again: bool) -> None:
         self._path = path
@@ -119,15 +119,15 @@ class Record:
         self._rows = {(row["file"], row["id"]): row for row in kept}
 
     def of(self, mutation: Mutation) -> Verdict | None:
-        """Return the verdict on record."""
+        """Return the recorded verdict, or None."""
         row = self._rows.get((mutation.file, mutation.id))
-        # What was equivalent by the list and is there no more is tried.
+        # A mutation that was equivalent, and is no longer on the list, is tried.
         if row is None or row["outcome"] == "equivalent":
             return None
         return Verdict(mutation, row["outcome"], row["by"], row["seconds"])
 
     def write(self, verdicts: list[Verdict]) -> None:
-        """Write these."""
+        """Write these verdicts and the recorded ones."""
         rows = dict(self._rows)
         for each in verdicts:
             mutation = each.mutation
@@ -151,13 +151,13 @@ def _line(verdict: Verdict, number: int) -> str:
 
 
 def caught_share(verdicts: Sequence[Verdict]) -> float:
-    """Return the share of the caught among those that change something."""
+    """Return the fraction of caught mutations among those that change something."""
     outcomes = Counter(each.outcome for each in verdicts)
     return outcomes["caught"] / max(1, outcomes["caught"] + outcomes["lives"])
 
 
 def table(verdicts: Sequence[Verdict]) -> str:
-    """Return the outcomes by language and operator."""
+    """Return a table of the outcomes by language and operator."""
     heads = ("caught", "lives", "equivalent", "not counted", "s each")
     lines = [f"{'':46}" + "".join(f"{head:>12}" for head in heads)]
     for name, group in _groups(verdicts):

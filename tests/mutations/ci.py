@@ -1,4 +1,4 @@
-"""Four mutations that one short test each must catch: the gate's proof that the tool works."""
+"""Four mutations that one short test each must catch, as a proof that the tool works."""
 
 import time
 
@@ -7,8 +7,8 @@ from tests.mutations.sample import Mutation, mutations
 from tests.mutations.tree import Processes, Tree
 from tests.mutations.trial import first_failure, put_in, take_out
 
-# File, name, test: one of each language, in lines that hardly ever change. No other change to the
-# checkout can make one of them live, so the gate fails for a reason alone.
+# File, name, test: one mutation of each language, in lines that hardly ever change. No other change
+# to the checkout can make one of them live, so that the gate fails for this reason only.
 PLANTED = (
     (
         "fortran/original/linear_solver.fypp", "bound 1: if (scaled > biggest) then",
@@ -41,7 +41,7 @@ def find(file: str, id: str) -> Mutation:
 
 
 def run_planted(processes: Processes) -> int:
-    """Try each with its test; return 1 if one lives, or if a test fails without it."""
+    """Try each mutation with its test; return 1 if one lives, or if a test fails without it."""
     begin = time.perf_counter()
     tree = Tree("changed-0", processes)
     tests = [Check(test, 10.0, frozenset()) for _, _, test in PLANTED]

@@ -11,21 +11,21 @@ from mutmut.mutation.mutators import mutation_operators
 
 from tests.mutations.text_source import PAIRS, constant
 
-# One line of the source, the operator, and what returns the whole text with the change in it.
+# The line of the source, the operator, and a function that returns the whole changed text.
 Change = tuple[int, str, Callable[[], str]]
-# Nothing in these is changed: what only a type checker or a reader looks at, what is imported,
-# and the message of an error.
+# These nodes are not changed: annotations and texts for a type checker or a reader, imports, and
+# messages of errors.
 _LEFT_ALONE = (
     cst.Annotation, cst.Import, cst.ImportFrom, cst.Decorator, cst.FormattedString, cst.Raise,
     cst.TypeAlias, cst.ConcatenatedString, cst.Assert,
 )  # fmt: skip
-# A text that is a key or a name may decide something; all others are for readers.
+# A string that is a key or a name may decide something; all others are for readers.
 _KEY = re.compile(r"[\"'][\w.-]+[\"']")
 _MESSAGE = re.compile(r"\w*(Error|Refused|warn|progress|Note)")
 
 
 def changes(text: str) -> Iterator[Change]:
-    """Return the changes of a file in its order."""
+    """Yield the changes of a file in order."""
     wrapper = MetadataWrapper(cst.parse_module(text), unsafe_skip_copy=True)
     lines = wrapper.resolve(PositionProvider)
 
@@ -75,7 +75,7 @@ def _dropped(node: Any) -> Iterable[cst.CSTNode]:
 
 
 def _swapped(node: Any) -> Iterable[cst.CSTNode]:
-    """Swap two arguments that stand side by side."""
+    """Swap two adjacent arguments."""
     if isinstance(node, cst.Call):
         for i, (a, b) in enumerate(pairwise(node.args)):
             if a.keyword is None and b.keyword is None and not a.star and not b.star:
@@ -102,7 +102,7 @@ def _constant(node: Any) -> Iterable[cst.CSTNode]:
 
 
 def _condition(node: Any) -> Iterable[cst.CSTNode]:
-    """Take the other way."""
+    """Negate the condition."""
     if isinstance(node, cst.If | cst.While) and not _is_for_readers(node):
         yield node.with_changes(test=cst.UnaryOperation(cst.Not(), _enclosed(node.test)))
 

@@ -1,6 +1,6 @@
-"""Which tests, and which kinds of `verify`, enter a function: recorded once, file by file.
+"""Functions that each test, and each kind of `verify`, enters: recorded once, file by file.
 
-A record lies in `build/mutations/reach/`; it is made anew where its file of tests changed.
+The records are in `build/mutations/reach/`; a record is made anew if its test file changed.
 """
 
 import hashlib
@@ -15,12 +15,12 @@ from pathlib import Path
 from pyharness.checks.kinds import KINDS
 from tests.mutations.tree import PLACE, ROOT, Processes, Tree
 
-# Random draws of `verify` follow a seed; the week's would give another score each week.
+# Random draws of `verify` follow a seed; with the seed of the week the score would change weekly.
 SEED = "mutations"
-# Not these: they test this very tool, a browser that takes more address space than a trial has, or
-# run times, where a failure under load says nothing.
+# Excluded are tests of this very tool, of a browser that takes more address space than a trial has,
+# and of run times, where a failure under load means nothing.
 NOT_HERE = ("tests/mutations/", "tests/browser/", "tests/bench/")
-# Those that most mutations need are recorded first: an interrupted recording is of use then.
+# The files that most mutations need are recorded first, so that an interrupted recording is useful.
 FIRST = ("methods", "model", "original", "truth", "compare", "theory", "ensembles", "checks")
 OF_ONE_FILE, UNKNOWN = 3000.0, 20.0  # s
 INSTRUMENTED = tuple(f"-D{language}_args=-finstrument-functions" for language in ("c", "fortran"))
@@ -42,7 +42,7 @@ def command_of(kind: str) -> list[str]:
 
 
 def files_of_tests() -> list[str]:
-    """Return the files of tests."""
+    """Return the test files, the most needed ones first."""
     paths = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "tests").rglob("test_*.py"))
     order = {f"tests/{name}": i for i, name in enumerate(FIRST)}
     paths.sort(key=lambda path: order.get(str(Path(path).parent), len(order)))
@@ -50,7 +50,7 @@ def files_of_tests() -> list[str]:
 
 
 def reach(processes: Processes, jobs: int) -> list[Check]:
-    """Return all checks that pass without a change; record those that are new or changed."""
+    """Return all checks that pass without a mutation; record those that are new or changed."""
     folder = PLACE / "reach"
     folder.mkdir(parents=True, exist_ok=True)
     names = [*files_of_tests(), *(f"verify {kind}" for kind in KINDS)]
@@ -86,7 +86,7 @@ def _up_to_date(name: str) -> bool:
 def _read(name: str) -> Iterable[Check]:
     path = _path(name)
     if not path.exists():
-        # One that could not be recorded is tried as a whole by those that name it.
+        # A file without a record is run as a whole for mutations of files that it names.
         yield Check(name, UNKNOWN, frozenset())
         return
     record = json.loads(path.read_text())
@@ -111,7 +111,7 @@ def _record(name: str, traced: Tree, plain: Tree, hooks: Path) -> tuple[str, str
     found = json.loads(place.read_text())
     if kind != name:
         found = {name: found["verify"]}
-    # What the recording itself disturbs is tried again without; what is skipped catches nothing.
+    # Tests that fail under the recording are tried again without it; skipped tests catch nothing.
     failed = [test for test, (_, _, passed) in found.items() if not passed]
     if failed and kind == name:
         _, said = plain.run([*pytest_command("-v"), *failed], OF_ONE_FILE)

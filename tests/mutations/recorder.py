@@ -1,4 +1,4 @@
-"""Record which functions each test, or each kind of `verify`, enters; a plugin of pytest.
+"""Recorder of the functions that each test, or each kind of `verify`, enters; a plugin of pytest.
 
 A function of Python is named `file:qualified.name`, a compiled one `module:procedure` or `:name`.
 """
@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-PLACES = 1 << 16  # as hooks.c has it
+PLACES = 1 << 16  # the same as in hooks.c
 
 
 class Recorder:
@@ -34,16 +34,16 @@ class Recorder:
         self._entered = (ctypes.c_void_p * PLACES).in_dll(hooks, "entered")
 
     def begin(self) -> None:
-        """Forget all, and look at every call from here on."""
+        """Clear the record, and watch every call from now on."""
         self._code.clear()
         ctypes.memset(ctypes.addressof(self._entered), 0, ctypes.sizeof(self._entered))
         threading.settrace(self._look)
-        # It sees this thread alone, and takes a small part of the time of a trace.
+        # The profile sees this thread alone, and takes a small part of the time of a trace.
         self._profile = cProfile.Profile(builtins=False)
         self._profile.enable()
 
     def end(self) -> list[str]:
-        """Return the names."""
+        """Return the names of the functions that were entered."""
         self._profile.disable()
         threading.settrace(None)
         found = set()
@@ -63,7 +63,7 @@ class Recorder:
 
 
 def _compiled_names() -> dict[int, str]:
-    """Return the names of the functions of our libraries by their addresses in this process."""
+    """Return the names of our libraries' functions by their addresses in this process."""
     found = {}
     maps = Path("/proc/self/maps").read_text()
     for begin, path in re.findall(r"^(\w+)-\S+ \S+ 0+ .*?(\S+/pyharness/_\w+\S*\.so)$", maps, re.M):
@@ -77,7 +77,7 @@ def _compiled_names() -> dict[int, str]:
 
 
 class Plugin:
-    """Write {test: [seconds, names, passed]}."""
+    """A plugin that writes {test: [seconds, names, passed]}."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -96,17 +96,17 @@ class Plugin:
         self._tests[item.nodeid] = [seconds, names, item.nodeid not in self._failed]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Remember what does not pass."""
+        """Remember a test that does not pass."""
         if report.outcome != "passed":
             self._failed.add(report.nodeid)
 
     def pytest_sessionfinish(self) -> None:
-        """Write them."""
+        """Write the record."""
         self._path.write_text(json.dumps(self._tests))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Take part in the run."""
+    """Register the plugin."""
     config.pluginmanager.register(Plugin(Path(os.environ["MUTATIONS_RECORD"])))
 
 

@@ -1,4 +1,4 @@
-"""What may be changed, a fair draw from it, and the changes that are known to change nothing."""
+"""Lines that may be changed, a fair draw from them, and the changes known to have no effect."""
 
 import ast
 import difflib
@@ -15,13 +15,14 @@ from tests.mutations.text_source import language_of
 from tests.mutations.tree import ROOT
 
 EQUIVALENT = Path(__file__).parent / "equivalent.toml"
-# What computes, judges, reads and keeps numbers. Not `cli`, `views`, `edition`, pictures and
-# reports, whose texts `tests/outputs` compares; not `bench`, whose results are run times.
+# Code that computes, judges, reads and keeps numbers. Excluded are `cli`, `views`, `edition`,
+# pictures and reports, whose texts `tests/outputs` compares, and `bench`, whose results are run
+# times.
 _PYTHON = ("model", "methods", "theory", "truth", "original", "compare", "checks",
            "ensembles", "history/claims")  # fmt: skip
 _FOR_READERS = re.compile(r"report|picture|sentences|__init__|facts|ledger")
-# Not `levels.c`, `levels.f90`: they choose among instruction sets of equal results; not what f2py
-# reads, where a change is a signature that does not fit.
+# Excluded are `levels.c` and `levels.f90`, which choose among instruction sets of equal results,
+# and what f2py reads, where a change is a signature that does not fit.
 _OTHERS = ("fortran/original/*.f90", "fortran/original/*.fypp", "fortran/many/*.f90",
            "fortran/many/*.c", "fortran/modern/*.f90", "fortran/modern/*.c", "fortran/*.c",
            "web/programs/*.js", "web/port.js")  # fmt: skip
@@ -116,6 +117,8 @@ def draw(seed: int | str) -> Iterator[Mutation]:
         (file,) = generator.choices(names, weights)
         if file not in known:
             known[file] = mutations(file)
+        if not known[file]:
+            continue
         line = generator.choice(sorted({each.line for each in known[file]}))
         of_line = [each for each in known[file] if each.line == line]
         operator = generator.choice(sorted({each.operator for each in of_line}))

@@ -101,9 +101,12 @@ def test_solve_ivp_in_spans_whose_square_is_no_number(method: str) -> None:
 @pytest.mark.parametrize(
     ("method", "words"),
     [
-        *((name, f"{name} gave up at t = ") for name in ("lsoda", "dop853", "rk45", "radau")),
-        ("gauss-2", "gauss-2 gave up at t = 0 s"),
-        ("taylor", "taylor gave up before t = 0.75 s after 1 step;"),
+        *(
+            (name, f"{name} exceeded its work limit at t = ")
+            for name in ("lsoda", "dop853", "rk45", "radau")
+        ),
+        ("gauss-2", "gauss-2 exceeded its work limit at t = 0 s"),
+        ("taylor", "taylor exceeded its work limit before t = 0.75 s after 1 step;"),
         ("auto", "closed-form: at t = 0.75 s the phase is beyond"),
         ("rk4", "steps of 1e-12 s are too many"),
     ],

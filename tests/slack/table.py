@@ -691,7 +691,7 @@ STRESS = (
         for check, due in (
             ("two-term/case-5/corrected/1e-02", 9.2e-4), ("rk4/case-5/1e-02", 6.4e-8),
             ("four-term/case-5/corrected/1e-06", 6.3e-6), ("rk4/case-5/1e-06", 2.9e-10),
-            # The longest step of which anything is foretold.
+            # The longest step of which anything is predicted.
             ("rk4/case-4/3e-01", 0.03),
             ("two-term/case-5/corrected/1e-06", 5.8e-10),
         )

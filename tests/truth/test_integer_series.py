@@ -65,7 +65,7 @@ def test_way_passes_through_the_largest_omega() -> None:
 @pytest.mark.parametrize(
     ("scene", "time", "steps", "words"),
     [
-        (Scene("", (1.0,) * 3, coefficients=(1.0,) * 3), 2.0, 300, "leaves every bound|300 steps"),
+        (Scene("", (1.0,) * 3, coefficients=(1.0,) * 3), 2.0, 300, "grows without bound|300 steps"),
         (Scene("", (1.0, 2.0, 3.0), BODY), 1e5, 20, "more than 20 steps"),
     ],
 )

@@ -1,7 +1,7 @@
 // The reference solution for a run: the Taylor series of equations 13 to 15, in binary64.
 //
 // Its error over the largest |omega| of the trajectory is below 1e-15 times the error
-// amplification. It is 2e-16 in 300 steps of the seven cases (docs/laboratory.md; tests/edition
+// amplification. It is 2e-16 in 300 steps of the seven cases (docs/explanation/laboratory.md; tests/edition
 // compares it with 40-digit arithmetic). The reference shares only the sines of the torque and A,
 // B, C with the programs.
 import { cosine, sine } from "../programs/circular.js";

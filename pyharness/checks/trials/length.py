@@ -90,7 +90,9 @@ def _gauss(stages: int) -> Runner:
             scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
         )
         if (n_rows, status) != (len(times), COMPLETE):
-            raise InputError(f"gauss-{stages} gave up after {evaluations} right-hand sides")
+            raise InputError(
+                f"gauss-{stages} exceeded its work limit after {evaluations} right-hand sides"
+            )
         lengths = np.diff([0.0, *times])
         return rows.T, np.cumsum(np.ceil(lengths / step - 1e-6))
 

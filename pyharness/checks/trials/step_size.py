@@ -52,7 +52,7 @@ def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attemp
     scenes = {n: replace(case_scene(case), step_size=TIME / n, steps=n) for n in COUNTS}
     error = cache(lambda count: _error(scenes[count], method, case, listing))
 
-    def foretold(count: int, name: Name) -> Check:
+    def predicted(count: int, name: Name) -> Check:
         found, note = error(count)
         if before:
             return name.described(found, note)
@@ -65,7 +65,7 @@ def _of_case(method: str, case: int, listing: Listing | None) -> Iterator[Attemp
 
     for count, scene in scenes.items():
         own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
-        yield Attempt(own, partial(foretold, count))
+        yield Attempt(own, partial(predicted, count))
     gauss = method.startswith("gauss")
     # At steps with visible rounding, a method of order above 4 has no truncation error left.
     if not (before or gauss) and SCHEMES[method].order in (2, 4):
@@ -92,15 +92,15 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
         # The crossing is between this step and the next smaller one: take the middle on a
         # logarithmic scale.
         found /= 10.0**0.25
-    foretold = forecaster.crossing(smallest)
+    predicted = forecaster.crossing(smallest)
     # The steps are half a decade apart. Rounding may be a tenth or ten times as large as predicted.
     limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
     best = min(counts, key=error)
     note = (
-        f"truncation down to {found:.1e} s, foretold {foretold:.1e} s; "
+        f"truncation down to {found:.1e} s, predicted {predicted:.1e} s; "
         f"least error {error(best):.1e} at {TIME / best:.0e} s"
     )
-    return name.bounded(abs(math.log10(found / foretold)), limit, note)
+    return name.bounded(abs(math.log10(found / predicted)), limit, note)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
@@ -148,11 +148,11 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
         found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)
         return name.described(found, _from(found, TIME))
     seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
-    note = f"{_from(seen.found, _LONG)}, foretold from {seen.foretold:.4g} s"
+    note = f"{_from(seen.found, _LONG)}, predicted from {seen.predicted:.4g} s"
     # Linear theory does not cover points that move from step to step, unless the equations are
     # linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
-        return name.bounded(abs(seen.found / seen.foretold - 1.0), seen.limit, note)
+        return name.bounded(abs(seen.found / seen.predicted - 1.0), seen.limit, note)
     return name.described(seen.found, note)
 
 

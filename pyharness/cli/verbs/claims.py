@@ -79,7 +79,7 @@ def _atlas(options: argparse.Namespace) -> int:
     axes = {axis.dimension: axis.coordinates() for axis in reversed(sweep.axes)}
     with opened(sweep, options.atlas) as store:
         if not all(store.done()):
-            raise InputError(f"--atlas '{options.atlas}': is not finished; 'sweep' goes on with it")
+            raise InputError(f"--atlas '{options.atlas}': is not finished; 'sweep' continues it")
         codes = {
             dict(asked.parameters)["id"]: store.array(asked.name)[...]
             for asked in sweep.reductions

@@ -26,7 +26,7 @@ OPTIONS = {
     "--draws N": f"Number of random draws (default {DRAWS}).",
     "--external FILE": "Check the published figures in this file alone.",
     "--listing-output FILE": "Find the arithmetic in which a program printed this page.",
-    "--port COMMAND": "Check a port in any language against the Python twins (docs/ports.md).",
+    "--port COMMAND": "Check a port in any language against the twins (docs/how-to/ports.md).",
     "--program P": "Program of that page or port (default: any).",
     "--case N": "Case of that page or port, 1 to 7 (default: any).",
     "--cell NAME,...": "Check these cells of that port, as in two-term/case-3 (default: all).",
@@ -154,7 +154,7 @@ def _selection(options: argparse.Namespace) -> Selection:
 def _title(chosen: Selection) -> list[str]:
     title = [f"seed of the random draws: {chosen.seed}"] if chosen.may_ask("random") else []
     if chosen.may_ask("golden") and not chosen.record.is_dir():
-        title.append("there is no golden record here (it stands in the checkout): not compared")
+        title.append("there is no golden record here (it is in the checkout): not compared")
     return title
 
 

@@ -39,7 +39,7 @@ def evidence_report(found: Sequence[Combination]) -> Report:
     axes = list(ordered[0].choices())
     columns = [
         *(Column(_SHORT[axis], left=True, name=axis) for axis in axes),
-        Column("score", digits(".1f")), Column("hold"),
+        Column("score", digits(".1f")), Column("reproduced", name="hold"),
     ]  # fmt: skip
     rows = [[*each.choices().values(), each.score, each.holding] for each in ordered]
     telling = discriminating(ordered)
@@ -61,7 +61,7 @@ def evidence_report(found: Sequence[Combination]) -> Report:
         "claims",
         [
             [evidence_rule()],
-            [keys],
+            [f"Each row is one combination; reproduced: number of claims. {keys}"],
             [Table(columns, shown)],
             [f"{counted(len(telling), 'claim')} of {len(ordered[0].verdicts)} discriminate:"],
             [Table([*words("claim"), Column("verdicts", left=True, fit="wrap")], spread)],

@@ -112,7 +112,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
         "bounded runs stopped": float(alarms),
         "unbounded runs, without the test": float(unbounded),
         "unbounded runs stopped": float(caught),
-        "a scene of ours, unbounded at 1 s: stopped": float(
+        "our own scene, unbounded at 1 s: stopped": float(
             lab.run_on(ours, lab.listing("runge-kutta")).stop is not None
         ),
     }

@@ -26,7 +26,7 @@ def _verdict(verdict: str) -> str:
 _LEDGER = (
     *words("claim where"),
     Column("original", _verdict, left=True), Column("corrected", _verdict, left=True),
-    Column("hangs on", left=True, fit="wrap"),
+    Column("depends on", left=True, fit="wrap"),
 )  # fmt: skip
 _DATA = (*_LEDGER[:1], *words("kind"), *_LEDGER[1:])
 KINDS = {
@@ -48,13 +48,18 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
         ]
         for each in judgements
     ]  # fmt: skip
-    text: list[Section] = []
+    legend = "; ".join(name for _, name in _VERDICTS.values())
+    text: list[Section] = [
+        [
+            "original, corrected: our verdict for the programs as printed and as corrected: "
+            f"{legend}. depends on: assumptions without which a verdict changes."
+        ]
+    ]
     for kind, about in KINDS.items():
         if of_kind := [[name, *rest] for name, its, *rest in rows if its == kind]:
             text.append([f"{kind}: {about}", Table(_LEDGER, of_kind)])
-    legend = "; ".join(name for _, name in _VERDICTS.values())
-    note = "`claims --explain ID` tells the story with its numbers."
-    text.append([f"Verdicts by kind, original / corrected ({legend}):", kinds_table(judgements)])
+    note = "`claims --explain ID` explains a verdict with its numbers."
+    text.append(["Number of verdicts by kind, original / corrected:", kinds_table(judgements)])
     text.append([note])
     data = Table(_DATA, rows)
     return Report("claims", text, record=lambda: _record(judgements), data=data)
@@ -96,7 +101,7 @@ def explanation(judgement: Judgement) -> Report:
     if judgement.survivals:
         lines = [Line("without its assumptions (original, corrected):")]
         for each in judgement.survivals:
-            mark = "stands" if each.survives else "TURNS"
+            mark = "same" if each.survives else "CHANGES"
             lines.append(Line(f"  {mark:7s}{each.assumption}: {each.original}, {each.corrected}"))
         text.append(lines)
     return claims_report([judgement])._replace(text=text)

@@ -35,7 +35,7 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """The order of one member in one scene, as derived in docs/family.md and as measured.
+    """The order of one member in one scene, as derived in docs/explanation/family.md and as measured.
 
     `measured` is None if the error is rounding error alone, or never gets small. `settled` is true
     if the last two measured values of the order differ by at most a tenth. `error` is the largest
@@ -85,7 +85,7 @@ def order_table(
     truth = reference(scene, wanted)
     if len(truth.time) < len(wanted):
         last = float(truth.time[-1]) if len(truth.time) else 0.0
-        raise InputError(f"the solution leaves every bound after {last:g} s; take fewer steps")
+        raise InputError(f"the solution grows without bound after {last:g} s; take fewer steps")
     place = {time: row for row, time in enumerate(truth.time.tolist())}
     measured: list[float | None] = [None] * len(chosen)
     doubts = [math.inf] * len(chosen)

@@ -84,11 +84,11 @@ def _tables(found: Sequence[OrderFinding]) -> list[Section]:
 
     return [
         [
-            "order derived / measured, by terms n and corrections k",
-            "(?: the measured order had not settled before rounding took over)",
+            "Each cell: order derived / order measured, with n terms and k corrections. ?: the "
+            "measured order did not converge before rounding errors dominated.",
             table(_order),
         ],
-        ["largest error of any w over these steps (rad/s)", table(_error)],
+        ["Largest error of any component of omega (rad/s):", table(_error)],
     ]
 
 

@@ -1,0 +1,91 @@
+"""`python -m tests.style [FILE ...]`: find expressions that the project's prose does not use.
+
+It reads docstrings and comments of Python, Fortran and C, and documents, outside code and
+quotations. Exit status 1 if it finds any. `style.toml` has the expressions.
+"""
+
+import ast
+import io
+import re
+import sys
+import tokenize
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+TERMS = tomllib.loads((Path(__file__).parent / "style.toml").read_text())
+_FOLDERS = ("pyharness", "fortran", "docs", "web/programs", "web/laboratory", "tests")
+# The history keeps its words; the benchmark's page quotes notes of a run of version 0.1.0.
+_NOT = ("CHANGELOG.md", "benchmark.md")
+_CODE = re.compile(
+    r"```.*?```|``.*?``|`[^`]*`|\$[^$]*\$|\"[^\"\n]*\"|“[^”]*”|\]\([^)]*\)|(?<!\w)'[^'\n]+'(?!\w)"
+    r"|^ *(>>>|\.\.\.) .*?$",
+    re.DOTALL | re.MULTILINE,
+)
+
+
+def files() -> list[Path]:
+    """Return the files whose prose is checked."""
+    found = [path for folder in _FOLDERS for path in (ROOT / folder).rglob("*")]
+    found += [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    kept = (".py", ".f90", ".fypp", ".c", ".js", ".md")
+    return sorted(path for path in found if path.suffix in kept and path.name not in _NOT)
+
+
+def prose(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the passages of a file that people read, each with its first line."""
+    text = path.read_text()
+    if path.suffix == ".md":
+        yield 1, text
+    elif path.suffix == ".py":
+        yield from _docstrings(text)
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            if token.type == tokenize.COMMENT:
+                yield token.start[0], token.string.strip("# ")
+    elif path.suffix in (".c", ".js"):
+        for found in re.finditer(r"/\*(.*?)\*/|(?<!:)//(.*)$", text, re.DOTALL | re.MULTILINE):
+            yield text.count("\n", 0, found.start()) + 1, found[1] or found[2]
+    else:
+        for number, line in enumerate(text.split("\n"), 1):
+            comment = re.search(r"!+(?!\$)([^!]*)$", line)
+            if comment and not re.search(r"['\"]", line):
+                yield number, comment[1]
+
+
+def _docstrings(text: str) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+            found = ast.get_docstring(node, clean=False)
+            if found is not None:
+                yield node.body[0].lineno, f"\0{found}"
+
+
+def findings(path: Path) -> Iterator[tuple[int, str, str]]:
+    """Yield line, expression and what to write instead."""
+    for first, passage in prose(path):
+        # What is code or quoted is blanked, and keeps its lines.
+        plain = _CODE.sub(lambda m: re.sub(r"[^\n]", " ", m[0]), passage)
+        for pattern, instead in TERMS["instead"].items():
+            pattern = rf"\b({pattern})\b".replace(" ", r"\s+")
+            for found in re.finditer(pattern, plain, re.IGNORECASE):
+                yield first + plain.count("\n", 0, found.start()), found[0], instead
+        for pattern, instead in TERMS["begin"].items():
+            if begin := re.match(rf"\0({pattern})\b", plain):
+                yield first, begin[1], instead
+
+
+def main(arguments: list[str]) -> int:
+    """Print what is found in the files, by default in all."""
+    paths = [Path(each).resolve() for each in arguments] or files()
+    count = 0
+    for path in paths:
+        for line, found, instead in findings(path):
+            shown = " ".join(found.split())
+            print(f"{path.relative_to(ROOT)}:{line}: '{shown}'; write: {instead}")
+            count += 1
+    return int(count > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

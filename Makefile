@@ -46,6 +46,7 @@ lint: .venv/ready-to-test
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/python -m mypy
+	@$(BIN)/python -m tests.style
 	@MESONPY_EDITABLE_SKIP=$(wildcard $(CURDIR)/build/cp*) PYTHONPATH=$(CURDIR) \
 	  $(BIN)/lint-imports --no-cache --no-logo >build/imports.log || { cat build/imports.log; exit 1; }
 	@$(BIN)/ninja --quiet -C build/cp*

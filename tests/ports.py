@@ -1,4 +1,4 @@
-"""Ports that tests ask: cells that touch all, and the port in JavaScript."""
+"""Ports for tests: cells that cover all branches, and the commands of two ports."""
 
 import re
 import shlex
@@ -25,7 +25,7 @@ SAMPLE = (
 
 
 def sample(names: Sequence[str] = SAMPLE) -> list[Cell]:
-    """Return the cells of these names, by leading parts."""
+    """Return the cells whose names begin with one of `names`."""
     return port_cells(PROGRAMS, case_numbers(), names)
 
 
@@ -36,12 +36,12 @@ def documented() -> str:
 
 
 def documented_command() -> str:
-    """Return the command that starts it."""
+    """Return the command that starts the documented port."""
     return shlex.join([sys.executable, "-c", documented()])
 
 
 def engine() -> str:
-    """Return the path of Node; the test is skipped without it."""
+    """Return the path of Node; skip the test if there is none."""
     found = shutil.which("node")
     if found is None:
         pytest.skip("no node on the PATH: the JavaScript is not tried")

@@ -34,7 +34,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def run(files: Sequence[str], seconds: float) -> int:
-    """Run files of tests in this order, and end after `seconds`, also in the middle of a test."""
+    """Run test files in this order, and end after `seconds`, even in the middle of a test."""
     plugin = Counter()
     signal.signal(signal.SIGALRM, lambda *_: pytest.exit("the time is up", returncode=0))
     signal.setitimer(signal.ITIMER_REAL, seconds)
@@ -55,13 +55,13 @@ def changed(base: str) -> list[str]:
 
 
 def sources() -> dict[str, str]:
-    """Return the files of tests by path."""
+    """Return the text of every test file by its path."""
     found = sorted((ROOT / "tests").rglob("test_*.py"))
     return {str(path.relative_to(ROOT)): path.read_text() for path in found}
 
 
 def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
-    """Return the files of tests to run: changed ones, of a changed file's name, that name it.
+    """Return the test files to run: changed ones, those of a changed file's name, those naming it.
 
     A test names a module of Python that it imports, and any other file by its name.
     """
@@ -98,7 +98,7 @@ def imported(text: str) -> set[str]:
 
 
 class Counter:
-    """A plugin that counts tests: an exit code of pytest says nothing where the time was up."""
+    """A plugin that counts tests, because after a time-out pytest's exit code means nothing."""
 
     collected = passed = failed = 0
 
@@ -107,7 +107,7 @@ class Counter:
         self.collected = len(session.items)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Count those that passed, and every part of one that failed."""
+        """Count each test that passed, and every failed part of a test."""
         self.failed += report.failed
         self.passed += report.when == "call" and report.passed
 

@@ -1,4 +1,4 @@
-"""Random scenes, plain and nasty, each from a generator: what methods were not tuned on."""
+"""Random scenes, plain and nasty, each from a generator. No method was tuned on them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,12 +25,12 @@ def size(generator: Generator, low: float, high: float) -> np.ndarray:
 
 
 def waves(generator: Generator, amplitude: tuple[float, float], f: tuple[float, float]) -> Wave:
-    """Return a wave; amplitude and frequency are given as powers of ten."""
+    """Return a wave; the ranges of amplitude and frequency are powers of ten."""
     return triple(size(generator, *amplitude)), float(10.0 ** generator.uniform(*f))
 
 
 def law(generator: Generator, high: float = 2.0, low: float = -1.0, least: int = 0) -> TorqueLaw:
-    """Return a torque of any kind from the least: 0 none, 4 all."""
+    """Return a torque of a random kind from `least` on: 0 none, 4 all terms."""
     kind = generator.integers(least, 5)
 
     def some() -> list[Wave]:
@@ -45,13 +45,13 @@ def law(generator: Generator, high: float = 2.0, low: float = -1.0, least: int =
 
 
 def moments(generator: Generator) -> np.ndarray:
-    """Return three moments that a body can have, in any order."""
+    """Return three moments of a possible body, in any order."""
     first, second, third = np.sort(generator.uniform(1.0, 10.0, 3))
     return generator.permutation([first, second, min(third, 0.999 * (first + second))])
 
 
 def plain(generator: Generator) -> tuple[Scene, float]:
-    """Return a body, a start and a torque over two orders of magnitude each, and a time."""
+    """Return a scene and its time (s): body, start and torque over two orders of magnitude each."""
     body, torque = moments(generator), law(generator)
     scene = Scene("", size(generator, -1, 1), moments=body, torque=torque)
     return scene, float(generator.choice([1, 1, -1]) * 10.0 ** generator.uniform(-1.0, 0.7))
@@ -66,7 +66,7 @@ def _nearly_symmetric(generator: Generator) -> tuple[Scene, float]:
 
 
 def _near_the_separatrix(generator: Generator) -> tuple[Scene, float]:
-    """Return a spin a little beside the axis in the middle, or one at the separatrix."""
+    """Return a scene that rotates near the middle axis or near the separatrix, and its time."""
     i1, i2, i3 = np.sort(moments(generator))
     start = size(generator, -8, -1)
     start[1] = generator.choice([-1, 1]) * 10.0 ** generator.uniform(-1, 1)
@@ -86,7 +86,7 @@ def _violent(generator: Generator) -> tuple[Scene, float]:
 
 
 def _resonant(generator: Generator) -> tuple[Scene, float]:
-    """Return a wave in step with the precession, or with twice or half of it."""
+    """Return a scene whose wave has the frequency of the precession, twice or half of it."""
     a, b, c = moments(generator)
     spin = 10.0 ** generator.uniform(0, 1)
     start = size(generator, -2, 0)
@@ -98,7 +98,7 @@ def _resonant(generator: Generator) -> tuple[Scene, float]:
 
 
 def _fast(generator: Generator) -> tuple[Scene, float]:
-    """Return waves of up to 1e4 rad/s, faint ones and such that rule the motion."""
+    """Return a scene with waves of up to 1e4 rad/s, faint or dominant, and its time."""
     scene, t_end = plain(generator)
     some = [waves(generator, (-1, 3.5), (1.5, 4)) for _ in range(generator.integers(1, 4))]
     return replace(scene, torque=TorqueLaw(cosines=some[:1], sines=some[1:])), t_end
@@ -111,7 +111,7 @@ def _no_body(generator: Generator) -> tuple[Scene, float]:
 
 
 def _other_units(generator: Generator) -> tuple[Scene, float]:
-    """Return times and moments that are many powers of ten away from one."""
+    """Return a scene with times and moments that are many powers of ten away from one."""
     scene, t_end = plain(generator)
     rate, mass = 10.0 ** generator.uniform(-30, 30), 10.0 ** generator.uniform(-20, 20)
     fast = scaled(scene, rate)

@@ -44,7 +44,7 @@ def prose(path: Path) -> Iterator[tuple[int, str]]:
             if token.type == tokenize.COMMENT:
                 yield token.start[0], token.string.strip("# ")
     elif path.suffix in (".c", ".js"):
-        for found in re.finditer(r"/\*(.*?)\*/|(?<!:)//(.*)$", text, re.DOTALL | re.MULTILINE):
+        for found in re.finditer(r"/\*((?:.|\n)*?)\*/|(?<!:)//(.*)$", text, re.MULTILINE):
             yield text.count("\n", 0, found.start()) + 1, found[1] or found[2]
     else:
         for number, line in enumerate(text.split("\n"), 1):

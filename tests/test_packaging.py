@@ -1,4 +1,4 @@
-"""The package for others: types that accept what runs, what it shows, how it is cited."""
+"""The package as its users see it: types that accept valid calls, public names, citation."""
 
 import inspect
 import os
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 SCRIPT = ROOT / "tests/user_script.py"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
-# Each line is refused when it runs, and has a type that says so before.
+# Each line is refused when it runs, and a type checker finds the mistake before.
 MISTAKES = """
 Scene("x", "abc", (3, 2, 1))
 Scene("x", 3.0, (3, 2, 1))
@@ -58,9 +58,9 @@ pyharness.sovle
 
 
 def _mypy(folder: Path, *scripts: Path) -> tuple[set[tuple[str, int]], str]:
-    """Check scripts as a user does for whom the package is installed; return where errors are."""
+    """Check scripts as a user of the installed package would; return the errors and the output."""
     venv.create(folder / "env", with_pip=False, symlinks=True)
-    # The environment holds what this one does, and the package as a wheel would lay it out.
+    # The environment has the packages of this one, and the package as a wheel would install it.
     (folder / "lib").mkdir()
     (folder / "lib/pyharness").symlink_to(ROOT / "pyharness")
     paths = {"base": str(folder / "env"), "platbase": str(folder / "env")}
@@ -117,7 +117,7 @@ def test_a_job_runs_with_the_newest_of_everything() -> None:
 @pytest.mark.external
 @pytest.mark.parametrize(("newest", "code"), [("required", 1), ("", 0)])
 def test_what_was_not_tested_is_said(tmp_path: Path, newest: str, code: int) -> None:
-    """The index has a newer NumPy than the one here, as where Python is old."""
+    """The index has a newer NumPy than the one installed, as it is with an old Python."""
     (tmp_path / ".ci").mkdir()
     shutil.copy(ROOT / ".ci/newest", tmp_path / ".ci")
     python = tmp_path / ".venv/bin/python"
@@ -138,7 +138,7 @@ def test_what_was_not_tested_is_said(tmp_path: Path, newest: str, code: int) -> 
 
 
 def test_lower_bounds_are_what_the_landing_script_installs() -> None:
-    """Each dependency has one bound, and `.ci/run` makes of it the version that it tests."""
+    """Each dependency has one bound, from which `.ci/run` makes the version that it tests."""
     extras = PROJECT["optional-dependencies"]
     bounds = list(dict.fromkeys([*PROJECT["dependencies"], *extras["plots"], *extras["edition"]]))
     script = (ROOT / ".ci/run").read_text()
@@ -178,7 +178,7 @@ def test_the_licences_of_others_are_declared() -> None:
 
 
 def test_nothing_tells_users_to_install_the_package_of_others() -> None:
-    """The index has a package by the name of the import; ours has another name."""
+    """The index has another package with the name of our import; our package has another name."""
     assert PROJECT["name"] == DISTRIBUTION != "pyharness"
     other = re.compile(r"pip install\b[^\n]*?['\" ]pyharness\b(?![-/._])|\bpyharness\[")
     assert other.search("pip install 'pyharness[sweep]'")

@@ -1,4 +1,4 @@
-"""`make quick`: which tests it chooses, and that it ends in time."""
+"""`make quick`: the tests that it chooses, and its end in time."""
 
 import os
 import subprocess

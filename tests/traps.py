@@ -1,9 +1,10 @@
-"""Floating-point exceptions in the compiled entries: none that the answer does not tell of.
+"""Floating-point exceptions in the compiled entries: an answer must report each of them.
 
-A kernel may overflow, or give up on numbers too large, and says so by its status; the stop test's
-quotient may be infinite, and is returned. Anything else that raises invalid, divide-by-zero or
-overflow is called again with traps, which end the process at the very place. Looking first and
-trapping then takes no mark on tests that overflow, and holds every call to its own status.
+A kernel may overflow, or exceed its work limit on numbers too large, and reports it by its status.
+The stop test's quotient may be infinite, and is returned. If any other call raises invalid,
+divide-by-zero or overflow, it is called again with traps, which end the process at the very place.
+Since the first call runs without traps, tests that overflow need no mark, and every call is
+compared with its own status.
 """
 
 import ctypes
@@ -29,11 +30,11 @@ DIVIDE = 2 if _ON_ARM else 4
 TOO_LARGE = 4 if _ON_ARM else 8
 _TRAPPED = INVALID | DIVIDE | TOO_LARGE
 _TRIES_AGAIN = (_CODES[RK4_OR_TAYLOR], _CODES["quick"])
-_EXTREME = 1e60  # its fifth power overflows, and that of its inverse vanishes
-# Bodies side by side share the flags of a processor, so that no answer can tell of its own. They
-# have the bits of single runs, and those are guarded; or both sides of a choice are computed, where
-# a method goes without branches, and what is not sure is left to a single solution.
-# What another word's answer tells stands in bytes; of binary64 it is that of the guarded entry.
+_EXTREME = 1e60  # its fifth power overflows, and the fifth power of its inverse underflows
+# Bodies in a batch share the flags of a processor, so that no answer can report its own. Their bits
+# are those of single runs, which are guarded. Methods without branches compute both sides of a
+# choice, and leave uncertain results to a single solution. Answers in other words are bytes; those
+# in binary64 come from the guarded entry.
 _UNGUARDED = (
     "run_programs", "solve_ensemble", "solve_packed_many", "run_program_in_word",
     "functions_of_word",
@@ -42,11 +43,11 @@ _NAMES = {INVALID: "invalid", DIVIDE: "divide by zero", TOO_LARGE: "overflow"}
 
 
 class UntoldException(AssertionError):
-    """A kernel raised what its answer does not tell of, and traps did not end the process."""
+    """A kernel raised what its answer does not report, and traps did not end the process."""
 
 
 def guard(module: ModuleType) -> int:
-    """Put a guard before every compiled entry of an extension; return how many."""
+    """Put a guard before every compiled entry of an extension; return their number."""
     _print_places(module)
     count = 0
     for name in dir(module):
@@ -58,7 +59,7 @@ def guard(module: ModuleType) -> int:
 
 
 def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
-    """Return an entry that raises nothing untold."""
+    """Return an entry that raises nothing unreported."""
     results = (entry.__doc__ or "").partition(" = ")[0].split(",")
     library = _mathematics()
 
@@ -70,8 +71,7 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
             return answer
         found = dict(zip(results, answer if isinstance(answer, tuple) else (answer,), strict=True))
         if name == "solve_packed" and args[0][Places.METHOD] in _TRIES_AGAIN:
-            # An attempt with too long steps may overflow; then it is made again with shorter ones,
-            # or the series answers.
+            # An attempt with too long steps may overflow; shorter steps or the series then follow.
             found["status"] = OVERFLOW
         untold = raised & ~_told(
             found, bool(raised & TOO_LARGE) or not _finite((*args, *named.values()))
@@ -94,18 +94,18 @@ def guarded(name: str, entry: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _told(found: dict[str, Any], has_infinity: bool) -> int:
-    """Return the exceptions that an answer tells of."""
+    """Return the exceptions that an answer reports."""
     told = 0
     if found.get("status") in (OVERFLOW, GAVE_UP) and has_infinity:
-        # An infinity taken from another is invalid, and a step of one over infinity is zero; either
-        # by itself is not told.
+        # Infinity minus infinity is invalid, and a step of one over infinity is zero; neither is
+        # reported by itself.
         told |= _TRAPPED
     if found.get("status") == SENSITIVE and has_infinity:
-        # Small differences, and the error carried with them, grew beyond every number.
+        # A perturbation, and the error propagated with it, overflowed.
         told |= _TRAPPED
     if np.isinf(found.get("stop_quotient", 0.0)):
         told |= DIVIDE
-    # A velocity beyond every number does not end a run: it is shown as it is.
+    # A velocity that overflows does not end a run, and is returned as it is.
     velocity = found["rows"][5:, : found["n_rows"]] if "ier_rows" in found else np.zeros(1)
     if has_infinity and not np.isfinite(velocity).all():
         told |= _TRAPPED
@@ -117,10 +117,10 @@ def _finite(args: tuple[Any, ...]) -> bool:
 
 
 def _are_extreme(args: tuple[Any, ...]) -> bool:
-    """Whether there are numbers whose products are none: what becomes of them is held elsewhere."""
+    """Whether products of the numbers leave the range, which other tests check."""
     for each in args:
         sizes = np.abs(np.asarray(each, dtype=float))
-        sizes = sizes[sizes > 0.0]  # NaN is no size
+        sizes = sizes[sizes > 0.0]  # NaN has no size
         if sizes.max(initial=1.0) > _EXTREME or sizes.min(initial=1.0) < 1.0 / _EXTREME:
             return True
     return False
@@ -132,8 +132,8 @@ def _mathematics() -> ctypes.CDLL:
 
 
 def _print_places(module: ModuleType) -> None:
-    """Let the Fortran library, where the extension has one, print the lines that led to a trap."""
+    """Let the Fortran library, if the extension has one, print the lines that led to a trap."""
     library = ctypes.CDLL(module.__file__ or "")
     if hasattr(library, "_gfortran_set_options"):
-        # Four options as gfortran's own main programs pass them; the last asks for the backtrace.
+        # Four options as gfortran's own main programs pass them; the last enables the backtrace.
         library._gfortran_set_options(4, (ctypes.c_int * 4)(68, 8191, 0, 1))

@@ -1,4 +1,4 @@
-"""A user's script: everything that runs has a type that accepts it (tests/test_packaging.py)."""
+"""A user's script: the types accept everything that runs (see tests/test_packaging.py)."""
 
 from decimal import Decimal
 from fractions import Fraction

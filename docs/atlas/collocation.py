@@ -1,4 +1,4 @@
-"""The picture of where the collocation programs diverge, linear regions beside."""
+"""The picture of the divergence of the collocation programs, with linear stability regions."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ _FEW = 21
 
 
 def collocation_picture(store: Store) -> Picture:
-    """Draw times of overflow and changes of energy, and where a wobble grows tenfold."""
+    """Draw the overflow times, the energy changes, and the steps with tenfold wobble growth."""
     from matplotlib.figure import Figure
 
     sweep = store.sweep
@@ -72,9 +72,10 @@ def tenfold(
     coefficients: tuple[float, float, float], omega: tuple[float, float, float], sizes: Array,
     seconds: float,
 ) -> Array:  # fmt: skip
-    """Return the steps from which a wobble grows tenfold within a time, for lengths of omega.
+    """Return the step sizes (s) above which a wobble grows at least tenfold in `seconds`.
 
-    A step of collocation makes of it 1 + z + z^2/2: for imaginary z it grows by |z|^4/8.
+    There is one for each magnitude of omega in `sizes`. A collocation step multiplies a wobble by
+    1 + z + z^2/2. For imaginary z its magnitude grows by the fraction |z|^4/8.
     """
     fastest = max(abs(q.imag) for q in rates(coefficients, omega)) / float(np.linalg.norm(omega))
     wobbles = fastest * sizes

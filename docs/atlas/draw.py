@@ -1,4 +1,4 @@
-"""Draw the pictures of the atlas from the stores of its sweeps.
+"""Pictures of the atlas, drawn from the stores of its sweeps.
 
 ``python -m docs.atlas.draw stops stops.zarr``, in a checkout, draws the store of ``stops.toml``. It
 writes ``stops.png`` and its numbers, ``stops.csv``, beside this file.
@@ -26,7 +26,7 @@ _HERE = Path(__file__).parent
 
 
 def main(name: str, path: str) -> None:
-    """Draw the picture of a name from the store at a path."""
+    """Draw the picture `name` from the store at `path`."""
     sweep = read_sweep(_HERE / f"{name}.toml")
     if not check_store(sweep, path):
         raise InputError(f"'{path}' is not there; 'pyharness sweep' makes it")

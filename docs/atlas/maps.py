@@ -1,4 +1,4 @@
-"""What pages of the atlas have in common: maps of the square of all bodies, linear regions."""
+"""Parts that pages of the atlas share: maps of the square of all bodies, stability regions."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,7 @@ _OF_REGIONS = (
 
 
 def axis_of(store: Store, field: str) -> Axis:
-    """Return the axis of a field."""
+    """Return the sweep axis that varies a field."""
     return next(axis for axis in store.sweep.axes if axis.field == field)
 
 
@@ -34,17 +34,17 @@ def values_of(store: Store, field: str) -> Any:
 
 
 def thinned(count: int, most: int = _MOST_PLACES) -> Any:
-    """Return the places that are shown."""
+    """Return at most `most` evenly spaced indices of `count` values."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
 def nearest(values: Array, value: float) -> int:
-    """Return the place of the number above 0 that is nearest to a value, by their ratio."""
+    """Return the index of the positive number whose ratio to a value is nearest to 1."""
     return int(np.argmin(np.abs(np.log(values / value))))
 
 
 def square_map(plot: "Axes", store: Store, values: Array, **style: Any) -> Any:
-    """Draw values over the square of all bodies, with the bodies of the thesis in it."""
+    """Draw values over the square of all bodies, and mark the bodies of the thesis."""
     across, up = values_of(store, "body.square.1"), values_of(store, "body.square.2")
     rows, columns = thinned(len(up)), thinned(len(across))
     shown = values[np.ix_(rows, columns)]
@@ -65,7 +65,7 @@ def square_map(plot: "Axes", store: Store, values: Array, **style: Any) -> Any:
 
 
 def square_rows(store: Store, what: str, values: Array, most: int) -> list[list[Any]]:
-    """Return some values over the square as rows: what, b/a, c/b, value."""
+    """Return values at up to `most`**2 points of the square as rows: what, b/a, c/b, value."""
     across, up = values_of(store, "body.square.1"), values_of(store, "body.square.2")
     return [
         [what, float(across[j]), float(up[i]), float(f"{values[i, j]:.6g}")]
@@ -75,7 +75,7 @@ def square_rows(store: Store, what: str, values: Array, most: int) -> list[list[
 
 
 def place_of(moments: Triple) -> tuple[float, float]:
-    """Return where a body stands in the square."""
+    """Return the coordinates b/a and c/b of a body in the square."""
     low, middle, high = sorted(moments)
     # Twice the integrals of x^2, y^2, z^2 over the mass.
     a, b, c = middle + high - low, low + high - middle, low + middle - high
@@ -83,7 +83,7 @@ def place_of(moments: Triple) -> tuple[float, float]:
 
 
 def region_panels(plane: "Axes", growth: "Axes", found: Regions) -> None:
-    """Draw the linear regions of the programs, and the growth along the imaginary axis."""
+    """Draw the linear stability regions of the programs, and growth on the imaginary axis."""
     regions = {each.name: each for each in found.regions}
     plane.axvspan(found.real[0], 0.0, color="#ededed", zorder=0)
     for name, label, color, dash in _OF_REGIONS:

@@ -1,4 +1,4 @@
-"""The picture of the stability atlas: time between flips of all bodies, by the closed form."""
+"""The picture of the stability atlas: times between flips of all bodies, in closed form."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ from pyharness.model.trajectory import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MAPS = ((1e-8, 0), (1e-4, 0), (1.0, 0), (1.0, -1))  # tilt (rad), place of the azimuth
+_MAPS = ((1e-8, 0), (1e-4, 0), (1.0, 0), (1.0, -1))  # tilt (rad), index of the azimuth
 _LEVELS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 _LIMITS = (3.0, 1000.0)  # s
 _SHARES = (0.01, 0.5, 0.99)
@@ -22,7 +22,7 @@ _FEW = 21
 
 
 def stability_picture(store: Store) -> Picture:
-    """Draw maps of the square at some tilts, shares of it against the tilt, and what stays up."""
+    """Draw flip times over the square, their quantiles by tilt, and the tilts with rare flips."""
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
@@ -68,9 +68,10 @@ def _contours(plot: "Axes", store: Store, values: Array) -> None:
 
 
 def _scanned(store: Store) -> tuple[Array, Array]:
-    """Return shares of the square (azimuth, share, tilt), and the largest tilts that flip rarely.
+    """Return quantiles of the flip time, and the largest tilt with rare flips of each body.
 
-    With `_LONG` between flips, by the first azimuth; NaN where no tilt has that.
+    The quantiles have the shape (azimuth, quantile, tilt). Flips are rare if the time between
+    them exceeds `_LONG` at the first azimuth. The tilt is NaN if no tilt has rare flips.
     """
     tilts, azimuths = values_of(store, "tilt"), values_of(store, "azimuth")
     times = store.array("flip-time")

@@ -1,4 +1,4 @@
-"""The picture of the stops atlas: what ends the Runge-Kutta program, linear regions beside."""
+"""The picture of the stops atlas: endings of the Runge-Kutta program, stability regions."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
 _COLORS = ("#f4f4f4", "#1f77b4", "#2ca02c", "#17becf", "#9467bd", "#d08030", "#d62728", "#808080",
            "#404040", "#000000")  # fmt: skip
-_OVERFLOW = 9  # beside the numbers of stop variables
-_LIMIT = 2.0 * 2.0**0.5  # of rk4 on the imaginary axis
+_OVERFLOW = 9  # a number that no stop variable has
+_LIMIT = 2.0 * 2.0**0.5  # rk4's stability limit on the imaginary axis
 _ROWS = 2000
 _MOST_PLACES = 400
 _FEW = 21
 
 
 def stops_picture(store: Store) -> Picture:
-    """Draw for each listing and case the variable that ends it, with what is predicted."""
+    """Draw, for each listing and case, the variable that ends the run, and the prediction."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
@@ -85,7 +85,7 @@ def stops_picture(store: Store) -> Picture:
 
 
 def case_scenes(sweep: Sweep) -> list[Scene]:
-    """Return the scene of each place along the dimension `case`, by the name of its case."""
+    """Return the scenes along the dimension `case`, each named after its case."""
     where = [
         np.arange(n) if name == "case" else np.zeros(sweep.dimensions["case"], dtype=np.int64)
         for name, n in sweep.dimensions.items()
@@ -102,10 +102,11 @@ def case_scenes(sweep: Sweep) -> list[Scene]:
 
 
 def predicted(scene: Scene, t_end: float) -> tuple[float, float]:
-    """Return where the corrected program stops: below which constant, and above which step.
+    """Return the constant (1/s) below which the corrected program stops, and a step size (s).
 
-    In short steps its quotient nears |omega''| / |omega'|, whose largest value on the way is the
-    constant; steps longer than rk4's limit for the fastest wobble on the way grow.
+    As the step size decreases, the quotient of the stop test tends to |omega''| / |omega'|. The
+    constant is its maximum from 0 to `t_end`. Above the step size, which is rk4's stability limit
+    for the fastest wobble in that time, perturbations grow.
     """
     times = [t_end * (i + 1) / _ROWS for i in range(_ROWS)]
     omega = np.vstack([scene.omega, solve(scene, times).omega])

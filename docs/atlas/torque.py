@@ -1,4 +1,4 @@
-"""The picture of the atlas under a torque fixed in the body: flips, and how far bodies tilt."""
+"""The picture of the torque atlas: flips and tilts under a torque fixed in the body."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from pyharness.model.trajectory import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_TILT = 1e-4  # rad, of the maps
+_TILT = 1e-4  # rad, in the maps
 _AXES = {1: "least", 2: "middle", 3: "largest"}
 _MOST_MAPS = 6
 _MOST_FLIPS = 8
@@ -20,7 +20,7 @@ _FEW = 16
 
 
 def torque_picture(store: Store) -> Picture:
-    """Draw flips over the square for each torque, and shares of it against the tilt."""
+    """Draw flips over the square, and the fraction that flips and the mean tilt by initial tilt."""
     from matplotlib.colors import BoundaryNorm
     from matplotlib.figure import Figure
 
@@ -53,7 +53,7 @@ def torque_picture(store: Store) -> Picture:
 
 
 def _told(store: Store) -> list[str]:
-    """Say the torque of each place along its dimension."""
+    """Return a description of each torque along the dimension `torque`."""
     count = store.sweep.dimensions["torque"]
     found = [""] * count
     for axis in store.sweep.axes:

@@ -1,4 +1,4 @@
-"""Forecasts: how long a number of random draws takes, said before any of them is made."""
+"""Limits and forecasts of the run time of random draws, checked before the first draw."""
 
 from typing import NamedTuple
 
@@ -9,22 +9,22 @@ _WORTH_SAYING = 60.0  # s
 
 
 class Cost(NamedTuple):
-    """The cost of a draw, as measured on one core of 2026, and the most draws that are allowed."""
+    """The cost of one draw, measured on one core of 2026, and the largest number of draws."""
 
-    what: str  # the things drawn, in the plural
+    what: str  # name of the drawn things, in the plural
     seconds: float
     n_bytes: float
     most: int
 
 
-# Nearly three checks a draw, each kept until the report.
+# A draw makes nearly three checks; each stays in memory until the report.
 CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
-# Every contender with every setting, the reference included.
+# A scene runs every contender with every setting, and the reference.
 SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def check_count(option: str, count: int, least: int, cost: Cost) -> None:
-    """Refuse a number of draws that no one waits for; say a forecast of one that takes long."""
+    """Raise InputError if a number of draws is not allowed; print a forecast of a long run."""
     from pyharness.ensembles.forecast import duration
 
     if not least <= count <= cost.most:

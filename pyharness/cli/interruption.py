@@ -1,8 +1,8 @@
-"""Ctrl-C on the command line: one line and exit code 130, whenever it comes.
+"""Ctrl-C on the command line: one line on stderr and exit status 130, at any time.
 
-A KeyboardInterrupt can come between any two instructions, and not all code lets it through: an
-import may turn it into another error, a finalizer or a callback drops it. So what counts is that
-the signal came, not which exception arrives; and one that was dropped is raised again.
+A KeyboardInterrupt can be raised between any two instructions, and not all code propagates it. An
+import may replace it by another exception; a finalizer or a callback drops it. This module
+therefore records the signal itself, and raises KeyboardInterrupt again if it was dropped.
 """
 
 import atexit
@@ -19,21 +19,21 @@ from typing import Any, TextIO
 from pyharness.cli import say, say_again
 
 _AGAIN = 0.25  # s, after which a dropped interrupt is raised again
-_MOST = 3  # of them, by the user, until nothing is waited for any more
-_PATIENCE = 2.0  # s, for what is tidied up when a process ends
+_MOST = 3  # the interrupt by the user at which the process ends at once
+_PATIENCE = 2.0  # s, for the cleanup at the end of a process
 CODE = 130
 LINE = "pyharness: interrupted\n"
 
 
 class _Interruption:
-    """How often the user interrupted, whether that was reported, and what happens when it comes."""
+    """The number of interrupts by the user, whether they were reported, and the signal handlers."""
 
     def __init__(self) -> None:
         self.count = 0
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """End the process now: nothing was begun that would have to be tidied up."""
+        """End the process at once, without any cleanup."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -41,7 +41,7 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt, and see to it that it is not dropped."""
+        """Raise KeyboardInterrupt, and start the timer that raises it again if it is dropped."""
         self.count += 1
         if self.count >= _MOST:
             self.leave_at_once()
@@ -50,7 +50,7 @@ class _Interruption:
         raise KeyboardInterrupt
 
     def _again(self, *_: object) -> None:
-        # Who has another handler for a while is not to be disturbed.
+        # Code that has installed its own handler is not interrupted.
         is_ours = signal.getsignal(signal.SIGINT) == self.interrupt
         if is_ours and not self.is_reported and not _is_on_its_way():
             raise KeyboardInterrupt
@@ -66,12 +66,12 @@ def came() -> bool:
 
 
 def leave_when_interrupted() -> bool:
-    """Let Ctrl-C end the process at once, with its line; return False where it is ignored.
+    """Make Ctrl-C end the process at once with its line; return False if SIGINT is ignored.
 
-    It is for times in which nothing has to be tidied up: while modules are imported, and after the
+    This handler is for times that need no cleanup: while modules are imported, and after the
     results are written.
     """
-    # A shell starts what runs in the background with the signal ignored, and so it stays.
+    # A shell starts a background process with SIGINT ignored; it remains ignored.
     if not callable(signal.getsignal(signal.SIGINT)):
         return False
     signal.signal(signal.SIGINT, _STATE.leave_at_once)
@@ -79,7 +79,7 @@ def leave_when_interrupted() -> bool:
 
 
 def run_interruptible(main: Callable[[], int]) -> int:
-    """Return the exit code of a command, 130 where the user has interrupted it."""
+    """Run a command and return its exit status, 130 if the user interrupted it."""
     hook, escaped, code = sys.unraisablehook, False, CODE
     try:
         sys.unraisablehook = _quiet_of(hook)
@@ -88,7 +88,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
             signal.signal(signal.SIGINT, _STATE.interrupt)
         code = main()
     except BaseException as error:
-        # What an interrupt became on its way is no error of its own.
+        # After an interrupt, any exception is taken as its consequence.
         if not came() and not isinstance(error, KeyboardInterrupt):
             raise
         escaped = True
@@ -101,22 +101,23 @@ def run_interruptible(main: Callable[[], int]) -> int:
 
 
 def report() -> int:
-    """Say in one line that the command was interrupted, and return its exit code."""
+    """Print the line that reports the interrupt, once, and return the exit status."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
-        say_again("")  # wipes how far it was
+        say_again("")  # wipes the progress line
         say(LINE)
     return CODE
 
 
 def leave(code: int) -> None:
-    """End the process with an exit code; temporary files are removed before.
+    """Remove temporary files and end the process with an exit status.
 
-    Python itself would wait for threads, free all memory piece by piece, and drop an interrupt, or
-    die by its signal. After an interrupt nothing is waited for, neither processes nor threads.
+    The normal exit of Python would wait for threads and free all memory piece by piece. It would
+    drop an interrupt, or end by its signal. After an interrupt this function waits for no process
+    and, beyond the time limit of the cleanup, for no thread.
     """
     if code == CODE:
-        # The line is written; what threads and finalizers have to say of their end is no news.
+        # The interrupt was reported; messages of ending threads and finalizers are suppressed.
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         if "multiprocessing" in sys.modules:
@@ -136,7 +137,7 @@ def leave(code: int) -> None:
 
 
 def _is_on_its_way() -> bool:
-    """Return whether a KeyboardInterrupt is being handled: what runs now is tidying up."""
+    """Return whether a KeyboardInterrupt is being handled, so that cleanup is running now."""
     error: BaseException | None = sys.exception()
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
@@ -153,13 +154,13 @@ def _show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    # Other threads may go on a little, and what was begun is not finished: no news to the user.
+    # After an interrupt, warnings of other threads and of unfinished work are suppressed.
     if not came():
         _SHOW_WARNING(message, category, filename, lineno, file, line)
 
 
 def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return the hook of errors that nobody can catch, without a word on interrupts."""
+    """Return a hook for unraisable exceptions that does not report KeyboardInterrupt."""
 
     def told(unraisable: Any) -> None:
         if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):

@@ -1,4 +1,4 @@
-"""The command line: find the verb, let it run, turn what went wrong into one line."""
+"""The command line: it finds the verb, runs it, and reports an error in one line."""
 
 import gc
 import os
@@ -9,7 +9,7 @@ from pyharness.cli import say
 from pyharness.cli.interruption import came, report
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
-# Each verb is a module of pyharness.cli.verbs, loaded when it is called for.
+# Each verb is a module of pyharness.cli.verbs, imported only when the verb is used.
 VERBS = {
     "compare": "compare original and corrected programs, Fortran and Python, and solve_ivp",
     "run": "compute one trajectory with a program of the appendix or with a method",
@@ -30,7 +30,7 @@ VERBS = {
     "edition": "write the whole edition as a static web site with a laboratory",
     "doctor": "report the build, its compiler and flags, and what is missing",
 }
-# The order in which a reader looks for them.
+# The groups of the overview, in the order in which a reader looks for a verb.
 _GROUPS = {
     "for everyone": ("compare", "run", "plan", "doctor"),
     "the thesis": ("claims", "figures", "cards", "defects", "deck", "limits", "family", "words"),
@@ -40,15 +40,15 @@ _GROUPS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit code.
+    """Run a command line and return its exit status.
 
-    0 as expected; 1 an unexpected difference; 2 wrong usage or input; 3 the extension is not
-    built; 130 interrupted.
+    It is 0 for expected results, 1 for an unexpected difference, 2 for wrong usage or input, 3 if
+    the extension is not built, and 130 after an interrupt.
     """
-    # A command is short: collecting cycles while rooms are imported costs 4 % and frees nothing.
+    # A command is short. Garbage collection during the imports costs 4 % and frees nothing.
     gc.set_threshold(100_000)
-    # No matrix here is worth a second thread, and starting a pool of them costs a seventh of
-    # `compare`. It counts only where NumPy is not imported yet.
+    # No matrix here is large enough for a second thread, and starting a pool of threads costs a
+    # seventh of `compare`. The variable has an effect only if NumPy is not imported yet.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if sys.stderr is None:  # closed by the caller, as in 2>&-
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _complain("not enough memory; take fewer steps", 2)
     except BrokenPipeError:
-        # The reader has seen enough.
+        # The reader of the pipe closed it, as `head` does.
         _leave_stdout()
         return 0
     except OSError as error:
@@ -103,15 +103,15 @@ def _run(arguments: list[str]) -> int:
 
 
 def _complete() -> int:
-    """Answer a shell that asks through argcomplete how the line typed so far may continue."""
+    """Return the completions of the line typed so far to a shell that uses argcomplete."""
     from argparse import ArgumentParser
 
     try:
         import argcomplete
-    except ImportError:  # it is installed beside the shell, and not here
+    except ImportError:  # installed for the shell, but not in this environment
         return 1
     line, first = os.environ["COMP_LINE"], int(os.environ["_ARGCOMPLETE"])
-    # A word counts as typed once a blank follows it.
+    # A word is complete if a blank follows it.
     typed = f"{line[: int(os.environ['COMP_POINT'])]}|".split()[:-1]
     verb = typed[first] if len(typed) > first else ""
     parser = ArgumentParser("pyharness", add_help=False)
@@ -136,13 +136,13 @@ def _overview() -> str:
 
 
 def _leave_stdout() -> None:
-    # Python would try once more when it closes the stream, and complain.
+    # Otherwise Python would flush the stream again at exit and report the error.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str, code: int) -> int:
     if came():
-        # An interrupt may turn into another error on its way here.
+        # Intermediate code may have replaced the KeyboardInterrupt by another exception.
         return report()
     line = " ".join(message.split())
     say(f"pyharness: {line}\n")

@@ -1,4 +1,4 @@
-"""Options that verbs share: how they are declared, read and refused."""
+"""Options that verbs share: their declaration, parsing and rejection."""
 
 import argparse
 import math
@@ -47,7 +47,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """Help in which the example keeps its lines, and the usage names no option: the groups do."""
+    """A help formatter that keeps the lines of the example and names no option in the usage."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if text.startswith("example:"):
@@ -61,10 +61,10 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, with the nearest name."""
+    """A parser whose error messages are one line and suggest the nearest name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the OPTIONS of a verb's module; its FORMATS, where it has any, replace ours."""
+        """Declare the OPTIONS of a verb's module."""
         self._width = _WIDEST
         self.module = import_module(f"pyharness.cli.verbs.{verb}")
         super().__init__(
@@ -73,7 +73,7 @@ class Parser(argparse.ArgumentParser):
             epilog=f"example:\n  pyharness {self.module.EXAMPLE}",
             allow_abbrev=False,
             add_help=False,
-            # Without a width argparse would import what asks the terminal, for every command.
+            # Without a width, argparse would import `shutil` for every command.
             formatter_class=lambda prog: _Formatter(prog, width=self._width),
         )
         titles = ["arguments", *dict.fromkeys([*_GROUPS.values(), "options", "output"])]
@@ -91,14 +91,14 @@ class Parser(argparse.ArgumentParser):
         groups["output"].add_argument("-h", "--help", action="help", help="Print this help.")
 
     def format_help(self) -> str:
-        """Return the help, as wide as the terminal or COLUMNS, between 80 and 100 columns."""
+        """Return the help in the width of the terminal or COLUMNS, limited to 80 to 100 columns."""
         from shutil import get_terminal_size
 
         self._width = min(max(get_terminal_size().columns, _NARROWEST), _WIDEST)
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError in place of printing the usage."""
+        """Raise InputError; argparse would print the usage."""
         raise InputError(message)
 
     def option_names(self) -> list[str]:
@@ -106,19 +106,19 @@ class Parser(argparse.ArgumentParser):
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
-        """Return the options of a command line; InputError for one that is unknown."""
+        """Return the options of a command line; raise InputError if an option is unknown."""
         options, rest = self.parse_known_args(self._joined(arguments))
         if rest:
             raise unknown("option", rest[0], self.option_names(), verb)
         for name, value in vars(options).items():
-            # What argparse makes of `--name=--`.
+            # For `--name=--`, argparse returns a list.
             if isinstance(value, list):
                 raise InputError(f"--{name.replace('_', '-')}: '--' is no value; give one")
         check_known("format", options.format, getattr(self.module, "FORMATS", FORMATS))
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
-        """Join an option and a value with a minus sign, which argparse takes for an option."""
+        """Join a value that begins with a minus sign to its option; argparse would reject it."""
         result: list[str] = []
         for argument in arguments:
             if result and result[-1] in self.option_names() and _NEGATIVE.match(argument):
@@ -129,7 +129,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "Draw a picture") -> dict[str, str]:
-    """Return the options of the output; `plot` is the help of --plot, empty if there is none."""
+    """Return the output options; `plot` is the help text of --plot, empty to omit --plot."""
     first, *others = formats
     form = {"--format F": f"Form of the result: {first} (default), {', '.join(others)}."}
     picture = {"--plot FILE": f"{plot} in this file, and write its numbers beside it as CSV."}
@@ -138,7 +138,7 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "Draw a picture") -> d
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return the factor on the limits."""
+    """Return the factor on the work limits."""
     return positive(options.effort, "--effort", 1.0)
 
 
@@ -150,7 +150,7 @@ def chosen_tolerance(options: argparse.Namespace) -> float | None:
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return the seed of random draws; InputError for one that no line could repeat."""
+    """Return the seed of random draws; raise InputError if it has unprintable characters."""
     if options.seed is not None and not options.seed.isprintable():
         raise InputError("--seed: has letters that can't be printed; allowed: any others")
     seed: str | None = options.seed
@@ -158,13 +158,13 @@ def chosen_seed(options: argparse.Namespace) -> str | None:
 
 
 def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
-    """Refuse what is given by the option of that name and not allowed."""
+    """Raise InputError if the value `name` of the option --`what` is given but not allowed."""
     if name is not None and name not in allowed:
         raise unknown(what, name, allowed, f"--{what}")
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return what --only names, as in kind/check; InputError where a kind is unknown."""
+    """Return the names in --only, as in kind/check; raise InputError if a kind is unknown."""
     only = names(text)
     for each in only:
         if each.partition("/")[0] not in allowed:
@@ -175,10 +175,10 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 def chosen_scene(
     options: argparse.Namespace, any_axes: bool = False, any_torque: bool = False
 ) -> Scene:
-    """Return the scene asked for; warn where no body has its moments.
+    """Return the requested scene; warn if no rigid body can have its moments.
 
-    InputError for a full inertia matrix, but with `any_axes`, and for a torque about the axes of
-    space, but with `any_torque`.
+    Raise InputError for a full inertia matrix unless `any_axes`, and for a torque about the axes
+    of space unless `any_torque`.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -212,13 +212,13 @@ def _norm(length: float) -> str:
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the one program asked for, or all."""
+    """Return the requested program, or all three by default."""
     check_known("program", options.program, PROGRAMS)
     return PROGRAMS if options.program is None else (options.program,)
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the listing of the one program asked for."""
+    """Return the requested listing of the requested program."""
     chosen_programs(options)
     listing = subset(
         options.program,
@@ -233,7 +233,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
-    """Warn of readings and conjectures that were asked for and change nothing."""
+    """Warn of requested readings and conjectures that have no effect."""
     asked = {*names(options.reading), *names(options.conjecture)} - {"none"}
     active = {name for listing in listings for name in listing.active}
     for name in sorted(asked - active - set(names(options.fix))):
@@ -241,7 +241,7 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Say a listing in a line."""
+    """Return a description of a listing in one line."""
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}
     told = [f"; {what}: {', '.join(sorted(names))}" for what, names in more.items() if names]
@@ -249,9 +249,10 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the constant of the stop test (1/s), by default that of the decks.
+    """Return the constant of the stop test (1/s), by default the constant of the decks.
 
-    InputError for what means nothing to a program without the test, or without a stop.
+    Raise InputError if the program has no stop test but one of its options is given, or if both
+    --no-stop and --lipschitz are given.
     """
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
@@ -261,24 +262,24 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Refuse options that mean nothing beside what was chosen."""
+    """Raise InputError if one of the options `names` is given; none has a meaning with `chosen`."""
     for name in names:
         if getattr(options, name):
             raise InputError(f"--{name.replace('_', '-')} has no meaning with {chosen}")
 
 
 def names(text: str | None) -> list[str]:
-    """Return the names of a list, as in a,b."""
+    """Return the names of a comma-separated list, as in a,b."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the finite numbers of a list, as in 1,2."""
+    """Return the finite numbers of a comma-separated list, as in 1,2."""
     return [number(part, option) for part in text.split(",")]
 
 
 def number(text: str, option: str) -> float:
-    """Return a finite number."""
+    """Return a text as a finite number; raise InputError if it is none."""
     try:
         value = float(text)
     except ValueError:
@@ -289,7 +290,7 @@ def number(text: str, option: str) -> float:
 
 
 def positive(text: str | None, option: str, default: float) -> float:
-    """Return a number above 0, or the default where none is given."""
+    """Return a text as a number above 0, or the default for None."""
     if text is None:
         return default
     value = number(text, option)
@@ -299,7 +300,7 @@ def positive(text: str | None, option: str, default: float) -> float:
 
 
 def whole(text: str, option: str) -> int:
-    """Return a whole number."""
+    """Return a text as a whole number; raise InputError if it is none."""
     try:
         return int(text)
     except ValueError:
@@ -307,17 +308,17 @@ def whole(text: str, option: str) -> int:
 
 
 def warn(message: str) -> None:
-    """Say on stderr what the user should know."""
+    """Print a warning on stderr."""
     say(f"pyharness: warning: {message}\n")
 
 
 def progress(text: str) -> None:
-    """Say on a terminal how far it is, in a line that the next one replaces; "" wipes it."""
+    """Print the progress on a terminal, in a line that the next call replaces; "" wipes it."""
     say_again(text)
 
 
 def check_outputs(options: argparse.Namespace) -> None:
-    """Refuse outputs that can't be written, before anything is computed."""
+    """Raise InputError before any computation if an output can't be written."""
     picture = getattr(options, "plot", None)
     if picture is None and options.out is None:
         return
@@ -340,9 +341,9 @@ def show(
     options: argparse.Namespace,
     own: Mapping[str, Callable[[], str | bytes]] | None = None,
 ) -> None:
-    """Give a report in the form asked for, and draw its picture where one is asked for.
+    """Write a report in the requested format, and its picture if --plot is given.
 
-    `own` are forms, by name, that this report alone has.
+    `own` maps the names of formats that only this report has to the functions that make them.
     """
     from pyharness.views.render import render
 
@@ -360,7 +361,7 @@ def show(
 
 
 def emit(content: str | bytes, out: str | None) -> None:
-    """Write to the terminal, or to the file asked for."""
+    """Write a result to the file `out`, or to stdout for None."""
     if out is not None:
         from pyharness.cli.output import write_files
 

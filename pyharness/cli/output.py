@@ -1,4 +1,4 @@
-"""Where results go: a file is there whole or not at all."""
+"""Output files and folders, each written as a whole or not at all."""
 
 import json
 import os
@@ -15,13 +15,13 @@ from pyharness.model.pipes import read_input, write_waiting
 from pyharness.model.schema import check_schema
 from pyharness.views.pictures import numbers_beside
 
-_LARGEST_MARK = 1 << 24  # bytes of the file that lists what a verb wrote
+_LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a verb
 
 
 def check_writable(path: str, option: str) -> None:
-    """Refuse a path that can't be written, before anything is computed for it."""
+    """Raise InputError before any computation if a path can't be written."""
     try:
-        # Through a link to what it names, as an ordinary write would go.
+        # A link is followed to its target, as in an ordinary write.
         target = Path(os.path.realpath(path)) if "\0" not in path else Path()
         folder = target.parent
         if "\0" in path:
@@ -41,7 +41,7 @@ def check_writable(path: str, option: str) -> None:
         elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
             reason = "permission denied"
         else:
-            # What no permission tells: a file system that takes no file, /proc among them.
+            # Permissions do not show that a file system, as /proc, accepts no file.
             probe = _File(path)
             try:
                 probe.write(b"")
@@ -54,7 +54,7 @@ def check_writable(path: str, option: str) -> None:
 
 
 def check_apart(picture: str, out: str) -> None:
-    """Refuse a result that would overwrite the picture or its numbers."""
+    """Raise InputError if the result would overwrite the picture or its numbers."""
     for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
         if os.path.realpath(path) == os.path.realpath(out):
             raise InputError(
@@ -63,10 +63,10 @@ def check_apart(picture: str, out: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write all files or none: each under a name of its own first, then all are renamed.
+    """Write all files or none: first under temporary names, then all are renamed.
 
-    Whatever interrupts it, Ctrl-C too, everything is as before. What exists and is no ordinary
-    file (a device, a pipe) is written to, never replaced, and first of all.
+    After any failure or interrupt, Ctrl-C included, the old files are restored. A path that is a
+    special file (a device, a pipe) is written to first, and never replaced.
     """
     path = ""
     try:
@@ -80,7 +80,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
                     path = file.path
                     file.write(contents[path])
                     patience.check()
-                # A single rename happens or does not.
+                # A single rename is atomic and needs no copy of the old file.
                 for file in files if len(files) > 1 else ():
                     path = file.path
                     file.keep()
@@ -98,10 +98,10 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
 
 
 class _DeferredInterrupt:
-    """Lets a Ctrl-C wait: one that came in the middle of tidying up would leave things behind."""
+    """A context that defers Ctrl-C, which would leave temporary files behind during cleanup."""
 
     def __enter__(self) -> Self:
-        """Hold it from now on."""
+        """Defer interrupts from now on."""
         self._came = False
         self._before = signal.getsignal(signal.SIGINT)
         # Python raises KeyboardInterrupt in the main thread alone.
@@ -111,14 +111,14 @@ class _DeferredInterrupt:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let it go."""
+        """Restore the handler, and call it if an interrupt was deferred."""
         if self._holds:
             signal.signal(signal.SIGINT, self._before)
         if self._came and callable(self._before):
             self._before(signal.SIGINT, None)
 
     def check(self) -> None:
-        """Give up here if one has come."""
+        """Raise KeyboardInterrupt if an interrupt was deferred."""
         if self._came:
             raise KeyboardInterrupt
 
@@ -127,12 +127,12 @@ class _DeferredInterrupt:
 
 
 class _File:
-    """A file on its way: `new` beside its target, and what the target held, `old`."""
+    """A file being written: `new` is its temporary name, and `old` a copy of the old target."""
 
     def __init__(self, path: str) -> None:
         self.path = path
-        # Through a link to what it names, as an ordinary write would go; and beside that, since
-        # a rename does not leave a file system.
+        # A link is followed to its target, as in an ordinary write. The temporary files are in the
+        # target's folder, as a rename works only within a file system.
         self.target = os.path.realpath(path)
         beside = os.path.join(os.path.dirname(self.target), f".pyharness-{os.urandom(8).hex()}")
         self.new, self.old = f"{beside}-new", f"{beside}-old"
@@ -163,7 +163,7 @@ class _File:
             try:
                 os.replace(self.old, self.target)
             except OSError:
-                self.old = self.new  # better left behind than lost
+                self.old = self.new  # keep the copy rather than lose the old content
         elif not self.existed:
             _remove([self.target])
 
@@ -175,12 +175,12 @@ def _remove(names: list[str]) -> None:
 
 
 def _is_special(path: str) -> bool:
-    """Whether there is something that is no ordinary file: a device, a pipe."""
+    """Return whether a path exists and is no ordinary file, but a device, a pipe or a folder."""
     return Path(path).exists() and not Path(path).is_file()
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Refuse a folder in which `names` can't be written, before anything is computed for it."""
+    """Raise InputError before any computation if `names` can't be written in a folder."""
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -195,10 +195,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return why a folder can't be made, after a colon; empty where it can.
+    """Return the reason why a folder can't be made, after a colon; empty if it can.
 
-    It is made and removed: no permission tells of a name that is too long, or of a file system
-    that takes no folder.
+    The folder is made and removed: permissions do not show that a name is too long, or that a
+    file system accepts no folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -211,7 +211,7 @@ def _why_not_made(folder: Path) -> str:
 
 
 def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Write all files into a folder, which is made if it is missing; all or nothing."""
+    """Write all files or none into a folder, which is made if it is missing."""
     folder = Path(path)
     files = {str(folder / name): content for name, content in contents.items()}
     with _DeferredInterrupt():
@@ -229,17 +229,17 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 
 
 def check_tree(path: str, mark: str, option: str) -> None:
-    """Refuse a folder that `write_tree` may not make anew, before anything is computed for it.
+    """Raise InputError before any computation if `write_tree` may not replace a folder.
 
-    It may be new or empty, or hold nothing but the `files` that the JSON of the file `mark` in it
-    lists, and that file.
+    The folder may be new or empty. Otherwise it may contain only the JSON file `mark` and the
+    files that its entry `files` lists.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
     new, _ = _beside(folder)
     try:
         reason = _why_not_anew(folder, mark)
-        # No permission tells of a name that is too long, or of a file system that takes no file.
+        # Permissions do not show that a name is too long, or that no file is accepted.
         if not reason:
             new.mkdir()
             try:
@@ -253,7 +253,7 @@ def check_tree(path: str, mark: str, option: str) -> None:
 
 
 def _why_not_anew(folder: Path, mark: str) -> str:
-    """Return why a folder may not be made anew; empty where it may."""
+    """Return the reason why a folder may not be replaced; empty if it may."""
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
@@ -279,15 +279,16 @@ def _listed(mark: Path) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    """Return where a folder is made anew, and where the one that stood there waits."""
+    """Return the temporary names of the new folder and of the old one."""
     new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     return new, old
 
 
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Write all files, and no other, into a folder with folders in it; all or nothing.
+    """Replace a folder by one with these files alone, in subfolders; write all or none.
 
-    They are written beside it first. What stood there is gone when they have its place.
+    The files are written to a temporary folder beside it, which is then renamed. The old folder
+    is removed after that.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)
@@ -309,7 +310,7 @@ def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
                     raise
             finally:
                 shutil.rmtree(new, ignore_errors=True)
-            # Only now: what stood there is safe until the new has its place.
+            # The old folder is kept until the new one has its name.
             shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         raise InputError(f"{option} '{path}': {error.strerror or error}") from None

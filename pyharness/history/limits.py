@@ -1,8 +1,8 @@
 """The limits of the original programs as the step size goes to zero.
 
 A program that does not converge to the solution converges to another function, or to none.
-docs/explanation/findings.md derives the limits. This module computes each limit independently of the programs,
-and compares the programs with their limits while the step is halved.
+docs/explanation/findings.md derives the limits. This module computes each limit independently of
+the programs, and compares the programs with their limits while the step is halved.
 """
 
 import math

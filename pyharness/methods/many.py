@@ -80,13 +80,16 @@ def solve_many(
         scenes, without arrays.
     t_end : float, or array of shape (n,)
         Time of each result, s; positive, negative or 0.
-    omega0, moments, coefficients, torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Initial angular velocities (rad/s), moments (kg m2), coefficients A, B, C, constant torques
-        (N m) and their rates (N m/s). For bodies given by coefficients the torques are divided by
-        the moments (1/s2, 1/s3). An array of one row is shared by all bodies.
+    omega0 : array, shape (n, 3) or (3,)
+        Initial angular velocities, rad/s. An array of one row is shared by all bodies.
+    moments, coefficients : array, shape (n, 3) or (3,)
+        Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
         Full inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the
         axes of the matrix. The principal axes take some tenths of a millisecond per body.
+    torque_constant, torque_rate : array, shape (n, 3) or (3,)
+        Constant torques (N m) and their rates (N m/s). For bodies given by coefficients the torques
+        are divided by the moments (1/s2, 1/s3).
     sines, cosines : array, shape (n, k, 4) or (k, 4)
         Waves of torque: three components of the amplitude (units as in `torque_constant`), and the
         frequency (rad/s).

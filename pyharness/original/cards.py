@@ -11,7 +11,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from pyharness.model.errors import InputError
+from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 
@@ -234,9 +234,7 @@ def _cards_of(asked: str) -> list[Card]:
     if asked in PROGRAMS:
         return list(deck(asked).cards.values())
     if colon and program not in PROGRAMS:
-        raise InputError(
-            f"cards {asked!r}: no program {program!r}; it is one of {', '.join(PROGRAMS)}"
-        )
+        raise unknown("program", program, PROGRAMS, f"cards {asked!r}")
     programs = (program,) if colon else PROGRAMS
     if not (match := re.fullmatch(r"(\d{1,6})(?:-(\d{1,6}))?", ranges)):
         raise InputError(

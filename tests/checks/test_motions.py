@@ -60,7 +60,7 @@ def test_brouwers_law_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_power_tells_chance_from_a_preference() -> None:
-    """Of 1000 random walks and 1000 drifts, at most 5 are taken for the other kind."""
+    """Classify 1000 random walks and 1000 drifts: at most 5 are taken for the other kind."""
     source = np.random.default_rng(1)
     steps = np.array([10.0 ** (k / 2.0) for k in range(6, 11)])
     lengths = np.diff([0.0, *steps])

@@ -262,7 +262,7 @@ def test_requests_give_the_floats_back() -> None:
 
 
 def test_what_leaves_the_group_of_a_port_is_ended_too(tmp_path: Path) -> None:
-    """A grandchild in its own session, whose parent had ended, outlived the check."""
+    """Regression test: an orphaned grandchild in its own session outlived the check."""
     script = (
         "import os, sys, time\n"
         "if os.fork() == 0:\n"
@@ -280,7 +280,7 @@ def test_what_leaves_the_group_of_a_port_is_ended_too(tmp_path: Path) -> None:
 
 
 def test_a_port_may_complain_without_end(tmp_path: Path) -> None:
-    """The stderr of a port went to a file that filled the disk; now only its end is kept."""
+    """Regression test: stderr went to a file that filled the disk; now only its end is kept."""
     script = (
         "import sys\n"
         "for i in range(3000): print('x' * 1000, file=sys.stderr)\n"

@@ -89,7 +89,7 @@ def test_reader_takes_files_and_pipes_up_to_its_limit() -> None:
 
 
 def test_sweep_and_its_scene_come_through_pipes(capsys: Capture) -> None:
-    """Both files were read twice, and the second read of a pipe waited without end."""
+    """Regression test: the files were read twice, and the second read of a pipe never returned."""
     sweep = SWEEP.replace("case = 3", f"file = '/dev/fd/{_piped(BODY)}'")
     assert main(["sweep", f"/dev/fd/{_piped(sweep)}", "--out", "store"]) == 0
     assert "2 scenes in 1 chunk" in capsys.readouterr().err

@@ -201,7 +201,7 @@ def test_compare_asks_for_no_attitude_by_itself(case_2: room.Comparison) -> None
 
 
 def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """These give exit code 1: plant a difference of one bit, and a program without an order."""
+    """Unexpected results give exit code 1: plant a one-bit difference, a program of no order."""
     real = Program.run
 
     def off_by_one_bit(self: Program, *given: Any, **named: Any) -> Trajectory:

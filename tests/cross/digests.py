@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-import tests.conftest  # noqa: F401  (guards the kernels where traps are asked for)
+import tests.conftest  # noqa: F401  (guards the kernels if traps are requested)
 from pyharness import _build, _kernels  # noqa: PLC2701
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene

@@ -115,7 +115,7 @@ def test_worker_that_dies_or_hangs_is_a_fault_of_its_input(
 
 @pytest.mark.parametrize("steps", ["1" + "0" * 400, "0x" + "F" * 5000])
 def test_number_of_steps_beyond_every_float(steps: str, tmp_path: Path) -> None:
-    """Regression test: OverflowError, and ValueError where Python would not write so many digits."""
+    """Regression test: OverflowError, and ValueError if Python would not write so many digits."""
     (tmp_path / "scene.toml").write_text(BODY + f"[run]\nsteps={steps}\n")
     with pytest.raises(InputError, match="a number of more than 18 digits"):
         read_scene(tmp_path / "scene.toml")
@@ -124,7 +124,7 @@ def test_number_of_steps_beyond_every_float(steps: str, tmp_path: Path) -> None:
 
 
 def test_message_is_one_line_that_a_terminal_can_show() -> None:
-    """Names with line feeds, escapes and 4000 letters were printed unchanged."""
+    """Regression test: names with line feeds, escapes and 4000 letters were printed unchanged."""
     assert str(InputError("a\nb\x1b[1m\udcff")) == "a b\\x1b[1m\\udcff"
     assert len(str(InputError("where: " + "x" * 5000 + "; allowed: y"))) < 1000
     assert str(InputError("x" * 5000 + "; allowed: y")).endswith("; allowed: y")
@@ -134,7 +134,7 @@ def test_message_is_one_line_that_a_terminal_can_show() -> None:
 def test_pipe_without_another_end_is_not_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Both hung: a scene from a pipe that nobody writes, and a result to one that nobody reads."""
+    """Regression test: a scene from an unwritten pipe, and a result to an unread one, hung."""
     monkeypatch.setattr("pyharness.model.pipes.PATIENCE", 0.05)
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

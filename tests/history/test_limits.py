@@ -48,7 +48,7 @@ def test_runge_kutta_in_case_2_is_twice_a_slow_sine() -> None:
 
 
 def test_two_term_in_case_6_follows_its_limit_into_the_blow_up() -> None:
-    """The solution of the limit equation grows without bound before t = 1; the program follows it."""
+    """The limit equation's solution grows without bound before t = 1; the program follows it."""
     assert _tends_elsewhere(limit("two-term", replace(case_scene(6), steps=30)))
     found = limit("two-term", case_scene(6), 2)
     assert math.isinf(found.halvings[0].from_limit)

@@ -114,7 +114,7 @@ def test_body_at_rest_is_driven_to_a_relative_error() -> None:
     [("from rest", 16), *(("nearly symmetric", seed) for seed in (8, 10, 18))],
 )
 def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
-    """If both steps are too long for the order to show, their difference is too small an estimate."""
+    """If both steps are too long to show the order, their difference is too small an estimate."""
     generator = np.random.default_rng(seed)
     for _ in range(25):
         scene, t_end = NASTY[kind](generator)

@@ -12,7 +12,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-import scipy.integrate  # noqa: F401  (what Ctrl-C meets within its import may be lost)
+import scipy.integrate  # noqa: F401  (an interrupt within its import may be lost)
 
 from pyharness.methods.many import solve_many
 from pyharness.methods.prepared import prepare

@@ -131,7 +131,7 @@ def test_every_call_of_the_right_hand_side_is_counted(
 
 
 def test_orders_of_the_programs_are_those_of_their_schemes() -> None:
-    """Two points, or four, and one correction: order 2; eq. 31: order 4."""
+    """Two or four points with one correction have order 2; eq. 31 has order 4."""
     orders = {name: program.order for name, program in PROGRAM_REGISTRY.items()}
     assert orders == {"two-term": 2, "four-term": 2, "runge-kutta": 4}
 

@@ -63,7 +63,7 @@ def test_collocation_keeps_the_phase_of_a_wave_over_many_turns() -> None:
 
 
 def test_series_takes_a_slow_sine_for_what_it_comes_to() -> None:
-    """Regression test: the first step fitted the amplitude, 1e-20 s, and the work limit was exceeded."""
+    """Regression test: a first step of 1e-20 s, for the amplitude, exceeded the work limit."""
     scene = _driven(sines=(((0.0, 0.0, 20e40), 1e-40),))
     assert solve(scene, [3.0], "taylor", 1e-12).omega[0, 2] == pytest.approx(4.5, rel=1e-12)
 

@@ -293,7 +293,7 @@ def test_giving_up_says_what_would_do() -> None:
         solve(PUSHED, [1.0, 1000.0], attitude=True, effort=1e-3)
     with pytest.raises(InputError, match="after 1 step; "):
         solve(PUSHED, [1e9], attitude=True)
-    # The speed grows with time, and with it the number of steps for a second.
+    # The speed grows with time, and with it the number of steps per second of time.
     with pytest.raises(InputError, match=r"--effort") as refused:
         solve(PUSHED, [1000.0], attitude=True, effort=1e-2)
     advised = float(str(refused.value).split("--effort ")[1].split(" ")[0])
@@ -302,7 +302,7 @@ def test_giving_up_says_what_would_do() -> None:
 
 
 def test_giving_up_in_the_first_integration_counts_the_second() -> None:
-    """Here each second takes as many steps, so that the first integration tells the work."""
+    """The number of steps per second is constant, so that the first integration shows the work."""
     calm = replace(
         PUSHED, omega=(0.0, 1.0, 10.0), torque=replace(PUSHED.torque, constant=(0.0, 0.0, 1e-9))
     )

@@ -205,7 +205,7 @@ def test_row_that_overflows_within_a_step_ends_the_rows() -> None:
     ("kind", "number"), [("near the separatrix", 127), ("other units", 190), ("resonant", 153)]
 )
 def test_growth_of_small_differences_is_followed_the_right_way(kind: str, number: int) -> None:
-    """Of 1500 draws, those where a wrongly propagated perturbation would have cost the most."""
+    """Test the draws, of 1500, that a wrongly propagated perturbation would affect most."""
     generator = np.random.default_rng([11, list(NASTY).index(kind)])
     scene, time = [NASTY[kind](generator) for _ in range(number + 1)][-1]
     _held_to_fine_rows(scene, time, [1e-3], 0.4)

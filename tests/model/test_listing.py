@@ -67,7 +67,7 @@ def test_options_of_the_command_line() -> None:
 
 
 def test_no_reading_or_conjecture_changes_a_corrected_listing() -> None:
-    """Its statements use the intended name and index; an entry that is kept stays active."""
+    """A corrected listing uses the intended name and index; an entry that is kept stays active."""
     given: dict[str, Any] = {
         "readings": ["do-variable"], "conjectures": ["torque-held", "initial-torque"],
     }  # fmt: skip

@@ -212,7 +212,7 @@ def test_zero_costs_nothing(method: str) -> None:
 
 @pytest.mark.parametrize("method", ["auto", "dop853", "gauss-4"])
 def test_rows_around_zero_are_kept_where_a_march_overflows(method: str) -> None:
-    """omega = 1 / (1 - t) on all axes is infinite at t = 1, or with the other sign at t = -1."""
+    """Omega = 1 / (1 - t) on all axes is infinite at t = 1, or with the other sign at t = -1."""
     for sign in (1.0, -1.0):
         runaway = Scene("", (sign, sign, sign), coefficients=(1.0, 1.0, 1.0))
         times = [-2.0, -0.5, 0.0, 0.5, 2.0]

@@ -31,18 +31,18 @@ _NO_RESULT = re.compile(r"levels\.|wide_functions|words\.fypp")
 
 @dataclass(frozen=True)
 class Mutation:
-    """A change to one line, known by its file, operator, line and number among its equals."""
+    """A change to one line, known by its file, operator, line and number among equal lines."""
 
     file: str
     line: int
     operator: str
-    source: str  # the line, its blanks made one
+    source: str  # the line, with each run of blanks as one
     occurrence: int
     changed: Callable[[], str]
 
     @property
     def id(self) -> str:
-        """Return a name that edits elsewhere do not change."""
+        """Return a name that does not change with edits elsewhere."""
         return f"{self.operator} {self.occurrence}: {self.source}"
 
     @property
@@ -105,8 +105,8 @@ def lines_of_code(file: str) -> int:
 def draw(seed: int | str) -> Iterator[Mutation]:
     """Draw changes without end: a file by its lines of code, a line, an operator, a place.
 
-    So languages come in proportion to their lines of code, and an operator with many variants is
-    no likelier than one with few.
+    Languages are thus drawn in proportion to their lines of code, and an operator with many
+    variants is no likelier than one with few.
     """
     generator = random.Random(f"mutations {seed}")
     names = files()
@@ -129,13 +129,13 @@ def draw(seed: int | str) -> Iterator[Mutation]:
 
 
 def equivalent(path: Path = EQUIVALENT) -> dict[tuple[str, str], str]:
-    """Return why changes change nothing, by file and name."""
+    """Return the reasons why changes have no effect, by file and name."""
     table = tomllib.loads(path.read_text())
     return {(file, id): why for file, of_file in table.items() for id, why in of_file.items()}
 
 
 def stale(known: dict[tuple[str, str], str]) -> list[str]:
-    """Return the entries that name no change any more."""
+    """Return the entries that no longer name a change."""
     every = {file: {each.id for each in mutations(file)}
              for file in {file for file, _ in known} if (ROOT / file).exists()}  # fmt: skip
     return [f"{file}: {id}" for file, id in known if id not in every.get(file, set())]

@@ -1,4 +1,4 @@
-"""The tool that changes the sources: its operators, its draws, its list of equivalent ones."""
+"""The tool that changes the sources: its operators, its draws, its list of equivalent changes."""
 
 from collections import Counter
 from itertools import islice
@@ -148,7 +148,7 @@ def test_the_function_around_a_mutation_is_known() -> None:
 
 
 def test_planted_mutations_and_their_tests_are_there() -> None:
-    """The four of `--ci`; a changed line asks for another, with a short test that catches it."""
+    """The mutations of `--ci`; if a line changes, choose another one that a short test catches."""
     for file, id, test in PLANTED:
         assert find(file, id).id == id
         path, _, name = test.partition("::")

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import PurePosixPath
 
-# A function, and the one that is put in its place.
+# A function, and the function that replaces it.
 PAIRS = {
     "min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "minval": "maxval",
     "maxval": "minval", "minloc": "maxloc", "maxloc": "minloc", "argmin": "argmax",
@@ -22,7 +22,7 @@ _NOT_CODE = {
     C: re.compile(rf"{_STRINGS}|//.*|/\*[\s\S]*?\*/|^[ \t]*#(?:.*\\\n)*.*", re.M),
     JAVASCRIPT: re.compile(rf"{_STRINGS}|`[^`]*`|//.*|/\*[\s\S]*?\*/", re.M),
 }
-# Declarations, and what only divides the text.
+# Declarations, and lines that only divide the text.
 _NO_STATEMENT = {
     FORTRAN: re.compile(
         r"\s*&?\s*(use|implicit|private|public|import|end|contains|module|submodule|interface|type|"
@@ -37,7 +37,7 @@ _DECLARES = re.compile(r"(const|let|var|double|int|size_t|Py_ssize_t|char|void|l
 
 
 def constant(text: str) -> str:
-    """Return ten times a limit that is written as a power of ten; else a hundredth more."""
+    """Return ten times a number that has an exponent, and 1.01 times any other."""
     number = float(text.lower().replace("d", "e").replace("_", ""))
     factor = 10.0 if "e" in text.lower() or "d" in text.lower() else 1.01
     return repr(number * factor if number else 0.01)
@@ -49,12 +49,12 @@ def language_of(file: str) -> str:
 
 
 def blanked(text: str, language: str) -> str:
-    """Return the text with blanks for its comments and strings."""
+    """Return the text with its comments and strings blanked."""
     return _NOT_CODE[language].sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
 
 
 def changes(text: str, language: str) -> Iterator[tuple[int, str, Callable[[], str]]]:
-    """Return the changes of a file in its order: the line, the operator, the new text."""
+    """Yield the changes of a file in order: the line, the operator, the new text."""
     lines = text.split("\n")
     plain = blanked(text, language).split("\n")
     for i, line in enumerate(plain):
@@ -77,7 +77,7 @@ def _joined(lines: list[str], begin: int, end: int, new: str) -> Callable[[], st
 
 
 def _statement_end(plain: list[str], i: int, language: str) -> int | None:
-    """Return the line after a statement that can be dropped, and that begins in line i."""
+    """Return the line after a statement that begins in line i and can be dropped, else None."""
     line = plain[i].strip()
     if language == FORTRAN:
         if i and plain[i - 1].rstrip().endswith("&"):
@@ -104,7 +104,7 @@ _OTHER = {
     "false": "true", **PAIRS,
 }  # fmt: skip
 _REAL = r"(?<![\w.])(?:\d+\.\d*(?:[eEdD][+-]?\d+)?|\d+[eEdD][+-]?\d+)"
-# An operator, what it changes, and what it puts there: a text, or what makes it.
+# An operator, the passage it changes, and the new text or a function that makes it.
 _TOKENS: list[tuple[str, re.Pattern[str], Callable[[str], str]]] = [
     (operator, re.compile(pattern), new)
     for operator, pattern, new in (
@@ -134,7 +134,7 @@ _IF = re.compile(r"\s*(?:(?:\} else |else )?if|while) (?=\()")
 _LOOP = re.compile(r"\s*(?:\w+: )?do \w+ = [^,]+, ([^,&]+?)\s*$")
 _NO_CALL = re.compile(r"\b(if|for|while|switch|real|integer|character|do)\($")
 
-Piece = tuple[str, int, int, str]  # the operator, where it changes the line, and what stands there
+Piece = tuple[str, int, int, str]  # the operator, begin and end in the line, the new text
 
 
 def _of_line(line: str, language: str) -> Iterator[Piece]:
@@ -168,7 +168,7 @@ def _closing(line: str, begin: int) -> int | None:
 
 
 def _calls(line: str) -> Iterator[tuple[int, int]]:
-    """Return where the arguments of calls, or the indices of arrays, begin and end."""
+    """Yield where the arguments of calls, or the indices of arrays, begin and end."""
     for found in re.finditer(r"(?<=\w)\((?=.)", line):
         last = _closing(line, found.start())
         if last and not _NO_CALL.search(line[: found.end()]):

@@ -1,4 +1,4 @@
-"""A copy of the checkout that may be changed: its files, its build, and the runs in it."""
+"""A copy of the checkout that may be changed: its files, its build, and the processes in it."""
 
 import contextlib
 import hashlib
@@ -13,15 +13,15 @@ from threading import Lock
 
 ROOT = Path(__file__).parent.parent.parent
 PLACE = ROOT / "build" / "mutations"
-MEMORY = 12 << 30  # bytes; a loop that gathers for ever must not take the machine along
+MEMORY = 12 << 30  # bytes; a loop that allocates for ever must not affect the machine
 
 
 class Stopped(Exception):
-    """The whole run was ended."""
+    """Raised when the whole run was ended."""
 
 
 class Processes:
-    """What runs at the moment, so that it can be ended."""
+    """The running processes, so that they can be ended."""
 
     def __init__(self) -> None:
         self._running: set[subprocess.Popen[str]] = set()
@@ -31,7 +31,7 @@ class Processes:
     def run(
         self, command: list[str], folder: Path, environment: dict[str, str], limit: float
     ) -> tuple[int | None, str]:
-        """Return the exit code, None where the time was up, and all that was said."""
+        """Return the exit code of a command, or None after the time limit, and its output."""
         with self._lock:
             if self._ended:
                 raise Stopped
@@ -51,14 +51,14 @@ class Processes:
         finally:
             with self._lock:
                 self._running.discard(process)
-            # What a test left behind goes with it.
+            # Processes that a test left behind are ended with it.
             _kill(process)
         if self._ended:
             raise Stopped
         return code, said
 
     def end(self) -> None:
-        """End them all, and let none begin."""
+        """End all processes, and let none begin."""
         with self._lock:
             self._ended = True
             for process in self._running:
@@ -73,7 +73,8 @@ def _kill(process: subprocess.Popen[str]) -> None:
 class Tree:
     """A copy of the checkout in `build/`, brought up to date whenever it is opened.
 
-    Python finds the package in it, not the editable one; the compiled extension lies in it.
+    Python finds the package in the copy, not the editable one; the compiled extension is in the
+    copy.
     """
 
     def __init__(self, name: str, processes: Processes, *options: str) -> None:
@@ -81,8 +82,8 @@ class Tree:
         self._processes = processes
         self._build = self.folder / "build" / "mutated"
         self._options = options
-        self.is_stale = True  # what is compiled is not of the sources
-        # A limit on memory for whatever is run: a loop that gathers for ever must end.
+        self.is_stale = True  # the extension was not built from these sources
+        # A limit on memory for every process: a loop that allocates for ever must end.
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
         editable = [f._build_path for f in sys.meta_path if hasattr(f, "_build_path")]
         self._environment = {
@@ -91,7 +92,7 @@ class Tree:
             "PYTHONPATH": str(self.folder),
             "MESONPY_EDITABLE_SKIP": os.pathsep.join(editable),
             "COLUMNS": "300",
-            # What was said before a crash is not lost.
+            # The output before a crash is not lost.
             "PYTHONUNBUFFERED": "1",
         }
         self._synchronise()
@@ -107,16 +108,16 @@ class Tree:
         )
 
     def write(self, file: str, text: str) -> None:
-        """Put another text into a file."""
+        """Replace the text of a file."""
         path = self.folder / file
         path.write_text(text)
         self.is_stale |= file.startswith("fortran/")
-        # Two texts of one length within a second look the same to Python.
+        # Python can't distinguish two texts of one length that were written within a second.
         for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*"):
             compiled.unlink()
 
     def compile(self) -> str | None:
-        """Build what changed; return what the compiler said where it does not take it."""
+        """Build what changed; return the compiler's message if it refuses."""
         if not (self._build / "build.ninja").exists():
             # Little optimisation: no result depends on it, and a build takes half the time.
             setup = ["meson", "setup", str(self._build), "-Doptimization=1", *self._options]
@@ -129,14 +130,14 @@ class Tree:
         for path in [*self._build.glob("_*.so"), self._build / "_build.py"]:
             place = self.folder / "pyharness" / path.name
             if not place.exists() or path.read_bytes() != place.read_bytes():
-                # Not over a file that may be mapped.
+                # A file that may be mapped must not be overwritten.
                 place.unlink(missing_ok=True)
                 shutil.copy(path, place)
         self.is_stale = False
         return None
 
     def binary(self) -> str:
-        """Return a digest of what is compiled."""
+        """Return a digest of the compiled extensions."""
         paths = sorted((self.folder / "pyharness").glob("_*.so"))
         return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
 

@@ -1,4 +1,4 @@
-"""One mutation on trial: the tests that enter its function, nearest first, then `verify`."""
+"""The trial of one mutation: tests that enter its function, nearest first, then `verify`."""
 
 import re
 import sys
@@ -9,18 +9,18 @@ from tests.mutations.reach import Check, command_of, files_of_tests, pytest_comm
 from tests.mutations.sample import Mutation
 from tests.mutations.tree import ROOT, Tree
 
-# Tests of the first tier may take this long together, as recorded; of the second too, and each kind
-# of `verify`. What would take longer is not tried, and a mutation that only that would catch lives.
+# Recorded time of all tests of the first tier; of the second tier; and of each kind of `verify`.
+# Slower checks are not tried, so that a mutation lives that only they would catch.
 FIRST, SECOND = 20.0, 60.0  # s
-# Tests that were seen to pass without a mutation, since the run began.
+# Tests that passed without a mutation since the run began.
 _PASS: set[str] = set()
-# A trial may take so many times longer than what it runs took when it was recorded.
+# A trial may take this many times its recorded time, and some seconds to start.
 SLOWER, START = 6.0, 60.0  # s
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a mutation: `outcome` is caught, lives, or why it does not count."""
+    """The outcome of a mutation: caught, lives, or the reason why it does not count."""
 
     mutation: Mutation
     outcome: str
@@ -29,11 +29,11 @@ class Verdict:
 
 
 class NotCollected(Exception):
-    """No test began: the mutation may be one that cannot be imported."""
+    """Raised if no test began: perhaps the mutation cannot be imported."""
 
 
 def attempt(mutation: Mutation, tree: Tree, unchanged: Tree, checks: list[Check]) -> Verdict:
-    """Put a mutation into the tree and try what may catch it; the tree is as before after it."""
+    """Put a mutation into the tree, run the checks that may catch it, and restore the tree."""
     try:
         if why := put_in(mutation, tree):
             return Verdict(mutation, why, None)
@@ -52,12 +52,12 @@ def attempt(mutation: Mutation, tree: Tree, unchanged: Tree, checks: list[Check]
 
 
 def take_out(mutation: Mutation, tree: Tree) -> None:
-    """Put the file of the checkout back; it is built with the next mutation that is compiled."""
+    """Restore the file from the checkout; the next compiled mutation will build it."""
     tree.write(mutation.file, (ROOT / mutation.file).read_text())
 
 
 def put_in(mutation: Mutation, tree: Tree) -> str | None:
-    """Write it and build; return why it does not count."""
+    """Write the mutation and build; return the reason if it does not count."""
     text = mutation.changed()
     if mutation.language == "Python":
         try:
@@ -71,14 +71,14 @@ def put_in(mutation: Mutation, tree: Tree) -> str | None:
 
 
 def _import(mutation: Mutation, tree: Tree) -> tuple[str, str]:
-    """Return whether a mutation of which no test began can be imported at all."""
+    """Return the outcome if no test began: whether the mutation can be imported at all."""
     module = ".".join(PurePosixPath(mutation.file).with_suffix("").parts)
     code, _ = tree.run([sys.executable, "-c", f"import pyharness, {module}"], START)
     return ("caught", "collection") if code == 0 else ("cannot be imported", "import")
 
 
 def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
-    """Return the checks that enter the function around a mutation, or else use its file at all."""
+    """Return the checks that enter the function around a mutation, or else use its file."""
     function = mutation.function()
     stem = PurePosixPath(mutation.file).stem
     if mutation.language == "JavaScript":
@@ -90,7 +90,7 @@ def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
             entered = [e for e in checks if any(name.startswith(begin) for name in e.functions)]
         mention = re.compile(rf"\b{stem}\b")
     else:
-        # What is written out for each instruction set has its library's name after its own.
+        # A module that is expanded for each instruction set has its library's name after its own.
         found = re.search(r"^\s*module (\w+?)_?(?:\$|$)", (ROOT / mutation.file).read_text(), re.M)
         modules = {f"{found[1].lower()}{of}" for of in ("", "_bodies", "_many")} if found else set()
         ends = {f"{module}:{function}" for module in (*modules, "")}
@@ -101,19 +101,19 @@ def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
     named = {path for path in files_of_tests() if mention.search(path + (ROOT / path).read_text())}
     chosen = {each.name for each in entered}
     more = [e for e in checks if e.name.partition("::")[0] in named and e.name not in chosen]
-    # Those of its own name first, then the quickest.
+    # Tests of the module's own name come first, then the quickest.
     own = f"/test_{stem}.py"
     entered.sort(key=lambda each: (own not in each.name, each.seconds))
     return [*entered, *sorted(more, key=lambda each: each.seconds)]
 
 
 def _tiers(mutation: Mutation, checks: list[Check]) -> list[list[Check]]:
-    """Return what to run first, and what then, if nothing failed."""
+    """Return lists of checks, each to be run if nothing failed in the lists before."""
     found = near(mutation, checks)
     tests = [each for each in found if not each.name.startswith("verify")]
     first = _within(tests, FIRST)
     tried = {each.name for each in first}
-    # Again from the quickest, which are the most.
+    # Start again from the quickest, so that most of them fit.
     rest = sorted((each for each in tests if each.name not in tried), key=lambda e: e.seconds)
     kinds = [e for e in found if e.name.startswith("verify") and e.seconds <= SECOND]
     kinds.sort(key=lambda each: each.seconds)
@@ -130,7 +130,7 @@ def _within(checks: list[Check], limit: float) -> list[Check]:
 
 
 def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
-    """Run checks until one fails; return it."""
+    """Return the first check that fails, or None."""
     if not checks:
         return None
     limit = START + SLOWER * sum(each.seconds for each in checks)
@@ -152,7 +152,7 @@ def first_failure(tree: Tree, checks: list[Check]) -> Check | None:
             return Check(name, found.seconds, found.functions)
     if failed or code in (2, 3, 4):
         raise NotCollected
-    # It crashed, or never ended.
+    # A test crashed, or never ended.
     begun = re.findall(r"^(tests/\S+::.*?)(?: (?:PASSED|FAILED|ERROR|SKIPPED).*)?$", said, re.M)
     known = [by_name[name.strip()] for name in begun if name.strip() in by_name]
     return known[-1] if known else checks[0]

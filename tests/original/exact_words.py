@@ -1,6 +1,6 @@
-"""The arithmetic of words a second time: exact rationals first, then the rule on what they are.
+"""A second implementation of the arithmetic of words: exact rationals, then the rounding rule.
 
-Nothing of `pyharness.original.rounding` or `cdc` is used: no shifts of whole numbers, no frames. A
+It uses nothing of `pyharness.original.rounding` or `cdc`: no shifts of integers, no frames. A
 number is a fraction, and its unit is found by comparison with powers of two.
 """
 
@@ -21,7 +21,7 @@ ON_NUMBERS: dict[str, Callable[[Number, Number], Number]] = {
 
 
 def exact(p: int, rule: str, name: str, x: Fraction, y: Fraction) -> Fraction:
-    """Return what a word of p bits makes of two of its numbers, neither of them zero.
+    """Return the result of an operation of a word of p bits on two non-zero numbers.
 
     No exponent may leave the range.
     """
@@ -38,7 +38,7 @@ def exact(p: int, rule: str, name: str, x: Fraction, y: Fraction) -> Fraction:
 
 
 def unit(value: Fraction, p: int) -> Fraction:
-    """Return the weight of the last of p bits; of zero any."""
+    """Return the weight of the last of p bits; for zero, any weight."""
     if not value:
         return Fraction(1)
     power = math.floor(math.log2(abs(value.numerator)) - math.log2(value.denominator))
@@ -54,7 +54,7 @@ def _towards_zero(value: Fraction, step: Fraction) -> Fraction:
 
 
 def _cdc_sum(p: int, rounds: bool, x: Fraction, y: Fraction) -> Fraction:
-    """Cut both where a register of 2 p bits ends, below the larger; then the sum at its unit."""
+    """Truncate both to a register of 2 p bits below the larger; then truncate the sum to p bits."""
     # Of two with one exponent the second counts as the larger.
     large, small = (x, y) if unit(x, p) > unit(y, p) else (y, x)
     step = unit(large, p)
@@ -72,7 +72,7 @@ def _cdc_sum(p: int, rounds: bool, x: Fraction, y: Fraction) -> Fraction:
 
 
 def _cdc_product(p: int, rounds: bool, x: Fraction, y: Fraction) -> Fraction:
-    """Half a unit is added where the product has the lower of two lengths, else a quarter."""
+    """Add half a unit to a product of the smaller of two lengths, else a quarter; then truncate."""
     units = unit(x, p) * unit(y, p)
     more = units * 2 ** (p - 2) if rounds else Fraction(0)
     value = abs(x * y) + more
@@ -81,7 +81,7 @@ def _cdc_product(p: int, rounds: bool, x: Fraction, y: Fraction) -> Fraction:
 
 
 def _cdc_quotient(p: int, rounds: bool, x: Fraction, y: Fraction) -> Fraction:
-    """Put a third of a unit, as far as p bits have it, behind the dividend where it rounds."""
+    """If the rule rounds, append a third of a unit, truncated to p bits, to the dividend."""
     more = Fraction(2**p // 3, 2**p) * unit(x, p) if rounds else Fraction(0)
     value = (abs(x) + more) / abs(y)
     cut = _towards_zero(value, unit(value, p))
@@ -114,7 +114,7 @@ def drawn(random: Random, p: int) -> tuple[int, int, int, int]:
 
 
 def disagreements(p: int, rule: str, count: int, seed: str) -> list[str]:
-    """Return the operations on drawn pairs whose result is not the exact one's, in words."""
+    """Return descriptions of operations on drawn pairs whose result is not the exact one."""
     word, random = Word(p, rule), Random(f"{seed} {p} {rule}")
     found = []
     for _ in range(count):

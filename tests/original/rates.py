@@ -1,4 +1,4 @@
-"""`python -m tests.original.rates`: what a body's step costs side by side, and by itself."""
+"""`python -m tests.original.rates`: the time of a body's step, in a batch and by itself."""
 
 import sys
 import time
@@ -14,8 +14,8 @@ from pyharness.original.compiled import program_arguments
 from pyharness.original.many import ProgramEnsemble, run_many
 from tests.instruction_sets import LEVELS, level_here
 
-BODY_STEPS = 2_000_000  # of one measurement side by side
-AT_REST = 1e9  # 1/s: the stop test is made, and ends nothing
+BODY_STEPS = 2_000_000  # of one measurement of a batch
+AT_REST = 1e9  # 1/s: the stop test is made, and stops no run
 
 
 def best(task: Callable[[], object], repeats: int = 9) -> float:
@@ -29,17 +29,17 @@ def best(task: Callable[[], object], repeats: int = 9) -> float:
 
 
 def single(listing: Listing, steps: int) -> float:
-    """Return the time of one step of a run by itself, called in a loop (ns)."""
+    """Return the time of one step (ns) of a single run, called in a loop."""
     scene = replace(case_scene(3), steps=steps)
     given = program_arguments(scene, listing, AT_REST, True, False)
     calls = max(1, 100_000 // steps)
     run = extension().run_program
-    taken = run(*given)[2]  # it may overflow before
+    taken = run(*given)[2]  # the run may overflow before the last step
     return best(lambda: [run(*given) for _ in range(calls)]) / calls / int(taken) * 1e9
 
 
 def side_by_side(listing: Listing, steps: int, threads: int = 1, work: int = BODY_STEPS) -> float:
-    """Return the time of one step of one body among many (ns)."""
+    """Return the time of one step (ns) of one body in a batch."""
     scene = replace(case_scene(3), steps=steps)
     n = max(256, work // steps)
     omega = np.array(scene.omega) * np.linspace(0.5, 1.0, n)[:, None]

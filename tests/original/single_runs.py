@@ -1,4 +1,4 @@
-"""What bodies side by side are held against: the single run of each, bit for bit."""
+"""Comparison of the bodies of a batch with their single runs, bit for bit."""
 
 from dataclasses import replace
 from typing import Any
@@ -16,7 +16,7 @@ Options = dict[str, Any]
 
 
 def same_bits(found: object, wanted: object) -> bool:
-    """Whether numbers agree to the last bit, one NaN like another."""
+    """Whether numbers agree to the last bit; all NaN are equal."""
     one, other = (np.asarray(each, dtype=np.float64) for each in (found, wanted))
     if one.shape != other.shape:
         return False
@@ -44,7 +44,7 @@ def single_scene(scene: Scene, options: Options, row: int) -> Scene:
 
 
 def assert_alike(found: ProgramEnsemble, scene: Scene, listing: Listing, options: Options) -> None:
-    """Hold every body against its single run."""
+    """Compare every body with its single run."""
     lipschitz = np.broadcast_to(options.get("lipschitz", 500.0), len(found.n_rows))
     at = found.at - 1
     for row in range(len(found.n_rows)):

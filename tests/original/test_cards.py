@@ -1,4 +1,4 @@
-"""The text of the edition: explained to the last character, and where port and twin have it."""
+"""The text of the edition: explained to the last character, with its places in port and twin."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from pyharness.original.cards import Difference, chosen, deck, numbers, passages
 from pyharness.original.collation import HEADING, expected_lines, undeclared, unexplained
 
 SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
-# What the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
+# Forms that the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
 FORMS = (
     (r"_wp|\s|&$", ""), (r"(?<=\d)\.0(?!\d)", "."), (r"(?<![\d.])0\.(?=\d)", "."),
     (r"\b([MR][123])\(\w\)", r"\1"), (r"\bT([123])2\b", r"T\1**2"), (r"\bTL([234])\b", r"T(L)**\1"),
@@ -25,7 +25,7 @@ FORMS = (
 
 @pytest.fixture(scope="module")
 def scan() -> str:
-    """Return a scan that the tables explain: made of them."""
+    """Return a scan that the tables explain, because it is made from them."""
     lines = [text for text, _ in expected_lines()]
     return "\n".join(["the thesis", HEADING, "", *lines[:40], "```", "", *lines[40:]])
 
@@ -33,7 +33,7 @@ def scan() -> str:
 def test_decks_are_whole() -> None:
     assert {each: len(deck(each).cards) for each in PROGRAMS} == facts("cases")["cards"]
     assert sum(card.scan is None for card in chosen(())) == 7
-    # Cards that deviate in more than their number: what an edition has to answer for.
+    # Cards that deviate in more than their number, for which an edition needs a reason.
     assert sum(bool(card.differences or card.lost) for card in chosen(())) == 202
 
 
@@ -70,7 +70,7 @@ def test_scan_of_the_tables_is_explained(scan: str) -> None:
 
 @pytest.mark.parametrize("change", ["replaced", "removed", "added"])
 def test_a_character_changed_anywhere_is_found(scan: str, change: str) -> None:
-    """At every place of every line: the k-th characters of all lines at once, each line found."""
+    """For every k, change the k-th characters of all lines at once; each line must be found."""
     head, heading, appendix = scan.partition(HEADING)
     lines = appendix.split("\n")
     kept = [n for n, line in enumerate(lines) if line not in ("", "```")]
@@ -129,7 +129,7 @@ def test_every_executable_card_has_its_place(program: str) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_statements_of_the_port_are_those_of_their_cards(program: str) -> None:
-    """In the card's own words, or for a reason; a defect's card stands beside its correction."""
+    """A statement has its card's words, or a reason; a defect's card is beside its correction."""
     found = deck(program)
     for number, places in found.port.items():
         card = "".join(found.cards[number].text[6:].split()).rstrip("+").replace("T5**", "T(L)**")
@@ -222,6 +222,6 @@ def test_pieces_of_a_text_hold_their_blanks() -> None:
     why = Difference("BC", "X", "why")
     pieces = [(" A ", None), ("B C", why), ("D E", None)]
     assert list(passages(" A B CD E", [why])) == pieces
-    # Each stands behind the one before it.
+    # Each passage begins after the one before it.
     with pytest.raises(ValueError, match="'BC' does not stand in ' A B CD E'"):
         list(passages(" A B CD E", [why, why]))

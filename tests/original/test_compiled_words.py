@@ -1,4 +1,4 @@
-"""The compiled programs in the words of IEEE 754, and what crosses to them as bytes."""
+"""The compiled programs in the words of IEEE 754, and numbers that are passed as bytes."""
 
 import math
 import struct
@@ -54,11 +54,11 @@ def differing(scene: Scene, listing: Listing, word: str, *options: Any) -> list[
 @pytest.mark.parametrize("word", HERE)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_fortran_and_twin_agree_in_every_word(program: str, word: str) -> None:
-    """`verify --only words` does so in every cell, and over all steps."""
+    """Test some steps of a few cells; `verify --only words` tests every cell over all steps."""
     for case in (3, 6, 7):
         for listing in (original(program), corrected(program)):
             assert differing(replace(case_scene(case), steps=12), listing, word) == []
-    # Case 2 gives a torque of its own to the first step, and ends by the stop test.
+    # Case 2 has its own torque in the first step, and ends by the stop test.
     for index, listing in enumerate(all_listings(program)):
         if index % 7 == 0:
             listing = replace(listing, conjectures=listing.conjectures | {"initial-torque"})
@@ -75,7 +75,7 @@ def test_extremes_agree(name: str, word: str) -> None:
 
 
 def test_runs_end_as_their_word_has_it() -> None:
-    """The wider the range, the later a run overflows; a stop's quotient comes back as a float."""
+    """The wider the range, the later a run overflows; a stop's quotient is returned as a float."""
     scene, listing = EXTREMES["overflow"], original("two-term")
     names = sorted(HERE, key=lambda name: WORDS[name].p)
     runs = [compiled_in_word.run(scene, listing, WORDS[name]) for name in names]
@@ -114,7 +114,7 @@ def test_words_that_are_not_here_are_one_line(monkeypatch: pytest.MonkeyPatch) -
     far = replace(case_scene(7), step_size=1e14)
     with pytest.raises(InputError, match="too large for the compiled sine of 128 bits"):
         run_program(far, listing, word="binary128")
-    # Another build refuses what its compiler does not have, as ours does numbers of 2 bytes.
+    # Another build refuses words that its compiler lacks, as this build refuses words of 2 bytes.
     entry = extension().run_program_in_word
 
     def without(program: int, flags: int, by_moments: bool, *given: Any) -> Any:
@@ -140,7 +140,7 @@ def test_unknown_numbers_are_refused() -> None:
 
 
 def drawn(word: Word, random: Random, least: int, most: int) -> Number:
-    """Return a number of any size between two powers of two, its bits few or many."""
+    """Return a random number between two powers of two, with few or many bits."""
     bits = random.choice((1, 2, 20, word.p))
     m = random.getrandbits(bits) | 1 << bits - 1
     return word(Fraction(m) * Fraction(2) ** (random.randint(least, most) - bits))
@@ -148,7 +148,7 @@ def drawn(word: Word, random: Random, least: int, most: int) -> Number:
 
 @needs_binary128
 def test_square_root_of_binary128_is_correctly_rounded() -> None:
-    """Against the roots of whole numbers: halves between two numbers are never reached."""
+    """Compare with the roots of integers: a root is never half way between two numbers."""
     random = Random("square roots")
     numbers = [drawn(WIDE, random, -16493, 16383) for _ in range(1200)]
     roots = [drawn(WIDE, random, -8000, 8000) for _ in range(400)]
@@ -168,7 +168,7 @@ def test_square_root_of_binary128_is_correctly_rounded() -> None:
 
 @needs_binary128
 def test_sine_and_cosine_of_binary128_are_the_nearest() -> None:
-    """Against mpmath at 600 bits; angles beside right angles above all."""
+    """Compare with mpmath at 600 bits, above all for angles near right angles."""
     import mpmath
 
     random = Random("waves")
@@ -222,7 +222,7 @@ def test_bytes_are_those_of_the_processor(name: str, form: str) -> None:
 
 
 def test_bytes_of_binary128() -> None:
-    """Sign, 15 bits of exponent from -16383, 112 bits of fraction."""
+    """The format is a sign, 15 bits of exponent from -16383, and 112 bits of fraction."""
     patterns = {
         0x3FFF << 112: 1.0,
         0xBFFF8 << 108: -1.5,

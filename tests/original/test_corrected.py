@@ -1,4 +1,4 @@
-"""Corrected listings under every reading and conjecture: orders, and the same bits everywhere."""
+"""Corrected listings with every reading and conjecture: their orders, and equal bits everywhere."""
 
 import itertools
 import json
@@ -57,7 +57,7 @@ def test_corrected_programs_have_their_orders_under_every_reading_and_conjecture
 
 
 def test_the_faults_that_readings_and_conjectures_are_cost_an_order_where_they_are_kept() -> None:
-    """What the other test would see if one of them reached a corrected statement."""
+    """The test above would find a reading or conjecture in a corrected statement by its order."""
     kept = {
         (listing.program, name): case
         for program in PROGRAMS
@@ -71,7 +71,7 @@ def test_the_faults_that_readings_and_conjectures_are_cost_an_order_where_they_a
 
 
 def test_languages_agree_bit_for_bit_on_all_of_them() -> None:
-    """Fortran, twin and JavaScript; of Case 7 the sines of JavaScript may be others."""
+    """Compare Fortran, twin and JavaScript, whose sines may differ in Case 7."""
     cells = list(itertools.product(ASSUMED, case_numbers()))
     given = b"".join(request(case_scene(case), _listing(each)) + b"\n" for each, case in cells)
     done = subprocess.run(
@@ -94,7 +94,7 @@ def test_languages_agree_bit_for_bit_on_all_of_them() -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_laboratory_has_the_same_listing(program: str) -> None:
-    """Its words are those of the command line, and so is what they mean."""
+    """The laboratory uses the words of the command line, with the same meaning."""
     words = [
         f"program={program}&listing=corrected"
         + (f"&reading={','.join(readings)}" if readings else "")
@@ -129,7 +129,7 @@ def test_compare_judges_them_and_says_what_was_asked_for_in_vain(
     told = capsys.readouterr()
     orders = [each["order"] for each in json.loads(told.out)["programs"]]
     assert len(orders) == 3
-    # Case 1 is solved to rounding at every step.
+    # Case 1 has only rounding errors at every step.
     assert case == 1 or all(each is not None for each in orders)
     for name in ("c1-for-c", "do-variable", "initial-torque"):
         assert f"'{name}'; --keep {name}" in told.err

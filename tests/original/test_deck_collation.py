@@ -1,4 +1,4 @@
-"""The decks compared with each other and with the thesis: nothing hidden, nothing forgotten."""
+"""The decks compared with each other and with the thesis: every difference is explained."""
 
 import copy
 import csv
@@ -19,7 +19,7 @@ def test_nothing_is_unexplained() -> None:
 
 
 def _with(monkeypatch: pytest.MonkeyPatch, name: str, change: Any) -> list[str]:
-    """Return the faults with a change of one table of facts."""
+    """Return the faults found after a change of one table of facts."""
     content = copy.deepcopy(facts(name))
     change(content)
     for module in (deck_collation, cards):

@@ -1,4 +1,4 @@
-"""Decks: the text as it stands, what is altered, and a few of them compiled."""
+"""Decks: the original text, the altered cards, and a few decks compiled."""
 
 import numpy as np
 import pytest
@@ -45,12 +45,12 @@ def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
     ]  # fmt: skip
     corrects = {each["corrects"] for each in altered if "corrects" in each}
     assert corrects == set(names_of("defect", program))
-    # The torque of Case 7, which no card holds, is the dialect's.
+    # No card has the torque of Case 7; the dialect inserts it.
     new = {n for each in altered if "keeps" not in each for key in ("replace", "insert")
            for n, _ in each.get(key, ())}  # fmt: skip
     assert {n for n, text in after.items() if before.get(n) != text} == new
     for n in set(after) - set(before):
-        assert n % 10 != 0  # between its neighbours
+        assert n % 10 != 0  # numbered between its neighbours
 
 
 @pytest.mark.parametrize("case", [1, 5, 7])
@@ -62,7 +62,7 @@ def test_case_stands_on_the_cards_of_the_deck(case: int) -> None:
     assert shown == list(scene.moments)
     assert [float(cards[n].partition("=")[2]) for n in (300, 310, 320)] == list(scene.omega)
     assert cards[690].split() == ["DO", "100", "I=1,100,1"]
-    # Table 1 gives torques that hold initially in Case 7.
+    # Table 1 gives initial torques in Case 7.
     assert cards[250].strip() == ("N1=0." if case == 2 else "N1=100.")
 
 
@@ -80,7 +80,7 @@ def test_job_for_ftn_has_the_cards_as_they_are(program: str, rounds: bool, syste
     assert len(compiles) == 1
     assert ("ROUND=+-*/" in compiles[0]) == rounds
     assert [line[:3] for line in control.splitlines()][-3:] == ["LGO", "REW", "COP"]
-    # What a card and the machine's character set have room for.
+    # A card has 80 columns, and the machine has no lower-case letters.
     assert all(
         len(line) <= 80 and line == line.upper() for line in job.splitlines()[6:] if line[0] != "~"
     )
@@ -130,7 +130,7 @@ def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     found = list(decks(Selection(thin=True)))
     assert len(found) == 3
     assert all(check.passed and check.value == 0.0 for check in found)
-    # One bit of one card, and a stop that comes too late, are seen.
+    # A change of one card, and a stop that comes too late, are found.
     for wrong in ("T3=.02", "T3=.010000000000000002"):
         monkeypatch.setattr(
             "pyharness.checks.decks.deck_text",
@@ -184,7 +184,7 @@ def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:
 @pytest.mark.parametrize("terms", [3, 5])
 @pytest.mark.parametrize("is_original", [True, False])
 def test_models_of_case_6_are_those_of_the_claims(terms: int, is_original: bool) -> None:
-    """The decks that V.2 used and did not print, against the laboratory's own."""
+    """Compare the decks that V.2 used and did not print with the laboratory's models."""
     listing = (original if is_original else corrected)("four-term")
     run = run_deck(deck_text(listing, case_scene(6), "gfortran", terms))
     wanted = Laboratory(is_original).models(6, terms)

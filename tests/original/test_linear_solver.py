@@ -1,4 +1,4 @@
-"""LEQT1F's stand-in: Fortran against twin bit for bit, and both against what a solver must do."""
+"""The stand-in for LEQT1F: Fortran and twin agree bit for bit, and solve as a solver must."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from pyharness.original.linear_solver import SINGULAR, leqt1f
 
 
 def _both(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, int]:
-    """Solve in both languages, require the same bits, return the solution and IER."""
+    """Solve in both languages, require the same bits, and return the solution and IER."""
     _, compiled, ier = extension().solve_linear(np.asfortranarray(a), np.asfortranarray(b))
     columns, twin_ier = leqt1f(a.tolist(), b.T.tolist())
     assert ier == twin_ier
@@ -19,7 +19,7 @@ def _both(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, int]:
 @pytest.mark.bitwise
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
 def test_random_unsymmetric_systems(n: int) -> None:
-    """Unsymmetric, so that a transposed index shows; several right-hand sides."""
+    """Unsymmetric matrices show a transposed index; each has several right-hand sides."""
     generator = np.random.default_rng(n)
     for _ in range(200):
         a = generator.normal(size=(n, n)) * 10.0 ** generator.integers(-3, 4, size=(n, 1))
@@ -53,7 +53,7 @@ def test_small_pivot_just_above_the_working_precision_is_not_singular() -> None:
 
 
 def test_rows_are_scaled_and_the_first_of_equal_maxima_is_the_pivot() -> None:
-    """Without scaling row 2 would be the pivot, and the small solution would be lost."""
+    """Without scaling, row 2 would be the pivot and the small solution would be lost."""
     x, _ = _both(np.array([[1.0, 1.0], [1e10, 1e25]]), np.array([[2.0], [1e25]]))
     np.testing.assert_allclose(x[:, 0], [1.0, 1.0], rtol=1e-14)
     # No exchange of equal candidates: the factors show which row was taken.

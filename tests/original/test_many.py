@@ -1,4 +1,4 @@
-"""Bodies side by side have the bits of single runs, whatever the block, thread, processor."""
+"""Bodies in a batch have the bits of single runs, whatever the block, thread or processor."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from tests.original.test_programs import NASTY
 
 
 def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
-    """Return a scene, and what differs from body to body of what may."""
+    """Return a scene, a listing, and options that differ at random from body to body."""
     drawn = draw("many", number)
     source = np.random.default_rng(number)
     scene = drawn.scene
@@ -29,7 +29,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
         "at": np.sort(source.choice(scene.steps, 4, replace=False)) + 1,
     }
     if source.random() < 0.3:
-        # Also steps with which the matrix is singular, and other rows are its pivots.
+        # Also steps for which the matrix is singular, or other rows are its pivots.
         options["step_size"] = scene.step_size * 10.0 ** source.choice([-9.0, -0.5, 0.0, 2.0], n)
     if source.random() < 0.3:
         body = "moments" if source.random() < 0.7 else "coefficients"
@@ -38,7 +38,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
         size = np.abs(scene.torque.constant).max() + 1.0
         options["torque_constant"] = source.normal(size=(n, 3)) * size
     if source.random() < 0.5:
-        # Extremes among others: what overflows, stands still, or vanishes.
+        # Extremes among others: bodies that overflow, do not move, or vanish.
         some = source.choice([0.0, -0.0, 1e-310, 1e160, 1e300], (n, 3))
         options["omega0"] = np.where(source.random((n, 3)) < 0.1, some, options["omega0"])
     return scene, drawn.listing, options
@@ -47,7 +47,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
 @pytest.mark.property
 @pytest.mark.parametrize("part", range(4))
 def test_random_bodies_have_the_bits_of_their_single_runs(level: int, part: int) -> None:
-    """Scenes plain and nasty, every program, torque of any kind, listings of any flags."""
+    """Test scenes plain and nasty, every program, torques of any kind, listings of any flags."""
     for number in range(250 * part, 250 * part + 250):
         n = (1, 2, 7, 8, 9, 31, 32, 33)[number % 8]
         scene, listing, options = random_ensemble(number, n)
@@ -57,7 +57,7 @@ def test_random_bodies_have_the_bits_of_their_single_runs(level: int, part: int)
 @pytest.mark.bitwise
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_listing_has_the_bits_of_its_single_runs(program: str) -> None:
-    """Of nasty scenes, and of Case 7 with and without the torque of its cards."""
+    """Test nasty scenes, and Case 7 with and without the torque of its cards."""
     scenes = [*NASTY.values(), case_scene(7)]
     for index, listing in enumerate(all_listings(program)):
         for scene in [scenes[(index + k) % len(scenes)] for k in range(0, len(scenes), 3)]:
@@ -123,7 +123,7 @@ def test_blocks_are_shared_among_threads(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_stops_of_the_thesis() -> None:
-    """Section V.2: Case 2 ends after 25 steps, by V2; the others beside it don't."""
+    """Section V.2: Case 2 ends after 25 steps, by V2; the other bodies of the batch don't."""
     cases = [case_scene(number) for number in (1, 2, 3)]
     found = run_many(
         cases[1], original("runge-kutta"), omega0=[case.omega for case in cases],
@@ -145,7 +145,7 @@ def test_stops_of_the_thesis() -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_bodies_that_overflow_spoil_no_other(program: str) -> None:
-    """One after the other, at every step, among those that go on to the end."""
+    """Bodies overflow one after the other, at every step, among those that reach the end."""
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(50.0, 60.0, 70.0), steps=40)
     options: Options = {"omega0": np.full((40, 3), 1.0), "at": range(1, 41), "may_stop": False}
     options["omega0"] *= (10.0 ** np.linspace(-2.0, 2.0, 40))[:, None]
@@ -157,7 +157,7 @@ def test_bodies_that_overflow_spoil_no_other(program: str) -> None:
 
 @pytest.mark.parametrize("program", ["two-term", "four-term"])
 def test_steps_of_any_size_side_by_side(level: int, program: str) -> None:
-    """A singular matrix leaves B alone, lane by lane; long steps have other rows for pivots."""
+    """In each lane a singular matrix leaves B unchanged; long steps have other rows for pivots."""
     scene = replace(case_scene(5), steps=12)
     step_size = np.tile([1e-17, 1e-9, 1e-3, 0.3, 1.0, 2.5, 40.0, 1e5, 1e200], 5)
     for listing in (original(program), corrected(program)):
@@ -219,7 +219,7 @@ def test_velocity_that_the_stop_test_reads_is_computed_unasked() -> None:
 
 @pytest.mark.parametrize("keep", [[], ["lipschitz-per-component"], ["lipschitz-tests-velocity"]])
 def test_constants_beside_the_quotient_itself(level: int, keep: list[str]) -> None:
-    """The last bit of a constant decides; numbers whose squares vanish or overflow among them."""
+    """The last bit of a constant decides, even for numbers whose squares underflow or overflow."""
     listing = subset("runge-kutta", "corrected", keep=keep)
     source = np.random.default_rng(1)
     scene = replace(case_scene(5), steps=2)

@@ -1,4 +1,4 @@
-"""What many bodies may be given as, and what is refused, the first bad row named."""
+"""Arguments of `run_many`: the accepted forms, and refusals that name the first bad row."""
 
 import functools
 from collections.abc import Callable
@@ -102,7 +102,7 @@ def test_scenes_that_are_refused(name: str) -> None:
 
 
 def test_arrays_stand_in_for_what_a_scene_lacks() -> None:
-    """A full inertia matrix that is not read, and a torque in space that is none."""
+    """With arrays the scene may have a full inertia matrix (not read) and a zero space torque."""
     scene = Scene("", (1.0, 2.0, 3.0), inertia=np.eye(3), torque=SPACE)
     found = run_many(scene, corrected("two-term"), moments=(3.0, 2.0, 1.0))
     plain = Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 1.0))

@@ -13,12 +13,13 @@ def test_runge_kutta_is_counted_as_by_hand() -> None:
     tests = 6 + 6 + 6  # 1270-1320, 1330-1380, 1410-1460
     found = operations_per_step(original("runge-kutta"))
     assert found.written == 1 + rates + stages + result + tests
-    # .5*DT and DT/6. once, and the slopes of stage 2, which the program takes at J = 1 again.
+    # Counted once are .5*DT, DT/6., and the slopes of stage 2, which the program computes at J = 1
+    # again.
     assert found.once == found.written - 16
 
 
 def test_powers_and_literals() -> None:
-    """Cards 850-960 and 1390-1560 of the four-term deck have powers, and one 2. is another."""
+    """Cards 850-960 and 1390-1560 of the four-term deck have powers; equal literals count once."""
     four = operations_per_step(original("four-term"))
     solver = 2 * _crout(4, 6)
     points = 1 + 4 + 1  # 710-750, 2250
@@ -29,7 +30,7 @@ def test_powers_and_literals() -> None:
 
 
 def _crout(n: int, m: int) -> int:
-    """Count what LEQT1F does: scales, sums of products, tests and quotients, two substitutions."""
+    """Count LEQT1F's operations: scales, sums of products, tests, quotients, two substitutions."""
     sums = sum(2 * min(i, j) for i in range(n) for j in range(n))
     tests = sum(n - j for j in range(n)) + n
     return n + sums + tests + sum(range(n)) + m * (n * (n - 1) + n * (n - 1) + n)
@@ -42,7 +43,7 @@ def test_what_a_correction_takes_off() -> None:
 
 
 def test_second_factors_of_the_matrix_are_those_of_the_first() -> None:
-    """The same literals and points: what the second call saves is all but its substitutions."""
+    """With the same literals and points, the second call saves all but its substitutions."""
     found = operations_per_step(original("two-term"))
     built_and_factored = 2 + _crout(2, 0)
     assert found.written - found.once >= built_and_factored

@@ -1,4 +1,4 @@
-"""The printer page: widths, columns and asterisks, held against a Fortran compiler."""
+"""The printer page: widths, columns and asterisks, compared with a Fortran compiler."""
 
 import math
 import os
@@ -21,7 +21,7 @@ from pyharness.original import compiled
 from pyharness.original.printer import formats_of, page, write
 
 Capture = pytest.CaptureFixture[str]
-# Only gfortran can be told that zero has no sign and that a tie goes away from it.
+# Only gfortran has options for a zero without sign and for rounding ties away from zero.
 COMPILER = os.environ.get("FC", "") if "gfortran" in os.environ.get("FC", "") else "gfortran"
 
 
@@ -42,7 +42,7 @@ def _page(program: str, case: int, capsys: Capture, *options: str) -> list[str]:
 def test_page_of_a_program(
     program: str, heads: list[int], columns: list[int], capsys: Capture
 ) -> None:
-    """Each has formats of its own; in one, four places for six values leave an empty line."""
+    """Each program has its own formats; in one, four places for six values leave an empty line."""
     lines = _page(program, 5, capsys)
     collocation = program != "runge-kutta"
     above = 4 if collocation else 5
@@ -50,7 +50,7 @@ def test_page_of_a_program(
     assert [word.start() for word in re.finditer(r"\w+", lines[above - 1])] == heads
     run = compiled.run(case_scene(5), original(program))
     assert run.velocity is not None
-    assert len(lines) == above + run.steps  # the last row is that of the stop
+    assert len(lines) == above + run.steps  # the last row is the step of the stop
     row = lines[above + 24]
     assert len(row.split()) == 7 + collocation
     for column, value in zip(columns, (*run.omega[24], 25, *run.velocity[24]), strict=True):
@@ -59,7 +59,7 @@ def test_page_of_a_program(
 
 
 def test_header_shows_the_torques_that_the_cards_set(capsys: Capture) -> None:
-    """Those of the deck in a case, those of its law in a scene of one's own."""
+    """A case shows the deck's torques, and a user's scene the torques of its law."""
     assert _page("two-term", 6, capsys)[0] == " 200.00     100.00"
     mine = Scene("mine", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), steps=1)
     run = compiled.run(mine, original("four-term"))
@@ -93,7 +93,7 @@ def test_long_runs_and_overflow_end_in_asterisks(capsys: Capture) -> None:
     [
         (0.00005, 10, 4, "0.0001"),  # binary64 holds a little more than the tie
         (0.00015, 10, 4, "0.0001"),  # and a little less here
-        (0.03125, 10, 4, "0.0313"),  # an exact tie goes away from zero
+        (0.03125, 10, 4, "0.0313"),  # an exact tie is rounded away from zero
         (-0.03125, 10, 4, "-0.0313"),
         (-0.00001, 10, 4, "0.0000"),
         (-0.0, 10, 4, "0.0000"),
@@ -108,7 +108,7 @@ def test_rounding(value: float, width: int, decimals: int, wanted: str) -> None:
 
 
 def test_format_is_read_as_fortran_reads_it() -> None:
-    """The character taken off is always a blank."""
+    """The carriage-control character, which is taken off, is always a blank."""
     assert write("(1X,3HA,B,1X,2F4.1)", [1, 2]) == [" A,B  1.0 2.0"]
     assert write("(I2,/,I3)", [1, 2, 3]) == [" 1", "  2", " 3", ""]
     assert write("(4HTIME)", []) == ["TIME"]
@@ -119,7 +119,7 @@ def test_format_is_read_as_fortran_reads_it() -> None:
 
 
 def _punched(number: int, text: str) -> str:
-    """Return a FORMAT as the cards have it, 66 columns a card."""
+    """Return a FORMAT as punched on cards, 66 columns a card."""
     statement = f"FORMAT{text}"
     parts = [statement[i : i + 66] for i in range(0, len(statement), 66)]
     return f"{number:5d} {parts[0]}\n" + "".join(f"     C{part}\n" for part in parts[1:])
@@ -129,7 +129,7 @@ def _punched(number: int, text: str) -> str:
 @pytest.mark.skipif(shutil.which(COMPILER) is None, reason="no compiler")
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_page_is_what_a_fortran_compiler_writes(program: str, tmp_path: Path) -> None:
-    """The same FORMATs on cards, compiled; F77 has no negative zero, and ties go away from 0."""
+    """The same FORMATs, compiled from cards: F77 has no negative zero, and ties go away from 0."""
     generator = np.random.default_rng(1982)
     n = 400
     sizes = 10.0 ** generator.uniform(-6, 6, size=(2, n, 3))

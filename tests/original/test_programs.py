@@ -28,7 +28,7 @@ from pyharness.truth.reference import reference
 
 @pytest.mark.bitwise
 def test_every_cell_agrees_to_the_last_bit_or_is_in_the_table() -> None:
-    """Every program, case, subset of defects and reading; exemptions no longer needed fail."""
+    """Compare every program, case, subset of defects and reading; unnecessary exemptions fail."""
     known = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in known if entry["kind"] == "cross-language"}
     found = set()
@@ -42,7 +42,7 @@ def test_every_cell_agrees_to_the_last_bit_or_is_in_the_table() -> None:
         if differences(compiled, twin) or distance(compiled, twin):
             found.add(cell_name(listing, case))
     assert found == listed
-    assert count == (16 * 2 + 8 + 128 * 2) * 8  # seven cases, and Case 7 with its first torque
+    assert count == (16 * 2 + 8 + 128 * 2) * 8  # seven cases, and Case 7 with its initial torque
 
 
 BODY = (3.0, 2.0, 1.0)
@@ -94,10 +94,10 @@ def test_overflow_ends_with_the_rows_until_then() -> None:
 
 
 def test_every_defect_alone_changes_something() -> None:
-    """A flag that changes nothing in any case would be a flag that is not wired."""
+    """A flag that changes nothing in any case would not be connected."""
     for program in PROGRAMS:
         for name in switchable(program):
-            # `lipschitz-mismatched-pairs` only moves the quotient, which a low limit shows.
+            # `lipschitz-mismatched-pairs` only changes the quotient, which a low limit shows.
             with_it = subset(program, "corrected", keep=[name])
             assert any(
                 differences(
@@ -110,7 +110,7 @@ def test_every_defect_alone_changes_something() -> None:
 
 @pytest.mark.parametrize("reading", names_of("reading"))
 def test_readings_not_adopted_lose_an_order(reading: str) -> None:
-    """Either reading is a guess; the one not adopted can't be what a working program says."""
+    """Either reading is a guess, but a working program can't have the one that is not adopted."""
     program = next(p for p in PROGRAMS if reading in names_of("reading", p))
     scene = case_scene(5)
     truth = reference(scene, scene.times())
@@ -120,7 +120,7 @@ def test_readings_not_adopted_lose_an_order(reading: str) -> None:
 
 
 def test_recorded_time_is_what_tape5_got() -> None:
-    """TIME runs quadratically original, and linearly, by repeated addition, corrected."""
+    """TIME grows quadratically in the original; corrected, it is a sum of equal steps."""
     scene = case_scene(3)
     before = compiled.run(scene, original("four-term"))
     n = np.arange(1, 101)
@@ -132,7 +132,7 @@ def test_recorded_time_is_what_tape5_got() -> None:
 
 @pytest.mark.parametrize("velocity", [True, False])
 def test_lipschitz_constant_and_no_stop(velocity: bool) -> None:
-    """Section V.2: terminated after only 25 steps; by the velocity, whether it is wanted or not."""
+    """Section V.2: terminated after only 25 steps, by the velocity, whether requested or not."""
     scene = case_scene(2)
     listing = original("runge-kutta")
     run = compiled.run(scene, listing, velocity=velocity)
@@ -166,7 +166,7 @@ def test_evaluations_count_right_hand_sides() -> None:
 
 @pytest.mark.bitwise
 def test_velocity_that_no_one_asked_for_changes_no_bit_of_the_rest() -> None:
-    """The skip of the plan: every cell again without the translational block."""
+    """Run every cell again without the translational block, which the plan may skip."""
     for listing, case in all_cells():
         scene = case_scene(case)
         whole, part = (compiled.run(scene, listing, velocity=wanted) for wanted in (True, False))
@@ -196,7 +196,7 @@ AXES: list[tuple[float, float, float]] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0
 def test_overflow_of_any_one_component_ends_the_run(
     program: str, axis: tuple[float, float, float]
 ) -> None:
-    """The other two stand still, and stay finite, until they meet what is no number."""
+    """The other two components are constant and finite, until they are combined with a NaN."""
     omega = [1e160 * (1.0 - each) for each in axis]
     scene = Scene("", omega, coefficients=axis, step_size=1.0, steps=3)
     for listing in (original(program), corrected(program)):
@@ -231,7 +231,7 @@ def test_sum_of_stages_may_overflow_where_no_stage_does(axis: tuple[float, float
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_torque_that_table_1_gives_initially_acts_over_the_first_step(program: str) -> None:
-    """By a conjecture: N h / I more than without, and nothing where the table gives none."""
+    """By a conjecture, omega increases by N h / I, or not at all if the table has no torque."""
     plain = original(program)
     assumed = replace(plain, conjectures=plain.conjectures | {"initial-torque"})
     scene = case_scene(7)

@@ -1,4 +1,4 @@
-"""Words: bits of the processor, of exact rationals, of the CDC's vectors; the twins in them."""
+"""Words: bits as the processor's, as exact rationals, as the CDC's vectors; the twins in words."""
 
 import json
 import math
@@ -31,7 +31,7 @@ CDC, ROUNDED = WORDS["cdc48"], WORDS["cdc48-rounded"]
 @pytest.mark.bitwise
 @pytest.mark.parametrize("name", FLOATS)
 def test_bits_are_those_of_numpy(name: str) -> None:
-    """`python -m tests.original.words_campaign` draws a million."""
+    """Test 20 000 operations; `python -m tests.original.words_campaign` draws a million."""
     assert differing(name, 20_000, "test") == []
 
 
@@ -74,7 +74,7 @@ def test_literals_beside_a_tie_go_to_their_own_side() -> None:
 
 
 def test_pages_do_not_hang_on_how_literals_are_rounded() -> None:
-    """How FTN converted them is not known; cut, they print what the nearest ones do."""
+    """FTN's conversion of literals is not known; truncated or rounded, they print the same page."""
     cut = Word(48, "FX", cut_literals=True)
     assert cut(0.2).fraction() < Fraction(1, 5) < CDC(0.2).fraction()
     assert cut(0.25).fraction() == Fraction(1, 4)
@@ -91,7 +91,7 @@ def test_no_guard_bit_survives() -> None:
         assert (word(1.0) - word(2.0**-48)).fraction() == due
     below = CDC(1 - Fraction(2) ** -48)
     assert (CDC(1.0) - below).fraction() == 0
-    # One unit apart, and equal by the zero of their difference, but not by its sign.
+    # They are one unit apart, and equal by the zero of their difference, but not by its sign.
     assert below == CDC(1.0)
     assert below < CDC(1.0)
     assert not below > CDC(1.0)
@@ -111,7 +111,7 @@ def test_infinite_indefinite_and_underflow() -> None:
     least = CDC.number(1 << 47, -1023)
     assert not least * CDC(0.5)
     assert CDC.number(1 << 47, -1022) * 0.5 == least
-    # IEEE 754 goes on below its least normal number, and has a minus zero.
+    # IEEE 754 has numbers below its least normal one, and a minus zero.
     assert (WORDS["binary32"](2.0**-149) * 1.0).fraction() == Fraction(2) ** -149
     assert math.copysign(1.0, float(-WORDS["binary32"](0.0))) == -1.0
     assert math.copysign(1.0, float(-CDC(0.0))) == 1.0
@@ -166,7 +166,7 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_binary64_has_the_bits_and_the_page_of_floats(program: str, name: str) -> None:
-    """`verify --only words` does so in every cell."""
+    """Test a few scenes; `verify --only words` tests every cell."""
     scene = SCENES[name]
     for listing in (original(program), corrected(program)):
         floats = run_program(scene, listing, "python")
@@ -189,7 +189,7 @@ def test_trajectory_has_the_numbers_themselves() -> None:
 
 
 def test_page_is_printed_from_the_exact_value() -> None:
-    """A number nearer to a tie than any float is printed to the side on which it is."""
+    """A number nearer to a tie than any float is rounded to its own side of the tie."""
     wide = Word(113)
     tie = Fraction(5, 100_000)
     scene, listing = case_scene(1), corrected("runge-kutta")
@@ -203,7 +203,7 @@ def test_page_is_printed_from_the_exact_value() -> None:
 
 
 def test_words_change_what_they_should() -> None:
-    """Case 2 has its stop in every word, IER = 129 in 24 bits, a last digit in the machine's."""
+    """Case 2 stops alike in every word, has IER = 129 in 24 bits, and differs in its last digit."""
     assert tuple(WORDS) == WORD_NAMES
     scene = case_scene(2)
     for name in WORD_NAMES:

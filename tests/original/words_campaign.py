@@ -1,7 +1,8 @@
-"""`python -m tests.original.words_campaign [PAIRS]`: a million operations, and 1e5 exact a rule.
+"""`python -m tests.original.words_campaign [PAIRS]`: check the arithmetic of words.
 
-Words of 24 and 53 bits against numpy.float32 and float, bit for bit; every rule against exact
-rationals. 0 where all agree, else 1.
+A million operations of words of 24 and 53 bits are compared with numpy.float32 and float, bit for
+bit; every rule is compared with exact rationals in 1e5 operations. Exit status 0 if all agree, else
+1.
 """
 
 import math
@@ -44,7 +45,7 @@ def pattern(random: Random, bits: int, exponents: int, near: int | None) -> int:
 
 
 def differing(name: str, count: int, seed: str) -> list[str]:
-    """Return the operations whose bits are not those of numpy: nan alone may have others."""
+    """Return the operations whose bits differ from numpy's; only nan may have other bits."""
     kind, unsigned, bits, exponents = FLOATS[name]
     word, random = WORDS[name], Random(f"{seed} {name}")
     found = []
@@ -70,7 +71,7 @@ def _order(word: Word, x: Any, y: Any) -> tuple[bool, bool, bool]:
 
 
 def given(word: Word, x: Any) -> Number:
-    """Return a float of numpy as a number, by its bits."""
+    """Return a float of numpy, converted by its bits, as a number."""
     value = float(x)
     if not value or not math.isfinite(value):
         return word(value)
@@ -79,13 +80,13 @@ def given(word: Word, x: Any) -> Number:
 
 
 def same(due: Any, ours: Number) -> bool:
-    """Whether two values are the same, zeros by their sign."""
+    """Whether two values are the same, including the sign of a zero."""
     x, y = float(due), float(ours)
     return struct.pack("d", x) == struct.pack("d", y) or (math.isnan(x) and math.isnan(y))
 
 
 def main(arguments: list[str]) -> int:
-    """Run it all."""
+    """Run the campaign."""
     count = int(arguments[0]) if arguments else 1_000_000
     failures = []
     for name in FLOATS:

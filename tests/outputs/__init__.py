@@ -1,1 +1,1 @@
-"""What some forty commands print, recorded and compared: what a refactoring must not move."""
+"""Outputs of some forty commands, recorded and compared, which a refactoring must not change."""

@@ -1,8 +1,8 @@
 """`python -m tests.outputs FOLDER` records; `python -m tests.outputs BEFORE AFTER` compares.
 
-A record is one file for each command: its exit code, what it prints (JSON wherever a verb has it,
-with sorted keys), and the digests of the files that it writes. What times are, and with what the
-extension was built, is left out. A comparison lists every difference; 1 where there is one.
+A record is one file for each command: its exit code, its output (JSON if the verb has it, with
+sorted keys), and the digests of the files that it writes. It does not contain times, or the build
+of the extension. A comparison lists every difference, and has exit status 1 if there is one.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-# Not the same in two runs: seconds, and what follows from them; the build, and where it stands.
+# These differ from run to run: seconds and their consequences; the build and its folder.
 _VARIES = ("seconds", "seconds_per_step", "build", "speed", "preparation", "time_ratio")
 _SCENE = """\
 name = "forced"
@@ -38,7 +38,7 @@ steps = 200
 
 
 def main() -> int:
-    """Record or compare."""
+    """Record or compare, by the number of folders."""
     folders = [Path(each) for each in sys.argv[1:] if not each.startswith("-")]
     if len(folders) == 1:
         return _record(folders[0])
@@ -49,7 +49,7 @@ def main() -> int:
 
 
 def commands() -> dict[str, str]:
-    """Return the commands by the names of their records."""
+    """Return the commands by the name of their record."""
     found: dict[str, str] = tomllib.loads((HERE / "commands.toml").read_text())["commands"]
     return found
 

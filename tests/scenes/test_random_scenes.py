@@ -1,4 +1,4 @@
-"""Random scenes: a seed gives today the scenes that it gave when it was first used."""
+"""Random scenes: a seed gives the same scenes as when it was first used."""
 
 import hashlib
 from random import Random
@@ -14,7 +14,7 @@ def digest(*found: object) -> str:
     return hashlib.sha256(repr(found).encode()).hexdigest()[:16]
 
 
-# What is drawn is seen in `repr`, to the last bit of every number.
+# `repr` shows every drawn number to the last bit.
 @pytest.mark.parametrize(
     ("seed", "recorded"), [("base", "d269171283763f2a"), ("2026-W47", "c9e110ce65249107")]
 )

@@ -56,14 +56,14 @@ def test_torques_are_scaled_too(method: str) -> None:
 def test_ordinary_scenes_are_left_alone() -> None:
     for case in range(1, 8):
         assert rescaling_factor(case_scene(case), 1.0) == 1.0
-    # What the torque gives counts: such a start is soon an ordinary motion.
+    # The effect of the torque counts: such a start soon becomes an ordinary motion.
     for case, first, time in ((5, 1e-200, 1.0), (4, 0.0, 1.0), (4, 1e200, 1e200)):
         scene = replace(case_scene(case), omega=(first, 0.0, 0.0))
         assert rescaling_factor(scene, time) == 1.0
 
 
 def test_a_result_beyond_the_range_of_numbers_is_an_overflow() -> None:
-    """Axis 3 gets more than 1.8e308 rad/s, out of energy that the others have."""
+    """Axis 3 gets more than 1.8e308 rad/s, from the energy of the others."""
     scene = Scene("", (1e307, 1.6e308, 1e308), moments=(3.0, 2.0, 0.5))
     times = [1e-309 * k for k in range(1, 100)]
     run = solve(scene, times, "taylor", 1e-12)
@@ -86,7 +86,7 @@ def test_solve_ivp_says_overflow_where_omega_leaves_the_range(method: str) -> No
 
 @pytest.mark.parametrize("method", ["lsoda", "dop853", "rk45", "radau"])
 def test_solve_ivp_in_spans_whose_square_is_no_number(method: str) -> None:
-    """LSODA squares the span: in one below 1e-150 s it stood still."""
+    """LSODA squares the span, and did not advance in spans below 1e-150 s."""
     for size in (1e-120, 1e-150, 1e-160, 1e-200, 1e-300):
         scene = replace(case_scene(3), omega=(size, size, size))
         np.testing.assert_allclose(solve(scene, [1.0], method, 1e-9).omega / size, 1.0, rtol=1e-9)
@@ -126,7 +126,7 @@ def test_a_refusal_tells_the_time_in_the_seconds_of_the_scene(
 
 
 def test_longer_motions_get_finer_steps_of_solve_ivp() -> None:
-    """Errors of steps add up: thirty times as long, and still within the tolerance."""
+    """Local errors add up: thirty times as long, the result is still within the tolerance."""
     scene = Scene("", (1e-2, 1.0, 0.3), moments=(6.0, 5.0, 2.0))
     moments = np.array(scene.moments)
     for method in ("lsoda", "dop853"):
@@ -179,7 +179,7 @@ def test_bound_of_what_torque_gives_holds_on_a_sphere(axis: int, time: float) ->
         TorqueLaw(sines=(((2.0, 1.0, -3.0), 7.0),)),
         TorqueLaw(cosines=(((1.0, -3.0, 2.0), 5.0),)),
     ):
-        # Of one axis alone: the bound is of the largest.
+        # The torque has one axis only, because the bound is on the largest component.
         kept = np.eye(3)[axis]
         part = replace(
             law, constant=tuple(kept * law.constant), rate=tuple(kept * law.rate),

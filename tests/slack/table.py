@@ -1,7 +1,8 @@
 """Plants of a chosen size: one just beyond every limit of `verify` and `stress`, one just within.
 
-What a limit promises is written down here once more, from its words and not from the code: a limit
-that becomes looser lets its plant pass, one that becomes too tight fails what lies within.
+The values of the limits are written down here a second time, from their descriptions and not from
+the code. A limit that becomes looser lets its plant pass; one that becomes too tight fails a plant
+within it.
 """
 
 import itertools
@@ -55,7 +56,7 @@ _REGIONS = "pyharness.checks.trials.regions"
 _STEPS = "pyharness.checks.trials.step_size"
 _MATRICES = "pyharness.checks.trials.matrices"
 
-# A room that is imported while something is planted would keep it.
+# A module that is imported while a fault is planted would keep the fault.
 for _name in TRIALS:
     trial(_name)
 
@@ -64,10 +65,10 @@ Plant = Callable[[float], AbstractContextManager[Any]]
 
 @dataclass(frozen=True)
 class Slack:
-    """A limit of the check that is asked for, between two plants.
+    """A limit of the check `check`, between two plants.
 
-    With what is measured wrong by `beyond` it fails, or `failing` where that is another, and with
-    `within` it passes.
+    With a plant of size `beyond`, the check fails (or `failing`, if given, fails instead); with one
+    of size `within`, it passes.
     """
 
     check: str
@@ -78,20 +79,20 @@ class Slack:
 
 
 def near(check: str, planted: Plant, due: float) -> Slack:
-    """Return a limit that is `due`, of an error that adds to what there is."""
+    """Return a limit of size `due`, on an error that adds to the existing one."""
     return Slack(check, planted, 1.5 * due, 0.75 * due)
 
 
 def exact(check: str, planted: Plant, least: float = 1.0, failing: str = "") -> Slack:
-    """Return a limit of nothing at all: the least there can be fails."""
+    """Return a limit of zero: the smallest possible error fails."""
     return Slack(check, planted, least, 0.0, failing)
 
 
-# What is planted: `change(found, size)`.
+# The planted changes: `change(found, size)`.
 
 
 def off(found: Any, size: float) -> Any:
-    """Let every omega be larger by a part of the largest."""
+    """Increase every component of omega by `size` times the largest."""
     if not isinstance(found, np.ndarray):
         return replace(found, omega=off(found.omega, size))
     return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
@@ -99,7 +100,7 @@ def off(found: Any, size: float) -> Any:
 
 @dataclass
 class Turned:
-    """A prepared solver whose attitudes are off by so many radians."""
+    """A prepared solver whose attitudes are wrong by `size` (rad)."""
 
     solver: Callable[..., tuple[Array, Array]]
     size: float
@@ -107,13 +108,13 @@ class Turned:
     steps: int = 0
 
     def __call__(self, *given: Any) -> tuple[Array, Array]:
-        """Turn what the solver gives."""
+        """Rotate the attitude of the solver's result."""
         omega, attitude = self.solver(*given)
         return omega, _turned(attitude[None, :], np.array([[0.48, 0.64, -0.6]]), self.size)[0]
 
 
 def turned_off(found: Trajectory, size: float, along: bool = False) -> Trajectory:
-    """Turn every attitude by so many radians, across the angular momentum or along it."""
+    """Rotate every attitude by `size` (rad), across the angular momentum or along it."""
     assert found.attitude is not None
     axes = found.angular_momentum()
     axes = axes if along else np.cross(axes, [1.0, 2.0, 3.0])
@@ -134,18 +135,18 @@ def unturned(found: Trajectory, size: float) -> Trajectory:
 
 
 def longer(found: Trajectory, size: float) -> Trajectory:
-    """Let quaternions be longer than 1."""
+    """Multiply every quaternion by 1 + `size`."""
     assert found.attitude is not None
     return replace(found, attitude=found.attitude * (1.0 + size))
 
 
 def last_off(found: Trajectory, size: float) -> Trajectory:
-    """As `off`, in the last row alone."""
+    """Apply `off` to the last row only."""
     return replace(found, omega=np.vstack([found.omega[:-1], off(found.omega[-1:], size)]))
 
 
 def bit_off(found: Any, size: float, name: str = "omega") -> Any:
-    """Let the largest element of an array be larger by a part of itself, and nothing else."""
+    """Multiply the largest element of an array by 1 + `size`, and change nothing else."""
     if not isinstance(found, np.ndarray):
         return replace(found, **{name: bit_off(getattr(found, name), size)})
     changed = found.copy()
@@ -154,12 +155,12 @@ def bit_off(found: Any, size: float, name: str = "omega") -> Any:
 
 
 def without_answer(found: list[Answer], size: float) -> list[Answer]:
-    """Let the first vector have no answer, where the size is not 0."""
+    """Remove the answer of the first vector, if the size is not 0."""
     return [found[0]._replace(found=""), *found[1:]] if size else found
 
 
 def degrees_off(found: Array, size: float) -> Array:
-    """Let the first angle be off by so many radians."""
+    """Change the first angle by `size` (rad)."""
     wrong: Array = found + np.array([math.degrees(size), 0.0, 0.0])
     return wrong
 
@@ -169,7 +170,7 @@ def counted_off(name: str) -> Callable[[Any, float], Any]:
 
 
 def value_off(found: Any, size: float) -> Any:
-    """Let a number, or each of an array, be larger by a part of itself."""
+    """Multiply a number, or each number of an array, by 1 + `size`."""
     return found * (1.0 + size)
 
 
@@ -180,12 +181,12 @@ def quotient_off(found: Trajectory, size: float) -> Trajectory:
 
 
 def cut(found: Trajectory, size: float) -> Trajectory:
-    """Leave out so many of the last rows."""
+    """Leave out the last `size` rows."""
     return replace(found, omega=found.omega[: len(found.omega) - int(size)])
 
 
 def singular(found: Trajectory, size: float) -> Trajectory:
-    """Let the matrices of so many of the last steps be singular that were not."""
+    """Report singular matrices for the last `size` steps."""
     if found.ier is None or not size:
         return found
     ier = found.ier.copy()
@@ -201,11 +202,11 @@ def probe_off(found: Any, size: float) -> Any:
     return replace(found, found=found.found + size)
 
 
-# Where it is planted.
+# The places of plants.
 
 
 def on(target: str, change: Callable[..., Any], call: int | None = None) -> Plant:
-    """Return the change of what `target`, a dotted name, returns: of every call, or of one."""
+    """Return a plant that changes what `target` (a dotted name) returns, in all calls or in one."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
         calls = itertools.count(1)
@@ -217,7 +218,7 @@ def on(target: str, change: Callable[..., Any], call: int | None = None) -> Plan
 
 
 def refuses(target: str, error: type[Exception] = InputError) -> Plant:
-    """Return a refusal of everything, where the size is not 0."""
+    """Return a plant that refuses every call, if the size is not 0."""
 
     def faulty(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
         if size:
@@ -228,7 +229,7 @@ def refuses(target: str, error: type[Exception] = InputError) -> Plant:
 
 
 def made_by(target: str, stand_in: Callable[..., Any]) -> Plant:
-    """Return a function in the place of another; the size comes before its arguments."""
+    """Return a plant that replaces a function; the size comes before its arguments."""
     return lambda size: patch(target, partial(stand_in, size))
 
 
@@ -238,7 +239,7 @@ def _truth() -> Reference:
 
 
 def graded(target: str, error: Callable[[Scene, float], float]) -> Plant:
-    """Return results that are the truth of Case 5 and an error of so much of the largest."""
+    """Return a plant of results with a known error, relative to the largest omega of Case 5."""
 
     def faulty(size: float, right: Callable[..., Any], *rest: Any, **named: Any) -> Trajectory:
         scene = next(each for each in rest if isinstance(each, Scene))
@@ -258,23 +259,23 @@ def graded(target: str, error: Callable[[Scene, float], float]) -> Plant:
 
 
 def solved(size: float, scene: Scene, times: Sequence[float], *_: Any) -> Trajectory:
-    """Return what is off by the size and no more, in the place of any method."""
+    """Return a solution with an error of `size`, in place of any method."""
     found: Trajectory = off(solve(scene, times, "taylor", 1e-15), size)
     return found
 
 
 def of_order(due: int) -> Callable[[Scene, float], float]:
-    """Return an error whose order misses by the size."""
+    """Return an error whose order is too low by the size."""
     return lambda scene, size: 1e-3 * (scene.step_size / case_scene(5).step_size) ** (due - size)
 
 
 def roundings(more: float) -> Callable[[Scene, float], float]:
-    """Return the size times 8 roundings of every step, and `more`."""
+    """Return `size` times the sum of 8 roundings of every step and `more`."""
     return lambda scene, size: size * (8.0 * U * scene.steps + more)
 
 
 def stop_test(size: float) -> AbstractContextManager[Any]:
-    """Let the program be given another constant."""
+    """Multiply the constant of the stop test by 1 + `size`."""
 
     def faulty(right: Callable[..., Any], *rest: Any, **named: Any) -> Any:
         if "lipschitz" in named:
@@ -285,7 +286,7 @@ def stop_test(size: float) -> AbstractContextManager[Any]:
 
 
 def kept(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that computes a thing once."""
+    """Return a function that computes each result only once."""
     known: dict[str, Any] = {}
 
     def found(*rest: Any, **named: Any) -> Any:
@@ -306,7 +307,7 @@ def _contenders() -> dict[str, length.Marcher]:
 
 
 def shorter() -> AbstractContextManager[Any]:
-    """Follow two starts through a thousand revolutions."""
+    """Follow only two starts, through a thousand revolutions."""
     return patch.multiple(length, MARCHERS=_contenders(), STARTS=2)
 
 
@@ -320,7 +321,7 @@ def watched(error: Callable[[float, float], float]) -> Plant:
 
 
 def beside(around: Callable[[], AbstractContextManager[Any]], planted: Plant) -> Plant:
-    """Return a plant in other circumstances."""
+    """Return a plant inside another context."""
 
     @contextmanager
     def both(size: float) -> Iterator[None]:
@@ -333,7 +334,7 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Plant) ->
 def form_for_all(
     size: float, scene: Scene, times: Sequence[float], name: str, *rest: Any, **named: Any
 ) -> Trajectory:
-    """Solve by a closed form, or what stands for it where there is none."""
+    """Solve by a closed form, or by the series in its place if the size is not 0."""
     if size:
         return solve(scene, times, "taylor", 1e-15, **named)
     return solve(scene, times, name, *rest, **named)
@@ -344,7 +345,7 @@ def other_library() -> AbstractContextManager[Any]:
 
 
 def without(found: Iterator[Any] | dict[str, Any], size: float) -> Any:
-    """Leave out the Taylor series' Case 5 of what is recorded, or should be."""
+    """Leave out Case 5 of the Taylor series, from the record or from what should be recorded."""
     if not size:
         return found
     if not isinstance(found, dict):
@@ -367,7 +368,7 @@ def linear(change: Callable[[Any, float], Any]) -> Plant:
 
 
 def crossing_off(size: float) -> AbstractContextManager[Any]:
-    """Let truncation rule down to a step of 10**-3.75 s times 10**-size, and nothing below."""
+    """Let truncation dominate down to a step of 10**-3.75 s times 10**-size, and not below."""
 
     def error(scene: Scene, name: str, case: int, listing: Any) -> tuple[float, str]:
         rules = math.log10(scene.step_size) > -3.75 - size
@@ -377,9 +378,9 @@ def crossing_off(size: float) -> AbstractContextManager[Any]:
 
 
 def some_bits(size: float) -> AbstractContextManager[Any]:
-    """Let so many of the calls in threads give other bits."""
+    """Let `size` of the calls in threads return other bits."""
     calls = itertools.count()
-    # Seven jobs are made alone before they are made at once.
+    # Seven jobs run alone before they run at once.
     return patch(
         "pyharness.checks.trials.threads.bits", lambda job: bytes(7 <= next(calls) < 7 + size)
     )
@@ -394,7 +395,7 @@ _JUDGED = [name for name, method in METHODS.items() if method.finest < 1.0 and n
 
 
 def _with_form(name: str) -> int:
-    """Return a case that the method takes."""
+    """Return a case that the method accepts."""
     return 4 if name == "closed-form" else 5
 
 
@@ -417,8 +418,8 @@ VERIFY = (
     exact(_BITS, on(_RUN, counted_off("evaluations"))),
     exact("cells/four-term/case-3/corrected", on(_COMPILED, singular)),
     exact("random/0/solve-taylor", refuses(f"{_DRAWN}.truth_of"), failing="random/0/no-truth"),
-    # .298 of the digits from 1e-3 to the finest that each claims: 1e-15, 1e-14, 7e-13, 2.1e-12,
-    # 2.2e-16, and 1e-12.
+    # .298 of the digits from 1e-3 to the finest tolerance that each claims: 1e-15, 1e-14, 7e-13,
+    # 2.1e-12, 2.2e-16, and 1e-12.
     *(
         near(f"random/0/solve-{name}", on(_SOLVE, off), due)
         for name, due in (
@@ -430,30 +431,30 @@ VERIFY = (
         near(f"random/0/prepare-{name}", on(_ANSWERED, off), due)
         for name, due in (("auto", 2.65e-7), ("taylor", 2.65e-7), ("quick", 2.07e-6))
     ),
-    # Where a difference grows a thousandfold the tolerance may be exceeded as many times.
+    # Where a perturbation grows a thousandfold, the tolerance may be exceeded by the same factor.
     near("random/56/solve-taylor", on(_SOLVE, off), 5.1e-6),
     near("random/592/solve-taylor", on(_SOLVE, off), 3.31e-6),
     near("random/592/solve-gauss-6", on(_SOLVE, off), 5.32e-6),
     near("random/641/solve-gauss-8", on(_SOLVE, off), 14.9e3 * 1.53e-6),
-    # Rounding has 2e-15 for each factor, here 15.1.
+    # Rounding is allowed 2e-15 for each unit of amplification, here 15.1.
     near("random/337/solve-gauss-8", on(_SOLVE, off), 9.7e-14 + 15.1 * 2e-15),
     exact("random/0/solve-taylor", on(_SOLVE, _TIME), ULP),
     exact("random/0/solve-taylor", on(_SOLVE, ended)),
     exact("random/0/solve-taylor", refuses(_SOLVE)),
     exact("cells/two-term/case-3/corrected", refuses("pyharness.checks.cells.case_scene"),
           failing="cells/refused"),
-    # The last step of Case 7 ends at (.25, .91, 1.08): 4 roundings of either end of it, and h times
-    # 32 of the sizes of all terms of a rate, in all 2.8, .3 and .16; in collocation times the
-    # condition of the matrix, 7 and 547.
+    # The last step of Case 7 ends at (.25, .91, 1.08). The limit is 4 roundings at either end, and
+    # h times 32 roundings of the sum of the sizes of a rate's terms, 2.8, .3 and .16. For
+    # collocation it is multiplied by the condition of the matrix, 7 and 547.
     near("schemes/two-term/case-7", on(_RUN, last_off), 8.2 * U / 1.08),
     near("schemes/four-term/case-7", on(_RUN, last_off), 37.0 * U / 1.08),
     near("schemes/runge-kutta/case-7", on(_RUN, last_off), 2.9 * U / 1.08),
     exact("schemes/runge-kutta/case-7", on(_RUN, cut)),
     exact("stops/case-3/corrected", on(_RUN, cut)),
-    # In a step of Case 3 rates of 5 rad/s**2, each with 32 roundings, change by .27, and omega, 10
-    # rad/s, with 2 at either end and those of the rates, by .05.
+    # In a step of Case 3 the rates, 5 rad/s**2 with 32 roundings each, change by .27. Omega, 10
+    # rad/s with 2 roundings at either end and those of the rates, changes by .05.
     near("stops/case-3/corrected", on(_RUN, quotient_off), 2.3e-13),
-    # Constants stand twice the rounding beside a quotient.
+    # The constants differ from a quotient by twice the rounding.
     near("stops/case-3/corrected", stop_test, 4.6e-13),
     # A tolerance, relative to the largest omega.
     *(
@@ -461,8 +462,8 @@ VERIFY = (
              made_by(_SOLVE, solved), 1e-6)
         for name in _JUDGED
     ),
-    # Of a steady spin nothing is left but 8 roundings of the start and 8 of the result, and half a
-    # unit in the last place of the truth itself.
+    # A steady spin has only 8 roundings of the start, 8 of the result, and half a unit in the last
+    # place of the truth itself.
     near("methods/taylor/case-1/1.0e-15", on(_SOLVE, off), 1e-15 + 17.0 * U),
     exact("methods/taylor/case-5/1.0e-06", refuses(_SOLVE)),
     exact("methods/closed-form/case-5/1.0e-06", made_by(_SOLVE, form_for_all)),
@@ -502,36 +503,36 @@ VERIFY = (
         near(f"orders/{name}/case-5", graded(_SOLVE, of_order(due)), 0.2)
         for name, due in _TEXTBOOKS.items()
     ),
-    # An error is that of rounding up to 8 of every step, and what the truth is wrong by: 7e-13 if
-    # it is that of `solve_ivp`.
+    # An error counts as rounding up to 8 roundings of every step, and the error of the truth, which
+    # is 7e-13 if `solve_ivp` computed it.
     near("orders/two-term/case-5", graded(_RUN, roundings(7e-13)), 1.0),
     near("orders/two-term/case-5/velocity", graded(_RUN, roundings(0.0)), 1.0),
-    # A method against print: half a unit of its last digit or what its source admits (5e-15 here),
-    # the finest tolerance, and two roundings of each number of the problem, which move the omega
-    # that they move the least by 4e-15.
+    # A method compared with print: half a unit of the last digit or the error that the source
+    # admits (5e-15 here), the finest tolerance, and two roundings of each number of the problem,
+    # which change the least sensitive omega by 4e-15.
     near("external/detest-b5/20/taylor", on(_SOLVE, off), 1.0e-14),
     near("external/detest-b5/20/gauss-8", on(_SOLVE, off), 1.9e-14),
     near("external/detest-b5/20/quick", on(_ANSWERED, off), 1e-9),
-    # The finest that LSODA claims to meet over 20 s.
+    # The finest tolerance that LSODA claims over 20 s.
     near("external/detest-b5/20/lsoda", on(_SOLVE, off), 1.6e-11),
-    # Nine digits of each of four components, of which an angle has twice as many.
+    # Nine digits of each of four components; the error of the angle is twice theirs.
     near("external/nasa-brick-attitude/1/taylor/attitude", on(_SOLVE, turned_off), 4e-9),
     exact("external/nasa-brick-attitude/1/taylor/attitude", refuses(_SOLVE)),
     exact("external/nasa-brick-attitude/1/taylor/attitude", on(_SOLVE, unturned)),
     near("external/nasa-brick/30/taylor", on(_SOLVE, off), 2e-8 / 34.3),
-    # A program's halved steps leave half a unit in the last place of each of 16 384.
+    # A program's halved steps have half a unit in the last place for each of 16 384 steps.
     near("external/detest-b5/20/runge-kutta", on(_RUN, off), 2.0e-12),
-    # Half a unit of three digits, 3.9e-4 of which there are, and the halved steps' own error.
+    # Half a unit of three digits, of which 3.9e-4 is used, and the error of the halved steps.
     Slack("external/hairer-rigid-body/20/runge-kutta", on(_RUN, off), 4e-4, 1e-4),
     exact("external/detest-b5/20/auto", refuses(_SOLVE)),
     exact("external/detest-b5/20/two-term", on(_RUN, singular)),
-    # Both the record and the result may be wrong by 1e-9; where every bit counts, none.
+    # The record and the result may each have an error of 1e-9; where every bit counts, none.
     near("golden/taylor/case-5", on(_SOLVE, off), 2e-9),
     exact("golden/taylor/case-5", on(_SOLVE, _TIME), ULP),
     exact("golden/taylor/case-5", on("pyharness.checks.golden.read_record", without)),
     exact("golden/taylor", on("pyharness.checks.golden.recorded", without),
           failing="golden/taylor/case-5-method-taylor-tolerance-1e-09"),
-    # Sine and cosine of another library may differ by what rounding may do to a wave.
+    # With another library's sine and cosine, results may differ by the rounding of a wave.
     near("golden/rk4/case-7", beside(other_library, on(_SOLVE, off)), 3.4e-15),
     exact("golden/rk4/case-5", on(_SOLVE, bit_off), ULP),
     exact("golden/two-term/case-5/corrected", on(_RUN, bit_off), ULP),
@@ -547,15 +548,15 @@ STRESS = (
     exact("separatrix/taylor/none", on(_NEAR_SEPARATRIX, bit_off), ULP),
     near("separatrix/quick/none", on(_NEAR_SEPARATRIX, off), ULP),
     exact("separatrix/taylor/none", on(_NEAR_SEPARATRIX, ended)),
-    # Near the separatrix the flow amplifies tolerances, 10.4 times here, and says nothing where
-    # less than two digits are left.
+    # Near the separatrix the flow amplifies tolerances, here 10.4 times; the limit means nothing
+    # where fewer than two digits are left.
     near("separatrix/taylor/early-1e-01/1e-06/error", on(_HELD, off), 1.04e-5),
     near("separatrix/taylor/on-1e-04/1e-06/error", on(_HELD, off), 6.4e-3 / 0.63),
     exact("separatrix/taylor/early-1e-01/1e-06/error", on(_HELD, ended)),
     exact("separatrix/taylor/early-1e-01/1e-06/error", refuses(_HELD)),
-    # A sphere's flow amplifies nothing: a tolerance, 8 roundings of the start and 8 of the result,
-    # half a unit in the last place of the truth, and one of each of the 10 steps of a method that
-    # does not compensate, 4 where its steps are iterated.
+    # The flow of a sphere amplifies nothing. The limit is a tolerance, 8 roundings of the start and
+    # 8 of the result, half a unit in the last place of the truth, and one of each of the 10 steps
+    # of a method that does not compensate, or 4 if its steps are iterated.
     *(
         near(_SPHERE.format(name, "1e-06/error"), on(_HELD, off), 1e-6)
         for name in ("taylor", *_GAUSS, "dop853", "lsoda", "radau", "rk45")
@@ -567,13 +568,15 @@ STRESS = (
     near(_SPHERE.format("gauss-4", "steps/drift"), on(_HELD, off), 56.0 * U),
     near(_SPHERE.format("closed-form", "1e-14/error"), on(_HELD, off), 1e-14),
     near(_SPHERE.format("auto", "1e-14/drift"), on(_HELD, off), 1e-14),
-    # What the rounding of A, B and C makes of 1e6 s, 2.7e-12, and is.
+    # The rounding of A, B and C has an effect of 2.7e-12 after 1e6 s, which is the actual error
+    # too.
     Slack("near-symmetry/closed-form/large-pair-long-1e-01/1e-14/error", on(_HELD, off), 4e-12,
           1e-12),
-    # The finest of the ladder that LSODA can meet over 14.5 radians, amplified 18.8 times.
+    # The finest tolerance of the ladder that LSODA can meet over 14.5 radians, amplified 18.8
+    # times.
     near("near-symmetry/lsoda/small-pair-1e-01/1e-11/drift", on(_HELD, off), 1e-11),
     near("near-symmetry/lsoda/small-pair-1e-01/1e-11/error", on(_HELD, off), 18.8 * 1e-11),
-    # What a step of .002 radians may leave out, by the largest derivatives, 20 000 times.
+    # The truncation error of a step of .002 radians, by the largest derivatives, 20 000 times.
     near("near-symmetry/improved-euler/small-pair-1e-01/steps/drift", on(_HELD, off), 1.38e-4),
     near("near-symmetry/rk4/small-pair-1e-01/steps/drift", on(_HELD, off), 1.19e-9),
     near("shapes/taylor/plate-123/1e-06/error", on(_HELD, off), 9.2e-5),
@@ -582,7 +585,7 @@ STRESS = (
     near("scales/taylor/1e0/1e-06/error", on(_HELD, off), 4.1e-4),
     exact("scales/taylor/same-2^100", on(_SCALED, bit_off, call=2), ULP),
     exact("scales/taylor/beyond", on(_SCALED, partial(ended, why="complete"))),
-    # The flow of the driven body amplifies 4 times.
+    # The flow of the driven body amplifies errors 4 times.
     *(
         near(f"torque/{name}/tiny-1e-12/1e-06", on(_END, off), 4e-6)
         for name in ("taylor", "auto", "prepared-auto", "quick", "gauss-4", "dop853")
@@ -591,14 +594,14 @@ STRESS = (
     exact("torque/prepared-auto/tiny-1e-12/1e-06", on(_ANSWERED, partial(ended, why="gave up"))),
     exact("torque/taylor/tiny-1e-12/1e-06",
           on(_END, ended)),
-    # The sphere's angle has two words, and the sum 16 roundings of its terms.
+    # The sphere's angle is a double-double, and the sum has 16 roundings of its terms.
     near("torque/closed-form/no-digits-1e16/1e-14", on(_END, off),
          1e-14 + 16.0 * U),
-    # 1e4 radians in binary64, of n evaluations 4 sqrt(n).
+    # The phase of 1e4 radians in binary64, with 4 sqrt(n) roundings for n evaluations.
     near("torque/taylor/axial-1e4/1e-15", on(_END, off), 4.8e-10),
-    # What a wave of 1e16 rad/s moves can't be seen: tolerance, amplified twice.
+    # The effect of a wave of 1e16 rad/s is invisible; the limit is the tolerance, amplified twice.
     near("torque/quick/averaged-1e16/1e-06", on(_END, off), 2.03e-6),
-    # 4 sqrt(n) of one rounding of a step, and n times what it leaves out.
+    # 4 sqrt(n) times one rounding of a step, and n times its truncation error.
     *(
         near(f"length/{name}/tumbling/{what}/1000", watched(lambda size, time: size), due)
         for name, what, due in (
@@ -607,7 +610,7 @@ STRESS = (
             ("gauss-4", "momentum", 2.4e-13), ("gauss-4", "phase", 2.9e-7),
         )
     ),
-    # The power of the growth, half way to the next.
+    # The power of the growth, half way to the next power.
     *(
         Slack(f"length/{name}/tumbling/{what}/power",
               watched(lambda size, time: 1e-20 * time**size), due + 0.1, due - 0.1)
@@ -626,15 +629,15 @@ STRESS = (
     exact("invariance/taylor/signs-12/free/1e-06", on(_FREE, bit_off, call=2), ULP),
     exact("invariance/runge-kutta/cyclic/free/corrected", on(_RUN, bit_off, call=2), ULP),
     exact("invariance/taylor/signs-12/free/1e-06", refuses(_FREE)),
-    # Both solutions may be wrong by the tolerance, amplified 2.7 times.
+    # Either solution may have an error of the tolerance, amplified 2.7 times.
     near("invariance/taylor/cyclic/free/1e-06", on(_FREE, off, call=2), 5.4e-6),
     near("invariance/dop853/times-1.7/free/1e-06", on(_FREE, off, call=2), 5.4e-6),
-    # The way back amplifies the error of the way there, and makes its own.
+    # The backward integration amplifies the error of the forward one, and adds its own.
     near("invariance/taylor/back/free/1e-06", on(_FREE, off, call=2), 8.6e-6),
-    # Four pieces, each amplified by those that follow, against one.
+    # Four pieces, each amplified by those that follow, compared with one.
     near("invariance/taylor/split/free/1e-06", on(_FREE, off, call=5), 1.8e-5),
-    # 40 roundings, at any time; of the angular momentum those of omega too, 16 times the largest
-    # over the norm.
+    # 40 roundings, at any time. For the angular momentum also those of omega, 16 times the largest
+    # component over the norm.
     near("attitude/closed-form/plate/1e-14/angle", on(_SOLVE, turned_off), 40.0 * U),
     near("attitude/closed-form/revolutions-1000000/tumbling/angle",
          on(_SOLVE, turned_off), 40.0 * U),
@@ -643,14 +646,14 @@ STRESS = (
     near("attitude/taylor/plate/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
     near("attitude/dop853/needle/1e-06/angle", on(_SOLVE, turned_off), 1e-6),
     exact("attitude/taylor/plate/1e-06/angle", refuses(_SOLVE)),
-    # 2 E T/L is 37 rad here, and 8 roundings of it and of a turn beside those of the attitude.
+    # 2 E T/L is 37 rad here; 8 roundings of it and of a turn are added to those of the attitude.
     near("attitude/closed-form/montgomery/random-0",
          on(_TURNING, partial(turned_off, along=True)), 3.7e-14),
-    # Two attitudes.
+    # The roundings of two attitudes.
     near("attitude/closed-form/cyclic/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
     near("attitude/closed-form/half-turn/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
     near("attitude/closed-form/space/random-0", on(_TURNING, turned_off, call=2), 88.0 * U),
-    # What the way there errs in omega, 16 roundings that the way may amplify, turns the way back.
+    # The forward error of omega, 16 roundings that may be amplified, rotates the backward motion.
     near("attitude/closed-form/back/random-0", on(_TURNING, turned_off, call=2), 3.9e-12),
     near("attitude/angles/3-1-3/1", on("pyharness.checks.trials.attitude.angles", degrees_off),
          64.0 * U),
@@ -658,18 +661,18 @@ STRESS = (
          64.0 * U),
     exact("matrices/two-term/1e-02/ier", on(f"{_MATRICES}.solved", counted_off("ier"))),
     exact("matrices/two-term/1e-02/bits", linear(bit_off), ULP),
-    # 3n roundings of a sum; carried by the inverse.
+    # 3n roundings of a sum, propagated by the inverse.
     near("matrices/two-term/1e-02/residual", linear(value_off), 6.0 * U),
     near("matrices/two-term/1e-02/forward", linear(value_off), 18.0 * U),
     near("matrices/two-term/1e-02/increment", linear(value_off), 41.0 * U),
     near("matrices/four-term/1e-02/residual", linear(value_off), 12.0 * U),
-    # Two sums, each wrong by n + 2 roundings.
+    # Two sums, each with an error of n + 2 roundings.
     near("matrices/two-term/1e-02/pivots", on(f"{_MATRICES}.solved",
          lambda found, size: replace(found, pivoting=(size, found.pivoting[1]))), 16.0 * U),
     near("matrices/four-term/threshold",
          on(f"{_MATRICES}.declared_singular_below", value_off), 1.3e-14),
     exact("matrices/four-term/original/ier-1e-04", on(_COMPILED, singular)),
-    # Roundings of a step, amplified by the differences that find its derivative.
+    # Roundings of a step, amplified by the difference quotient that gives its derivative.
     *(
         near(f"regions/{program}/corrected/{check}", on(f"{_REGIONS}.{probe}", probe_off), due)
         for program, check, probe, due in (
@@ -685,20 +688,21 @@ STRESS = (
             ("two-term", "step-10-case-6", "moving_step", 1.9e-13),
         )
     ),
-    # Twice what steps miss, carried to the end, and in a million steps the roundings of each.
+    # Twice the local errors, propagated to the end, and in a million steps the roundings of each.
     *(
         near(f"step-size/{check}", made_by(f"{_STEPS}._error", lambda size, *_: (size, "")), due)
         for check, due in (
             ("two-term/case-5/corrected/1e-02", 9.2e-4), ("rk4/case-5/1e-02", 6.4e-8),
             ("four-term/case-5/corrected/1e-06", 6.3e-6), ("rk4/case-5/1e-06", 2.9e-10),
-            # The longest step of which anything is predicted.
+            # The longest step for which there is a forecast.
             ("rk4/case-4/3e-01", 0.03),
             ("two-term/case-5/corrected/1e-06", 5.8e-10),
         )
     ),
-    # A quarter of a decade, and a decade of rounding by its root: the next of the steps is beyond.
+    # The limit is a quarter of a decade, since steps are half a decade apart, and the root of the
+    # decade by which rounding is uncertain. The next step is beyond it.
     Slack("step-size/rk4/case-5/crossing", crossing_off, 0.3, 0.2),
-    # Where the wobble of a spin has doubled.
+    # The step at which the wobble of a spin has doubled.
     near("step-size/rk4/case-4/diverges",
          on("pyharness.checks.divergence.smallest_divergent", value_off), 0.0575),
     exact("threads/linear-solver", some_bits),

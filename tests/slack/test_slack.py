@@ -1,4 +1,4 @@
-"""Slack of `verify` and `stress`: what lies just beyond a limit fails, what lies within passes."""
+"""Slack of `verify` and `stress`: errors just beyond a limit fail, errors just within it pass."""
 
 import ast
 import pkgutil
@@ -23,7 +23,7 @@ from tests.ports import documented_command, sample
 from tests.slack.table import SLACK, Slack, kept
 
 PACKAGE = Path(pyharness.__file__).parent
-# A place of the source: file and line.
+# A place in the source: file and line.
 Place = tuple[str, int]
 
 
@@ -38,7 +38,7 @@ def _made(id: str) -> list[Check]:
 
 @contextmanager
 def _failing(places: set[Place]) -> Iterator[None]:
-    """Gather where checks are made that fail."""
+    """Collect the places at which failing checks are made."""
 
     def seeing(init: Callable[..., None]) -> Callable[..., None]:
         def seen(self: Check, *rest: Any, **named: Any) -> None:
@@ -65,13 +65,13 @@ def _is_between(code: CodeType) -> bool:
     return not is_ours or code.co_name in ("bounded", "judged")
 
 
-# What plants don't touch and limits are made of.
+# Modules that compute limits, and that plants do not change.
 _KEPT = ("checks.judge", "checks.hold", "checks.trials.torque", "checks.trials.scales")
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _once() -> Iterator[None]:
-    """Compute truths and conditionings once."""
+    """Compute each truth and each conditioning only once."""
     with pytest.MonkeyPatch.context() as patched:
         for room in _KEPT:
             for name in ("conditioning", "reference"):
@@ -83,7 +83,7 @@ def _once() -> Iterator[None]:
 
 @cache
 def _fared(slack: Slack) -> tuple[list[Check], list[Check], frozenset[Place]]:
-    """Return the checks within and beyond, and where those failed."""
+    """Return the checks within the limit and beyond it, and the places of those that failed."""
     places: set[Place] = set()
     with slack.planted(slack.within):
         within = _made(slack.check)

@@ -1,7 +1,7 @@
-"""The flow's conditioning against finite differences of the true solution.
+"""The flow's conditioning, compared with finite differences of the true solution.
 
-The other way: no linearised equations, no propagator. The truth is computed in decimal arithmetic
-from neighbouring starts, and differences tell what an error becomes.
+The comparison uses no linearised equations and no propagator: the truth is computed in decimal
+arithmetic from neighbouring starts, and differences show the amplification of an error.
 """
 
 import math
@@ -27,7 +27,7 @@ _SCENES = {
 
 
 def _propagator(scene: Scene, start: Array, time: float) -> Array:
-    """Return the derivatives of the end by the start."""
+    """Return the derivatives of the end with respect to the start."""
 
     def end(moved: Array) -> Array:
         first, second, third = moved.tolist()
@@ -42,7 +42,7 @@ def _propagator(scene: Scene, start: Array, time: float) -> Array:
 
 @cache
 def _sampled(name: str, count: int = 32) -> tuple[Array, Array, Array]:
-    """Return times, omega and propagators to the end; the law of torque must not vary."""
+    """Return times, omega and propagators to the end; the torque must be constant."""
     scene, time = _SCENES[name]
     times = np.linspace(0.0, time, count + 1)
     omega = np.vstack([scene.omega, reference(scene, times[1:].tolist()).omega])
@@ -59,7 +59,7 @@ def test_amplification_is_that_of_neighbouring_solutions(name: str) -> None:
     _, omega, rest = _sampled(name)
     sampled = float(np.abs(rest).sum(axis=2).max())
     found = conditioning(scene, time)
-    # Samples miss the very largest, never exceed it.
+    # Samples miss the maximum by a little, and never exceed it.
     assert 0.999 * sampled <= found.amplification <= 1.1 * sampled
     assert found.largest == pytest.approx(np.abs(omega).max(), rel=1e-3)
 
@@ -86,11 +86,11 @@ def test_rounding_and_storing_are_sums_over_neighbouring_solutions(name: str) ->
 
 
 def test_torque_that_varies_counts_with_its_angle() -> None:
-    """A rounding of frequency times t is one of so many radians."""
+    """The rounding of frequency times t is proportional to this angle."""
     law = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1000.0),))
     scene = Scene("", (1.0, 1.0, 1.0), moments=(2.0, 2.0, 2.0), torque=law)
     found = conditioning(scene, 4.0)
-    # Of a sphere errors just add up: 1000 t over the moment, integrated.
+    # On a sphere errors just add up: 1000 t over the moment, integrated.
     wanted = 8.0 * ROUNDING * (0.5 * 1000.0 * 4.0**2 / 2.0 + 0.5 * 4.0 + 2.0)
     assert found.rounding == pytest.approx(wanted, rel=0.01)
     assert found.amplification == 1.0
@@ -107,7 +107,7 @@ def test_limit_says_nothing_beyond_two_and_is_none_without_a_number() -> None:
 
 
 def test_flow_between_nodes_is_that_of_the_middle() -> None:
-    """Its error falls with the square of the distance of nodes: with that itself at an end."""
+    """The error falls with the square of the distance of nodes; taken at an end, linearly."""
     scene, time = _SCENES["any body"]
 
     def flow(count: int) -> Array:

@@ -1,4 +1,4 @@
-"""Flip times: against half the exact period, and against the motion itself."""
+"""Flip times, compared with half the exact period and with the motion itself."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from pyharness.truth.free_attitude import period_of
 
 
 def _drawn(n: int, least: float) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Return bodies, angular velocities beside the middle axis, and which axis that is."""
+    """Return bodies, angular velocities near the middle axis, and the index of that axis."""
     rng = np.random.default_rng(7)
     parts = np.sort(rng.uniform(0.01, 1.0, (n, 3)), axis=1)
     moments = np.stack([parts[:, 0] + parts[:, 1], parts[:, 0] + parts[:, 2],
@@ -47,7 +47,7 @@ def test_middle_component_changes_its_sign_once_in_it() -> None:
         signs.append(np.sign(np.take_along_axis(ends, middle[:, None], axis=1)[:, 0]))
     changes: Any = (np.diff(np.array(signs), axis=0) != 0).sum(axis=0)
     assert (changes == 1).all()
-    # Half a period later it is what it was, the other way.
+    # Half a period later omega points the other way along the middle axis.
     before = np.take_along_axis(omega, middle[:, None], axis=1)
     after = np.take_along_axis(ends, middle[:, None], axis=1)
     assert np.abs(before + after).max() < 1e-8
@@ -66,7 +66,7 @@ def test_it_grows_with_the_logarithm_of_the_tilt() -> None:
     [
         ((1.0, 2.0, 3.0), (0.0, 1.0, 0.0)),  # on the axis
         ((2.0, 2.0, 2.0), (1.0, 1.0, 0.0)),  # a sphere
-        ((1.0, 2.0, 2.0), (0.0, 1.0, 0.1)),  # about an axis of a circle
+        ((1.0, 2.0, 2.0), (0.0, 1.0, 0.1)),  # an axis in the plane of equal moments
     ],
 )
 def test_what_never_turns_takes_for_ever(moments: Any, omega: Any) -> None:

@@ -1,4 +1,4 @@
-"""Steady rotations: against eigenvalues, the right-hand side, and motions that are solved."""
+"""Steady rotations, compared with eigenvalues, the right-hand side, and solved motions."""
 
 import csv
 import json
@@ -73,7 +73,7 @@ def test_rates_are_the_eigenvalues_of_the_linearised_equations() -> None:
         found = np.array(rates(scene.euler_coefficients, scene.omega))
         wanted = np.linalg.eigvals(_jacobian(scene, scene.omega))
         size = np.abs(found).max()
-        # Of a double root the eigenvalues have half the digits.
+        # For a double root the eigenvalues have half the digits.
         for each in found:
             assert np.abs(wanted - each).min() <= 2e-7 * size
         for each in wanted:
@@ -190,7 +190,7 @@ _MOVING = ("none", "largest", "middle", "smallest", "all", "across", "across, fi
 
 @pytest.mark.parametrize("name", _MOVING)
 def test_stability_is_that_of_motions_that_are_solved(name: str) -> None:
-    """What is unstable grows with Re Q, and with t where Q is 0; what is stable stays."""
+    """Unstable rotations grow with Re Q, or with t where Q is 0; stable ones stay."""
     scene = SCENES[name]
     for each in _rotations(scene):
         spin = math.hypot(*each.omega)
@@ -210,7 +210,7 @@ def test_stability_is_that_of_motions_that_are_solved(name: str) -> None:
 
 
 def test_hyperbola_is_stable_to_its_margin() -> None:
-    """About the middle axis it is stable all along; about others only beyond the margin."""
+    """The middle axis has a stable hyperbola; the others' is stable on one side of its margin."""
     assert all(each.stable for each in _rotations(SCENES["middle"]))
     for name in ("largest", "smallest"):
         found = _rotations(SCENES[name])
@@ -235,7 +235,7 @@ def test_top_drifts_away_from_an_axis_across_its_own() -> None:
 
 
 def test_where_nothing_turns_about_a_stable_axis_no_time_is_told() -> None:
-    # The spin itself drifts with the square of the disturbance: no phase is there to be off.
+    # The spin itself drifts with the square of the perturbation, so that no phase can be wrong.
     first, *_ = _rotations(SCENES["one coefficient"])
     assert first.stable
     assert first.rates == (0j, 0j, 0j)
@@ -283,7 +283,7 @@ def test_linear_picture_of_what_grows_in_waves_ends_about_when_it_says() -> None
             _disturbed(scene, each.omega + size * grows.real, [each.linear_until]) - each.omega
         )
         linear = size * (grows * np.exp(values[chosen] * each.linear_until)).real
-        # The size of a wave is that of its whole turn.
+        # The size of an oscillation is its largest over a whole turn.
         offs.append(np.linalg.norm(away - linear) / (size * math.exp(
             each.rates[0].real * each.linear_until)))  # fmt: skip
     assert 0.05 <= max(offs) <= 0.12
@@ -294,7 +294,7 @@ def test_phase_about_a_stable_axis_is_a_tenth_off_when_it_says(axis: int, toward
     scene, tilt = SCENES["none"], 0.02
     each = _rotations(scene, tilt)[axis]
     spin = each.omega[axis]
-    # Towards the axis of the smaller coefficient.
+    # The perturbation is towards the axis of the smaller coefficient.
     sizes = np.abs(scene.euler_coefficients)
     toward = min({0, 1, 2} - {axis}, key=lambda k: sizes[k])
     start = np.array(each.omega)
@@ -329,9 +329,9 @@ def test_flips_come_when_they_are_said_to(moments: Triple, tilt: float) -> None:
     (flipped,) = _disturbed(scene, start, [interval])
     wanted = start.copy()
     wanted[middle] = -spin
-    # Beside the separatrix what is left of the small component is a matter of rounding times 1/k'.
+    # Near the separatrix, the rest of the small component has the size of rounding times 1/k'.
     assert np.abs(flipped - wanted).max() <= 1e-13 * spin / tilt
-    # Towards the other axis it has not come so far.
+    # With a perturbation towards the other axis, the flip is not yet complete.
     start[[toward, other]] = start[[other, toward]]
     (late,) = _disturbed(scene, start, [interval])
     assert late[middle] > -spin * (1.0 - 1e-4 * tilt**2)

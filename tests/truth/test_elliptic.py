@@ -1,4 +1,4 @@
-"""The truth of torque-free motion: against the series, and by the laws of a flow."""
+"""The truth of torque-free motion, compared with the series, and checked by the laws of a flow."""
 
 import itertools
 from dataclasses import replace
@@ -48,17 +48,18 @@ def test_agrees_where_the_motion_is_special(
 
 
 def test_digits_hold_over_many_flips() -> None:
-    """Beyond what 40 digits would bear energy and momentum stay."""
+    """Energy and momentum are conserved further than 40 digits would allow."""
     scene = Scene("", (1e-15, 1.0, 0.0), moments=(6.0, 5.0, 2.0))
     rows = [[Decimal(w) for w in scene.omega], torque_free(scene, 350.0), torque_free(scene, 700.0)]
-    # omega holds 53 bits only, so that a second half would start beside: the laws are held instead.
+    # Omega has 53 bits only, so that a second half would start elsewhere; the invariants are
+    # compared.
     for weights in ((6, 5, 2), (36, 25, 4)):
         energies = [sum(q * w * w for q, w in zip(weights, row, strict=True)) for row in rows]
         assert max(energies) - min(energies) < Decimal("1e-60")
 
 
 def test_coefficients_as_binary64_holds_them() -> None:
-    """The two solutions differ by what one rounding of A, B and C does, and are not the same."""
+    """The two solutions differ by the effect of one rounding of A, B and C; they are not equal."""
     scene = Scene("", _START, moments=(3.0, 0.7, 2.9))
     exact, held = torque_free(scene, 50.0), torque_free(scene, 50.0, rounded=True)
     away = max(float(abs(x - y)) for x, y in zip(exact, held, strict=True))

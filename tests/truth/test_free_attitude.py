@@ -1,4 +1,4 @@
-"""The truth of the attitude without torque, against series of 200 bits that share nothing."""
+"""The truth of the attitude without torque, compared with independent series of 200 bits."""
 
 import random
 from decimal import Decimal
@@ -44,7 +44,7 @@ def test_separatrix_and_rest_are_told(omega: Triple, steady: bool, endless: bool
     if steady:
         assert free_attitude(scene, 0.0) == [1, 0, 0, 0]
     elif not endless:
-        # Beyond a period as within it: the sign goes on.
+        # The sign is continuous beyond a period as within it.
         period = period_of(scene) or Decimal(0)
         near, far = (free_attitude(scene, float(period) * part) for part in (0.999999, 1.000001))
         assert sum(abs(x - y) for x, y in zip(near, far, strict=True)) < Decimal("1e-3")

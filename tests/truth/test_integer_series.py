@@ -1,4 +1,4 @@
-"""The second reference: what is known exactly, the first reference, and scenes at every scale."""
+"""The second reference, compared with exact solutions, the first reference, and at every scale."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ REST = (0.0, 0.0, 0.0)
 @pytest.mark.parametrize("case", range(1, 8))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_both_references_agree_to_the_last_bit_but_one(case: int, sign: float) -> None:
-    """They share no code: other numbers, other steps, other waves."""
+    """The references share no code, and differ in arithmetic, steps and treatment of waves."""
     scene, times = case_scene(case), [sign * t for t in (0.3, 1.0, 1.7)]
     first = reference(scene, times, precise=True)
     second = integer_series(scene, times)
@@ -28,7 +28,7 @@ def test_both_references_agree_to_the_last_bit_but_one(case: int, sign: float) -
 @pytest.mark.parametrize("frequency", [1e-300, 1e-30, 1e-8, 1.0, 700.0])
 @pytest.mark.parametrize("is_sine", [True, False])
 def test_wave_on_one_axis_is_its_integral(frequency: float, is_sine: bool) -> None:
-    """From rest nothing else moves; a slow sine leaves its whole answer in one small number."""
+    """From rest nothing else moves; for a slow sine the whole answer is one small number."""
     wave = (((0.0, 0.0, 20.0), frequency),)
     law = TorqueLaw(sines=wave) if is_sine else TorqueLaw(cosines=wave)
     path = integer_series(Scene("", REST, BODY, torque=law), [3.0])
@@ -52,7 +52,7 @@ def test_units_change_no_digit(power: int) -> None:
 
 
 def test_way_passes_through_the_largest_omega() -> None:
-    """A spin about the middle axis turns over: its third part is large only on the way."""
+    """A spin about the middle axis flips: omega3 is large only at intermediate times."""
     scene = Scene("", (1e-3, 1.0, 0.0), (40.0, 30.0, 20.0))
     path = integer_series(scene, [40.0])
     finer = integer_series(scene, np.linspace(0.0, 40.0, 801)[1:].tolist())

@@ -1,4 +1,4 @@
-"""The reference against closed forms, against mpmath, and its own estimate against the truth."""
+"""The reference, compared with closed forms and mpmath, and its estimate with the true error."""
 
 import decimal
 import math
@@ -21,7 +21,7 @@ from tests.exact_attitude import exact
 
 
 def _whole(found: room.Reference, row: int) -> list[mpmath.mpf]:
-    """Return the reference to all the digits that it carries."""
+    """Return the reference to all its digits."""
     assert found.remainder is not None
     return [
         mpmath.mpf(float(high)) + mpmath.mpf(float(low))
@@ -59,7 +59,7 @@ _START = (0.3, -1.1, 2.2)
 def test_series_agrees_with_the_known_solution(
     scene: Scene, times: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two derivations that share only the arithmetic; the estimate bounds their difference."""
+    """The two derivations share only the arithmetic; the estimate bounds their difference."""
     known = reference(scene, times)
     assert known.source == "known solution"
     monkeypatch.setattr(room, "known_solution", lambda *_: None)
@@ -73,7 +73,7 @@ def test_series_agrees_with_the_known_solution(
 @pytest.mark.parametrize("time", [1e20, 1e39, 1e40, -1e41, 1e100, 1e300])
 @pytest.mark.parametrize("third", [10.0, 10.1, -1e30, 1e-200])
 def test_a_symmetric_body_after_any_time(time: float, third: float) -> None:
-    """The phase has as many digits before the point, and 40 after it are needed."""
+    """The phase has as many digits before the point, and needs 40 after it."""
     scene = Scene("", (0.3, 1.0, third), moments=(40.0, 40.0, 20.0))
     found = reference(scene, [time])
     with mpmath.workdps(700):
@@ -97,7 +97,7 @@ def test_a_sphere_after_any_time(frequency: float, time: float) -> None:
         t, f, slope = mpmath.mpf(time), mpmath.mpf(frequency), mpmath.mpf(law.rate[2])
         pushes = [(1 - mpmath.cos(f * t)) / f, mpmath.sin(f * t) / f, 2 * t + slope * t * t / 2]
         wanted = [float(w + push / 2) for w, push in zip(scene.omega, pushes, strict=True)]
-    # The terms of axis 3 cancel but for what rounding left of the rate.
+    # The terms of axis 3 cancel, except for the rounding error of the rate.
     np.testing.assert_allclose(found.omega[0], wanted, rtol=2e-16)
 
 
@@ -107,7 +107,7 @@ def test_a_sphere_after_any_time(frequency: float, time: float) -> None:
 def test_torque_free_top_agrees_with_jacobis_elliptic_functions(
     case: int, times: list[float], precise: bool
 ) -> None:
-    """A second, independent way: mpmath's sn, cn, dn, from omega(0) = (0, b, c)."""
+    """Compare with an independent solution: mpmath's sn, cn, dn, from omega(0) = (0, b, c)."""
     scene = case_scene(case)
     found = reference(scene, times, precise=precise)
     with mpmath.workdps(45):
@@ -127,7 +127,7 @@ def test_torque_free_top_agrees_with_jacobis_elliptic_functions(
 
 
 def test_case_7_agrees_with_mpmaths_own_integrator_to_25_digits() -> None:
-    """Torque that varies."""
+    """Test a torque that varies."""
     scene = case_scene(7)
     found = reference(scene, [0.05], precise=True)
     with mpmath.workdps(32):
@@ -175,7 +175,7 @@ def test_sine_and_cosine_have_all_their_digits() -> None:
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_series_for_the_velocity_is_estimated_where_omega_is_known(number: int) -> None:
-    # A mass with which no acceleration is a short decimal: in Case 1 nothing would be rounded.
+    # With this mass no acceleration is a short decimal; in Case 1 nothing would be rounded.
     scene = replace(case_scene(number), masses=(110.0,) * 3)
     found = reference(scene, [1.0], velocity=True)
     assert found.source == "known solution"
@@ -214,14 +214,14 @@ def test_attitude_is_that_of_the_series_in_whole_numbers(case: int, time: float)
     _, wanted = exact(scene.moments, scene.omega, scene.attitude, time)
     assert found.attitude[1] == pytest.approx([float(x) for x in wanted], abs=2e-16)
     assert 0.0 < found.angle_estimate < 1e-18
-    # Omega is as it was, and known where it was known.
+    # Omega does not change, and has the same source.
     bare = reference(case_scene(case), [0.5 * time, time])
     assert (found.omega == bare.omega).all()
     assert found.source == bare.source
 
 
 def test_attitude_of_a_body_that_is_pushed_about_one_axis() -> None:
-    """omega3 = t**2 / 4 + t / 2 from rest: the angle is its integral; a start the other way up."""
+    """From rest omega3 = t**2 / 4 + t / 2; the angle is its integral, the body is upside down."""
     law = TorqueLaw((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
     scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 2.0), torque=law)
     found = reference(replace(scene, attitude=(0.0, 0.0, 0.0, 1.0)), [1.0, 2.0]).attitude

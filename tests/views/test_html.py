@@ -1,4 +1,4 @@
-"""Reports as HTML: nothing of a text is taken for markup, and lines stay together."""
+"""Reports as HTML: no text is read as markup, and lines stay together."""
 
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, words
 from pyharness.views import html

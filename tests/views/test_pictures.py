@@ -20,7 +20,7 @@ BODY = "[body]\nmoments=[3,2,1]\n[initial]\nomega=[0.1,1,0.2]\n"
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> "list[Figure]":
-    """Return the list to which every figure that is saved is added."""
+    """Return the list to which every saved figure will be appended."""
     figures = []
     real = plots._image
 
@@ -34,7 +34,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> "list[Figure]":
 
 
 def _ends(figure: "Figure") -> list[tuple[int, float, float]]:
-    """Return panel, time and place of every end that is marked."""
+    """Return panel, time and place of every marked end."""
     return [
         (panel, float(np.asarray(line.get_xdata())[0]), float(np.asarray(line.get_ydata())[0]))
         for panel, axes in enumerate(figure.axes)

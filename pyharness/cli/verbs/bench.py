@@ -1,4 +1,4 @@
-"""`bench`: run time against error, every method of ours against programs and peers."""
+"""`bench`: run time against error of our methods, the programs and third-party packages."""
 
 import argparse
 import shlex
@@ -18,7 +18,7 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.scenes.random_scenes import weekly_seed
 
 _Named = TypeVar("_Named", bound=Contender)
-# Beyond it the reference, in decimal arithmetic, takes longer than anyone waits for.
+# s; beyond it the reference, in decimal arithmetic, takes too long.
 _LONGEST = 1e3
 _BODIES, _MOST_BODIES, _MOST_GROWN = 100_000, 1_000_000, 10_000_000
 OPTIONS = {
@@ -39,7 +39,7 @@ EXAMPLE = "bench --case 5 --peers none"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure and show."""
+    """Measure, print the results and return the exit status."""
     if options.ensemble:
         return _ensemble(options)
     if options.bodies is not None:
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
 def _present(
     methods: Sequence[_Named], others: Sequence[_Named], named: bool
 ) -> tuple[list[_Named], list[_Named]]:
-    """Return who takes part, and the peers that are missing; InputError for one that is named."""
+    """Return the contenders, and those not installed; raise InputError for these if `named`."""
     missing = [each for each in others if not each.is_installed]
     if missing and named:
         raise InputError(
@@ -103,7 +103,7 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return how many random scenes are asked for, 0 for none; without a seed it is the week's."""
+    """Return the number of random scenes, 0 without --random; set a missing seed to the week's."""
     if options.random is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --random or --ensemble")
@@ -123,9 +123,9 @@ def chosen(
     where: str,
     attitude: bool = False,
 ) -> list[SceneContender]:
-    """Return the contenders named, by their own name or their package; all where none are.
+    """Return the contenders that `text` lists, by name or package; by default all able ones.
 
-    Where the `attitude` is asked for, who is named must carry it; where it is not, omega alone.
+    With `attitude`, a listed contender must compute the attitude; without it, omega alone.
     """
     if text is None:
         return [each for each in contenders if attitude or each.velocity]
@@ -139,7 +139,7 @@ def chosen(
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the command that makes the page again."""
+    """Return the command that reproduces the page."""
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
     for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
         value = getattr(options, name)
@@ -186,7 +186,7 @@ def _ensemble(options: argparse.Namespace) -> int:
     loads = draw(options.seed, n)
     rates = measure_ensembles(loads, contenders, options.seed, shared.progress)
     rates.refused.extend(("", each.name, _absent()) for each in missing)
-    # A hundred times as many as above, and what memory ten times as many take.
+    # Run times up to a hundred times as many bodies, and the memory of ten times as many.
     growth = sizes(options.seed, min(100 * n, _MOST_GROWN), shared.progress)
     found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
     shared.progress("")
@@ -196,7 +196,7 @@ def _ensemble(options: argparse.Namespace) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
-    """Return those that are named, by their own name or their package; all where none are."""
+    """Return the contenders that `text` lists, by name or package; by default all."""
     names: list[str] = shared.names(text)
     if names == ["none"]:
         return []

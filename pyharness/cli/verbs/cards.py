@@ -25,7 +25,7 @@ EXAMPLE = "cards runge-kutta:860"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the cards; 1 where the tables leave anything of a scan or of the decks unexplained."""
+    """Show the cards; return exit status 1 if a difference in a scan or deck is unexplained."""
     if options.format == "tei":
         from pyharness.history.tei import tei_document
 

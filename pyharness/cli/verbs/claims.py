@@ -1,4 +1,4 @@
-"""`claims`: statements of the thesis by kind, each judged."""
+"""`claims`: the statements of the thesis by kind, each with a verdict."""
 
 import argparse
 
@@ -22,7 +22,7 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge and show."""
+    """Judge the claims, print the verdicts and return exit status 0."""
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))
         shared.check_known("format", options.format, ("table", "json"))

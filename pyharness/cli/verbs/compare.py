@@ -1,4 +1,4 @@
-"""`compare`: original against corrected, Fortran against Python, all against the truth."""
+"""`compare`: original and corrected programs, Fortran and Python, each against the truth."""
 
 import argparse
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare and show; 1 where something is not as it should be."""
+    """Print a comparison; return status 1 if unexpected, or sensitive with --strict."""
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     shared.check_known("word", options.word, WORD_NAMES)

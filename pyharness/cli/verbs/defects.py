@@ -1,4 +1,4 @@
-"""`defects`: the apparatus, and what each entry does."""
+"""`defects`: the entries of the apparatus and their effects."""
 
 import argparse
 
@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _card(options: argparse.Namespace) -> int:
-    """Show a card, and each entry that names it, with its effect in the card's program."""
+    """Show a card and the apparatus entries that name it, with their effects."""
     from pyharness.history.cards_report import cards_report
     from pyharness.original.cards import chosen
 

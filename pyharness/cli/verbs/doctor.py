@@ -1,4 +1,4 @@
-"""`doctor`: what is built, with what, and what is missing."""
+"""`doctor`: the build, its compiler and flags, and missing parts."""
 
 import argparse
 
@@ -13,7 +13,7 @@ EXAMPLE = "doctor"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show; 3 where the extension is not built."""
+    """Print the report; return exit status 3 if the extension is not built."""
     shared.check_outputs(options)
     found = build()
     shared.show(doctor_report(found), options)

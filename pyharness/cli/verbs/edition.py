@@ -1,4 +1,4 @@
-"""`edition`: the edition as pages."""
+"""`edition`: the edition as a static web site."""
 
 import argparse
 
@@ -15,7 +15,7 @@ EXAMPLE = "edition --out pages"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Make all pages, then write them."""
+    """Make all pages, write them and print a list of the files."""
     from pyharness.cli.output import check_tree, write_tree
     from pyharness.edition.libraries import check_libraries
     from pyharness.edition.report import MARK, edition_report

@@ -1,4 +1,4 @@
-"""`family`: what limits the weighted residual methods; orders derived against orders measured."""
+"""`family`: derived and measured orders of the weighted residual methods."""
 
 import argparse
 
@@ -26,7 +26,7 @@ EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure and show; 1 where an order is below the one derived."""
+    """Print the orders; return exit status 1 if a measured order is below the derived one."""
     if options.lost:
         return _lost(options)
     shared.refuse(options, "the family; give --lost", ("word",))

@@ -15,7 +15,7 @@ EXAMPLE = "figures --out figures"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute and draw everything, then write everything."""
+    """Draw all figures, then write all files and print a list of them."""
     from pyharness.cli.output import check_folder, write_folder
     from pyharness.views.pictures import check_matplotlib, saved
     from pyharness.views.render import render
@@ -35,6 +35,6 @@ def run(options: argparse.Namespace) -> int:
         drawn.append(finding)
     shared.progress("")
     write_folder(options.out, content, "--out")
-    # The folder takes the files; what was drawn is told here.
+    # --out names the folder of the files; the list goes to the terminal.
     shared.emit(render(room.figures_report(drawn), options.format or "table"), None)
     return 0

@@ -1,4 +1,4 @@
-"""`limits`: what the original programs tend to as the step goes to zero."""
+"""`limits`: the limits of the original programs as the step size tends to zero."""
 
 import argparse
 
@@ -18,7 +18,7 @@ EXAMPLE = "limits --case 5 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Hold the original programs against their limits and against the truth."""
+    """Compare the original programs with their limits and with the truth."""
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
     halvings = 6 if options.halvings is None else shared.whole(options.halvings, "--halvings")

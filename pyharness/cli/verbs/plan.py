@@ -1,4 +1,4 @@
-"""`plan`: what a scene needs, what is therefore not computed, and why."""
+"""`plan`: the computations that a scene requires, those left out, and the reasons."""
 
 import argparse
 
@@ -19,7 +19,7 @@ EXAMPLE = "plan --case 5 --tolerance 1e-9"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the decisions for a scene."""
+    """Print the decisions of the plan for a scene."""
     scene = shared.chosen_scene(options, any_torque=True)
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))

@@ -1,4 +1,4 @@
-"""`rotations`: the steady rotations of a scene, and what a small disturbance makes of each."""
+"""`rotations`: the steady rotations of a scene, and the effect of a perturbation on each."""
 
 import argparse
 
@@ -16,7 +16,7 @@ EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find and show."""
+    """Find the steady rotations and print them."""
     scene = shared.chosen_scene(options)
     disturbance = shared.positive(options.disturbance, "--disturbance", 1e-3)
     if disturbance >= 1.0:

@@ -1,4 +1,4 @@
-"""`run`: one trajectory, of a program of the appendix or of a method."""
+"""`run`: one trajectory, computed by a program of the appendix or by a method."""
 
 import argparse
 import sys
@@ -20,7 +20,7 @@ from pyharness.original.programs import (
     run_program,
 )
 
-# What only a program wrote: its printer page, and its tape.
+# Formats that exist for programs alone: the printer page and the tape.
 PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
@@ -46,7 +46,7 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run and show; 1 where a result is sensitive and that is not to be passed over."""
+    """Print the results; return exit status 1 if they are sensitive and --strict is given."""
     by_method = options.method is not None
     scene = shared.chosen_scene(options, any_axes=by_method, any_torque=by_method)
     if (options.program is None) == (options.method is None):
@@ -83,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
-    """Refuse a page or a tape that no program could have written, or no one could read."""
+    """Raise InputError if the run has no page or tape, or if a tape would go to a terminal."""
     if options.program is None:
         raise InputError(
             f"--format {form} has no meaning with --method; allowed: {', '.join(shared.FORMATS)}"
@@ -132,7 +132,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
 
 
 def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
-    # A program needs neither.
+    # A run of a program does not import these modules.
     from pyharness.methods.registry import METHODS
     from pyharness.methods.solve import solve
 

@@ -1,4 +1,4 @@
-"""`stress`: numerical stability tried to breaking, each trial with a bound derived beforehand."""
+"""`stress`: trials of numerical stability, each against a bound derived beforehand."""
 
 import argparse
 
@@ -20,7 +20,7 @@ EXAMPLE = "stress --only separatrix --plot separatrix.png"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Try and show; 1 where a bound does not hold."""
+    """Run the trials and print them; return exit status 1 if a bound does not hold."""
     only = shared.chosen_names(options.only, "trial", tuple(TRIALS))
     if options.plot is not None and len(_chosen(only)) != 1:
         raise InputError("--plot draws one trial: choose it by --only, as in --only separatrix")
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     failed = [check for check in checks if not check.passed]
     if options.save is not None:
         _save(options.save, checks)
-    # One check alone is a replay: its input has been saved before.
+    # A check that is requested by its id is a replay; its input was saved before.
     elif not any("/" in each for each in only):
         try:
             _save(_FOLDER, failed)

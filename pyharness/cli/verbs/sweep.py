@@ -1,4 +1,4 @@
-"""`sweep`: a grid of scenes, solved chunk by chunk and kept in a store that resumes."""
+"""`sweep`: a grid of scenes, solved chunk by chunk into a store that a later run completes."""
 
 import argparse
 from functools import partial
@@ -13,7 +13,7 @@ from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
 
-# Where the function of a claim over many starts stands, by the claim's name.
+# The functions that judge a claim over many initial conditions, by the claim's name.
 CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {
@@ -32,7 +32,7 @@ EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute what the store lacks, and show what it holds."""
+    """Compute the missing chunks of the store, and print a report of its contents."""
     if options.file is None:
         raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")
     if options.out is None:
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     workers = _workers(options, executor)
     sweep = read_sweep(options.file, CLAIMS)
     quantity = None
-    # What `show` gets: the report goes to the terminal, the store is what --out names.
+    # `show` gets no --out, which names the store; the report goes to the terminal.
     shown = argparse.Namespace(**{**vars(options), "out": None})
     if options.plot is not None:
         from pyharness.ensembles.picture import chosen_quantity

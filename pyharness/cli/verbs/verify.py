@@ -1,4 +1,4 @@
-"""`verify`: bits between languages, error against the truth, and what changed."""
+"""`verify`: bit-for-bit comparisons, errors against the truth, and the golden record."""
 
 import argparse
 from pathlib import Path
@@ -16,7 +16,7 @@ from pyharness.model.scene_file import case_numbers
 from pyharness.original.decks import compiler
 
 FORMATS = ("table", "json", "junit")
-# Options that no other kind looks at.
+# Options that apply to one kind of check alone.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record")
 OPTIONS = {
@@ -39,7 +39,7 @@ EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Verify and show; 1 where something is not as it should be."""
+    """Run the checks and print the results; return exit status 1 if a check fails."""
     if options.listing_output is not None:
         return _listing_output(options)
     if options.port is not None:
@@ -159,7 +159,7 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Say what was not judged, as no failure shows it: decks, and figures of the user's."""
+    """Return a line on decks or published figures that no check judged; no failure shows it."""
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]
     count = sum(check.passed and check.value is None for check in checks)

@@ -1,4 +1,4 @@
-"""`words`: the programs in words of any length and rounding, and vectors of the CDC."""
+"""`words`: the programs with words of any length and rounding, and test vectors of the CDC."""
 
 import argparse
 import time
@@ -25,7 +25,7 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run in every word and show; 1 where a vector differs."""
+    """Run the programs in every word, or check vectors; return status 1 if a vector differs."""
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))
         return _vectors(options)
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 class _Forecast:
-    """Says how far it is, and how long the rest takes at the pace so far."""
+    """A progress line with the remaining time, estimated from the time of the finished runs."""
 
     def __init__(self) -> None:
         self._begin = self._said = time.monotonic()

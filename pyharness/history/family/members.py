@@ -87,7 +87,7 @@ class Member:
 
 
 def converged_order(member: Member) -> int:
-    """Return the order of a member with enough corrections, as derived in docs/explanation/family.md."""
+    """Return the order of a member with enough corrections, as family.md derives it."""
     n = member.terms
     if member.weighting == "galerkin":
         return n

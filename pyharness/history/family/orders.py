@@ -35,7 +35,7 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """The order of one member in one scene, as derived in docs/explanation/family.md and as measured.
+    """The order of one member in one scene, as family.md derives it and as measured.
 
     `measured` is None if the error is rounding error alone, or never gets small. `settled` is true
     if the last two measured values of the order differ by at most a tenth. `error` is the largest

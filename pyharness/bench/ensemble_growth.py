@@ -17,6 +17,7 @@ from pyharness.bench.ensemble_contenders import (
 from pyharness.bench.ensemble_measure import SLOW, STEPS, clock_of
 from pyharness.compare.timing import seconds
 from pyharness.methods.prepared import prepare
+from pyharness.model.progress import Progress, no_progress
 
 SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
 _BATCH, _ROUNDS = 0.02, 5
@@ -45,19 +46,20 @@ class Memory:
         return None if self.peak is None else self.peak / self.arrays
 
 
-def sizes(seed: str, most: int, say: Callable[[str], None] = lambda _: None) -> list[Size]:
+def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Measure calls with 1, 10, ... up to `most` bodies.
 
     The closed form is measured without torque, the other methods with torque.
     """
     free, pushed = draw(seed, most)
-    found, n = [], 1
+    found: list[Size] = []
+    n = 1
     while n <= most:
         runs: dict[str, Callable[[], object]] = {"prepared": _prepared(free.part(slice(0, n)))}
         for method in own_ensembles():
             load = (free if method.torque_free else pushed).part(slice(0, n))
             runs[method.name] = method.prepare(load, SETTINGS[method.name], 1)
-        say(f"{n} bodies")
+        progress(len(found), len(str(most)), f"{n} bodies")
         clocks = [clock_of(1)] * len(runs)
         times = seconds([*runs.values()], _BATCH, _ROUNDS, statistic=min, clocks=clocks, slow=SLOW)
         found.append(Size(n, {name: time / n for name, time in zip(runs, times, strict=True)}))

@@ -21,6 +21,7 @@ from pyharness.bench.ensemble_contenders import (
 from pyharness.compare.timing import Clock, batch_seconds, seconds, silenced
 from pyharness.methods.plan import FINEST
 from pyharness.model.errors import InputError
+from pyharness.model.progress import Progress, no_progress
 from pyharness.model.trajectory import Array
 
 TARGETS = (1e-6, 1e-12)
@@ -32,7 +33,7 @@ _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
 _MOST_STEPS = 1 << 14
-Say = Callable[[str], None]
+Say = Callable[[str], None]  # receives the current part of a task
 
 
 @dataclass(frozen=True)
@@ -118,19 +119,25 @@ def measure_ensembles(
     loads: Sequence[EnsembleLoad],
     contenders: Sequence[EnsembleContender],
     seed: str,
-    say: Say = lambda _: None,
+    progress: Progress = no_progress,
 ) -> Rates:
     """Measure all contenders on all loads, at all target errors.
 
     On the last load, RK4 is also measured in `STEPS` steps.
     """
     found = Rates(seed, loads[0].n)
+    n_tasks, done = len(loads) * len(TARGETS) + 1, 0
     for load in loads:
         sample = load.part(slice(0, SAMPLE))
         ends = sample.ends()
         for target in (*TARGETS, None) if load is loads[-1] else TARGETS:
             task = _Task(load, target, sample, ends)
+
+            def say(text: str, done: int = done, place: str = task.place) -> None:
+                progress(done, n_tasks, f"{place}: {text}")
+
             found.rows.extend(_rates(task, contenders, found, say))
+            done += 1
     return found
 
 
@@ -139,7 +146,7 @@ def _rates(
 ) -> Iterator[Rate]:
     ready: list[tuple[Rate, Callable[[], Array]]] = []
     for each in filter(task.takes, contenders):
-        say(f"{task.place}: {each.name}")
+        say(each.name)
         with silenced():
             setting = task.setting(each)
             if setting is None:
@@ -152,7 +159,7 @@ def _rates(
                             task.error(run()))  # fmt: skip
                 ready.append((rate, run))
     times = seconds(
-        [run for _, run in ready], _BATCH, ROUNDS, lambda text: say(f"{task.place}: {text}"), min,
+        [run for _, run in ready], _BATCH, ROUNDS, say, min,
         [clock_of(rate.threads) for rate, _ in ready], SLOW,
     )  # fmt: skip
     for (rate, _), best in zip(ready, times, strict=True):

@@ -8,7 +8,7 @@ the machine affects all alike. The median time counts.
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -19,6 +19,7 @@ from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.compare.timing import seconds, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
+from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
@@ -132,16 +133,15 @@ def workloads(
 def measure(
     loads: Sequence[Workload],
     contenders: Sequence[SceneContender],
-    say: Callable[[str], None] = lambda _: None,
+    progress: Progress = no_progress,
 ) -> Finding:
-    """Run the benchmark; `say` receives messages about the progress."""
+    """Run the benchmark."""
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
     for number, load in enumerate(loads, 1):
-        place = f"{load.place} ({number} of {len(loads)})"
 
-        def tell(text: str, place: str = place) -> None:
-            say(f"{place}: {text}")
+        def tell(text: str, number: int = number, place: str = load.place) -> None:
+            progress(number - 1, len(loads), f"{place}: {text}")
 
         tell("reference")
         truth = load.truth or reference(load.scene, [load.horizon], precise=True)

@@ -174,6 +174,11 @@ def run_suites(
             yield replace(name.judged(False, f"ended here: {refusal}"), again=again)
 
 
+def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
+    """Return the names of the suites that may contain a requested check, in order."""
+    return [suite for suite in suites if may_hold(suite, only)]
+
+
 def severity(check: Check) -> tuple[bool, float]:
     """Return a sort key for checks: failed ones last, then by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:

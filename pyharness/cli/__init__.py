@@ -8,7 +8,6 @@ from pyharness.model.errors import printable
 
 # Control characters of lines and columns; a page of TAPE6 may contain a form feed.
 _LAYOUT = "\n\t\f"
-_WIPED = "\r\x1b[K"
 
 
 def shown(text: str) -> str:
@@ -20,24 +19,17 @@ def shown(text: str) -> str:
     return printable(text, _LAYOUT)
 
 
-def write_text(stream: TextIO, text: str, before: str = "") -> None:
+def write_text(stream: TextIO, text: str) -> None:
     """Write a text to a stream of this process.
 
-    A character that the stream's encoding lacks is written as an escape sequence. `before` is
-    written unchanged in front of the text: it comes from this program and may steer a terminal.
+    A character that the stream's encoding lacks is written as an escape sequence.
     """
     encoding = stream.encoding or "utf-8"
-    stream.write(before + shown(text).encode(encoding, "backslashreplace").decode(encoding))
+    stream.write(shown(text).encode(encoding, "backslashreplace").decode(encoding))
 
 
-def say(text: str, before: str = "") -> None:
+def say(text: str) -> None:
     """Write to stderr; a failure, as of a full or closed stderr, does not end the command."""
     with suppress(OSError, ValueError):
-        write_text(sys.stderr, text, before)
+        write_text(sys.stderr, text)
         sys.stderr.flush()
-
-
-def say_again(text: str) -> None:
-    """Replace the last line on stderr by a text, if stderr is a terminal."""
-    if sys.stderr.isatty():
-        say(text, _WIPED)

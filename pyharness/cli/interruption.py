@@ -16,7 +16,8 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, TextIO
 
-from pyharness.cli import say, say_again
+from pyharness.cli import say
+from pyharness.cli.progress import end_progress
 
 _AGAIN = 0.25  # s, after which a dropped interrupt is raised again
 _MOST = 3  # the interrupt by the user at which the process ends at once
@@ -104,7 +105,7 @@ def report() -> int:
     """Print the line that reports the interrupt, once, and return the exit status."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
-        say_again("")  # wipes the progress line
+        end_progress()
         say(LINE)
     return CODE
 

@@ -9,7 +9,9 @@ from dataclasses import replace
 from importlib import import_module
 from typing import Any, NoReturn
 
-from pyharness.cli import say, say_again, shown, write_text
+from pyharness.cli import say, shown, write_text
+from pyharness.cli.progress import end_progress as end_progress
+from pyharness.cli.progress import progress as progress
 from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
@@ -312,11 +314,6 @@ def warn(message: str) -> None:
     say(f"pyharness: warning: {message}\n")
 
 
-def progress(text: str) -> None:
-    """Print the progress on a terminal, in a line that the next call replaces; "" wipes it."""
-    say_again(text)
-
-
 def check_outputs(options: argparse.Namespace) -> None:
     """Raise InputError before any computation if an output can't be written."""
     picture = getattr(options, "plot", None)
@@ -347,7 +344,7 @@ def show(
     """
     from pyharness.views.render import render
 
-    progress("")
+    end_progress()
     form = options.format or FORMATS[0]
     content = own[form]() if own and form in own else render(report, form)
     if getattr(options, "plot", None) is not None:

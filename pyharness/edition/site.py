@@ -7,7 +7,7 @@ JavaScript.
 
 import json
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,6 +21,7 @@ from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
+from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.schema import SCHEMAS
 from pyharness.views.json import json_text
@@ -66,15 +67,13 @@ class Page(NamedTuple):
     menu: str = ""  # path of the page's menu entry; if empty, the page's own path
 
 
-def build_site(
-    progress: Callable[[str], None] = lambda _: None, docs: Path | None = None
-) -> dict[str, bytes]:
+def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
     """Return the files of the site by path; `progress` is called with the name of each part.
 
     `docs` is the folder of the documents, by default the folder of the checkout.
     """
     docs = docs or documents.documents_folder()
-    progress("figures")
+    progress(0, 5, "figures")
     drawn = figures.drawn()
     pictures = figures.together(drawn)
     for each in drawn.values():
@@ -89,17 +88,15 @@ def build_site(
     return content
 
 
-def _pages(
-    drawn: Mapping[str, figures.Drawn], docs: Path, progress: Callable[[str], None]
-) -> Iterator[Page]:
-    progress("claims")
+def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -> Iterator[Page]:
+    progress(1, 5, "claims")
     judged = ledger.judgements()
     context = {
         "counts": ledger.counts(judged), "kinds": ledger.kinds(judged),
         "account": ledger.account(),
     }  # fmt: skip
     yield Page("index.html", "Rigid bodies: a thesis of 1982", "index.html", context)
-    progress("listing")
+    progress(2, 5, "listing")
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
     sentences = ledger.thesis(judged)
@@ -128,7 +125,7 @@ def _pages(
             for each in judged
         ],
     )  # fmt: skip
-    progress("apparatus")
+    progress(3, 5, "apparatus")
     entries = ledger.apparatus()
     yield Page(
         "apparatus.html", "Apparatus", "apparatus.html", {"entries": entries},
@@ -138,7 +135,7 @@ def _pages(
             for each, _ in entries
         ],
     )  # fmt: skip
-    progress("documents")
+    progress(4, 5, "documents")
     yield from _documents(docs)
     offered = api.entries()
     yield Page(

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pyharness.ensembles.executors import Engine, engine
-from pyharness.ensembles.forecast import Estimate, byte_count, duration, forecast, short_count
+from pyharness.ensembles.forecast import Estimate, byte_count, forecast, short_count
 from pyharness.ensembles.reductions import empty
 from pyharness.ensembles.store import Store, check_store, opened
 from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
+from pyharness.model.progress import Progress, no_progress
 
 # Memory of a process, in chunks: those that it holds at once, and what computing them takes.
 _COPIES = 12
@@ -84,7 +85,7 @@ def swept(
     workers: int | None = None,
     address: str | None = None,
     before: Callable[[Estimate], None] = lambda estimate: None,
-    progress: Callable[[str], None] = lambda text: None,
+    progress: Progress = no_progress,
     repair: bool = False,
 ) -> Iterator[tuple[Store, Outcome]]:
     """Compute the missing chunks of a sweep, and yield the open store and the outcome.
@@ -114,7 +115,7 @@ def run_sweep(
     workers: int | None = None,
     address: str | None = None,
     before: Callable[[Estimate], None] = lambda estimate: None,
-    progress: Callable[[str], None] = lambda text: None,
+    progress: Progress = no_progress,
     repair: bool = False,
 ) -> Outcome:
     """Compute the chunks of a sweep that a store does not have yet.
@@ -154,7 +155,7 @@ def _completed(
     store: Store,
     own: Engine,
     before: Callable[[Estimate], None],
-    progress: Callable[[str], None],
+    progress: Progress,
 ) -> Outcome:
     sweep = store.sweep
     missing = [chunk for chunk, done in enumerate(store.done()) if not done]
@@ -170,9 +171,7 @@ def _completed(
     try:
         for n, (chunk, found) in enumerate(results, 1):
             store.write(chunk, found)
-            spent = time.monotonic() - begin
-            rest = spent / n * (len(missing) - n)
-            progress(f"chunk {n_before + n} of {sweep.n_chunks}, {duration(rest)} left")
+            progress(n, len(missing), "chunks")
     finally:
         # Processes and connections end here, and not only at garbage collection.
         close = getattr(results, "close", None)

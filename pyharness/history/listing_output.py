@@ -4,13 +4,14 @@ The digits that a machine printed, real or emulated, show in which arithmetic it
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import zip_longest
 
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing, corrected, original
 from pyharness.model.pipes import read_input
+from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import Column, Report, Section, Table, words
 from pyharness.model.scene_file import case_scene
 from pyharness.original.printer import page
@@ -76,14 +77,15 @@ def fits(
     lines: Sequence[Sequence[str]],
     programs: Sequence[str],
     cases: Sequence[int],
-    progress: Callable[[str], None] = lambda told: None,
+    progress: Progress = no_progress,
 ) -> list[Fit]:
     """Compare a page with each of our pages that has the same moments, torques and columns.
 
     Return the comparisons, those with the fewest differences first. Raise InputError if none of our
     pages has these moments, torques and columns.
     """
-    found = []
+    found: list[Fit] = []
+    every = len(programs) * len(cases) * 2 * len(WORD_NAMES)
     for program in programs:
         for case in cases:
             head, width = _form(program, case)
@@ -93,7 +95,7 @@ def fits(
                 continue
             for listing in (original(program), corrected(program)):
                 for word in WORD_NAMES:
-                    progress(f"{program}, case {case}, {listing.label}, {word}")
+                    progress(len(found), every, f"{program}, case {case}, {word}")
                     found.append(_fit(theirs, listing, case, word))
     if not found:
         raise InputError(

@@ -6,6 +6,7 @@ from itertools import zip_longest
 
 from pyharness.compare.agreement import accuracy
 from pyharness.model.listing import PROGRAMS, Listing, corrected, original
+from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
@@ -82,7 +83,7 @@ def cells(
     cases: Sequence[int],
     programs: Sequence[str] = PROGRAMS,
     lengths: Sequence[int] = LENGTHS,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    progress: Progress = no_progress,
 ) -> Iterator[WordCell]:
     """Run the programs, original and corrected, on the cases in every word; yield the cells.
 
@@ -102,7 +103,7 @@ def cells(
         for word in (DOUBLE, WIDEST, *words):
             found.append(judge.run(word))
             done += 1
-            progress(done, every)
+            progress(done, every, f"case {case}, {listing.program}")
         yield WordCell(found[0], found[1], tuple(found[2:]))
 
 

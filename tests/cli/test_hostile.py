@@ -11,7 +11,8 @@ import pytest
 from pyharness import InputError
 from pyharness.cli import forecast, output, shown
 from pyharness.cli.main import main
-from pyharness.cli.options import progress, warn
+from pyharness.cli.options import warn
+from pyharness.cli.progress import progress
 from pyharness.edition.report import MARK
 from pyharness.model import pipes
 from pyharness.model.errors import printable
@@ -171,7 +172,7 @@ def test_output_layer_keeps_lines_and_letters(capsys: Capture) -> None:
     assert printable("a\nb") == "a\\nb"
     warn(STEERING)
     assert capsys.readouterr().err == "pyharness: warning: \\x1b[31m\\x07\\u202e\\x9b\n"
-    progress(STEERING)  # written to a terminal only
+    progress(1, 2, STEERING)  # written to a terminal only
     assert capsys.readouterr().err == ""
 
 

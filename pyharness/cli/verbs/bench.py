@@ -64,13 +64,13 @@ def run(options: argparse.Namespace) -> int:
     if count:
         loads = []
         for number in range(1, count + 1):
-            shared.progress(f"drawing scene {number} of {count}")
+            shared.progress(number - 1, count, "drawing scenes")
             loads.append(random_load(options.seed, number, options.attitude))
     else:
         case = None if options.case is None else int(options.case)
         loads = workloads(case, horizon, options.attitude)
     found = measure(loads, contenders, shared.progress)
-    shared.progress("")
+    shared.end_progress()
     if not found.rows:
         told = "; ".join(reports.not_measured(found))
         raise InputError(f"bench: nothing could be measured: {told}")
@@ -189,7 +189,7 @@ def _ensemble(options: argparse.Namespace) -> int:
     # Run times up to a hundred times as many bodies, and the memory of ten times as many.
     growth = sizes(options.seed, min(100 * n, _MOST_GROWN), shared.progress)
     found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
-    shared.progress("")
+    shared.end_progress()
     packages = sorted({each.package for each in those} - {"", "numpy"})
     shared.show(ensembles.ensemble_report(found, packages, _again(options)), options)
     return 0

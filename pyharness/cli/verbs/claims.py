@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
 
     judgements = []
     for number, entry in enumerate(chosen, 1):
-        shared.progress(f"{number} of {len(chosen)}: {entry['id']}")
+        shared.progress(number - 1, len(chosen), entry["id"])
         judgements.append(judgement(entry["id"], options.word or BINARY64))
     one = options.explain is not None
     shared.show(explanation(judgements[0]) if one else claims_report(judgements), options)
@@ -57,7 +57,7 @@ def _evidence(options: argparse.Namespace) -> int:
     found, every = [], len(combinations())
     for combination in evidence():
         found.append(combination)
-        shared.progress(f"{len(found)} of {every} combinations")
+        shared.progress(len(found), every, "combinations")
     shared.show(evidence_report(found), options)
     return 0
 

@@ -29,8 +29,8 @@ def run(options: argparse.Namespace) -> int:
     from pyharness.edition.site import build_site
 
     docs = documents_folder(options.docs)
-    content = build_site(lambda what: shared.progress(f"edition: {what}"), docs)
-    shared.progress("")
+    content = build_site(shared.progress, docs)
+    shared.end_progress()
     write_tree(options.out, content, "--out")
     shared.emit(render(edition_report(options.out, content), options.format or "table"), None)
     return 0

@@ -29,11 +29,11 @@ def run(options: argparse.Namespace) -> int:
     content: dict[str, bytes] = {}
     drawn = []
     for number, finding in enumerate(room.findings(), 1):
-        shared.progress(f"figures: {number} of {len(plans)}")
+        shared.progress(number - 1, len(plans), finding.plan.title)
         svg, png, _ = finding.plan.files
         content |= saved(room.figure_picture(finding), svg, png)
         drawn.append(finding)
-    shared.progress("")
+    shared.end_progress()
     write_folder(options.out, content, "--out")
     # --out names the folder of the files; the list goes to the terminal.
     shared.emit(render(room.figures_report(drawn), options.format or "table"), None)

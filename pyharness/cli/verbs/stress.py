@@ -2,7 +2,7 @@
 
 import argparse
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import Check, requested_suites
 from pyharness.checks.stress import TRIALS, stress, trial, worst
 from pyharness.checks.stress_report import stress_report
 from pyharness.cli import options as shared
@@ -31,10 +31,11 @@ def run(options: argparse.Namespace) -> int:
         check_folder(options.save, (), "--save")
 
     checks: list[Check] = []
+    names = requested_suites(TRIALS, only)
     for check in stress(only):
-        shared.progress(f"{len(checks) + 1}: {check.id}")
+        shared.progress(names.index(check.suite), len(names), check.id)
         checks.append(check)
-    shared.progress("")
+    shared.end_progress()
     if not checks:
         raise unknown("check", ",".join(only), TRIALS, "--only")
     failed = [check for check in checks if not check.passed]

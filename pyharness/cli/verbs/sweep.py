@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         progress=shared.progress,
         repair=options.repair,
     ) as (store, outcome):
-        shared.progress("")
+        shared.end_progress()
         report = sweep_report(store, outcome, options.out)
         if quantity is not None:
             from pyharness.ensembles.picture import sweep_picture

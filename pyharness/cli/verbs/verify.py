@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import Check, requested_suites
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.random_methods import ROUNDING
 from pyharness.checks.report import checks_report, samples, summary
@@ -56,10 +56,10 @@ def run(options: argparse.Namespace) -> int:
         shared.refuse(options, "--self-test", ("only", "draws", "external"))
         return _self_test(options, chosen)
     checks = []
+    kinds = requested_suites(KINDS, chosen.only)
     for check in verify(chosen):
         checks.append(check)
-        if len(checks) % 20 == 0 or check.suite != "cells":
-            shared.progress(f"{len(checks)}: {check.id}")
+        shared.progress(kinds.index(check.suite), len(kinds), check.id)
     if not checks:
         if chosen.may_ask("decks") and compiler() is None:
             raise InputError("decks are compiled, and there is no gfortran on the PATH")
@@ -97,8 +97,7 @@ def _port(options: argparse.Namespace) -> int:
     checks = []
     for check in port(options.port, asked):
         checks.append(check)
-        if len(checks) % 20 == 0:
-            shared.progress(f"{len(checks)} of {len(asked)}: {check.id}")
+        shared.progress(len(checks), len(asked), check.id)
     title = [f"{options.port}: against the twins, bit for bit"]
     if checks[-1].value is None:
         title.append(f"ended at the first of {len(asked)} cells that it did not answer")
@@ -120,7 +119,7 @@ def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
     found = []
     for caught in self_test(chosen.seed, chosen.record):
         found.append(caught)
-        shared.progress(f"{len(found)} of {len(PLANTS) + 1}: {as_check(caught).id}")
+        shared.progress(len(found), len(PLANTS) + 1, as_check(caught).id)
     shared.show(self_test_report(_title(chosen), found, chosen.seed), options)
     return 0 if all(caught.passed for caught in found) else 1
 

@@ -1,7 +1,6 @@
 """`words`: the programs with words of any length and rounding, and test vectors of the CDC."""
 
 import argparse
-import time
 
 from pyharness.cli import options as shared
 from pyharness.history.words import LENGTHS, cells
@@ -36,23 +35,9 @@ def run(options: argparse.Namespace) -> int:
     programs = shared.chosen_programs(options)
     shared.check_outputs(options)
     lengths = range(LENGTHS[0], LENGTHS[-1] + 1) if options.all else LENGTHS
-    found = list(cells(cases, programs, lengths, _Forecast()))
+    found = list(cells(cases, programs, lengths, shared.progress))
     shared.show(words_report(found), options)
     return 0
-
-
-class _Forecast:
-    """A progress line with the remaining time, estimated from the time of the finished runs."""
-
-    def __init__(self) -> None:
-        self._begin = self._said = time.monotonic()
-
-    def __call__(self, done: int, every: int) -> None:
-        now = time.monotonic()
-        if now - self._said >= 0.5:
-            self._said = now
-            left = (now - self._begin) / done * (every - done)
-            shared.progress(f"words: {done} of {every} runs, some {left:.0f} s left")
 
 
 def _vectors(options: argparse.Namespace) -> int:

@@ -1,13 +1,14 @@
 """The errors of the family's members, and their measured and derived orders."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pyharness.history.family.members import Member, march, predicted_order
 from pyharness.model.errors import InputError
+from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
@@ -69,7 +70,7 @@ def family_members(
 def order_table(
     scene: Scene,
     members: Sequence[Member] | None = None,
-    progress: Callable[[str], None] = lambda text: None,
+    progress: Progress = no_progress,
 ) -> list[OrderFinding]:
     """Measure the orders and errors of many members at once, by default of `family_members()`.
 
@@ -79,8 +80,9 @@ def order_table(
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")
     chosen = list(family_members() if members is None else members)
     times = scene.times()
-    progress("reference")
     horizons = [part * times[-1] for part in _HORIZONS]
+    phases = len(horizons) + 2
+    progress(0, phases, "reference")
     wanted = sorted({*times, *horizons})
     truth = reference(scene, wanted)
     if len(truth.time) < len(wanted):
@@ -90,9 +92,9 @@ def order_table(
     measured: list[float | None] = [None] * len(chosen)
     doubts = [math.inf] * len(chosen)
     open_ones = list(range(len(chosen)))
-    for horizon in horizons:
+    for number, horizon in enumerate(horizons, 1):
         end = truth.omega[place[horizon]]
-        progress(f"orders of {len(open_ones)} members over {horizon:g} s")
+        progress(number, phases, f"orders of {len(open_ones)} members over {horizon:g} s")
         errors = _ladder(scene, [chosen[i] for i in open_ones], horizon, end)
         for i, column in zip(open_ones, errors.T, strict=True):
             slopes = _slopes(column)
@@ -102,7 +104,7 @@ def order_table(
         open_ones = [i for i in open_ones if doubts[i] > _SETTLED]
         if not open_ones:
             break
-    progress("errors")
+    progress(phases - 1, phases, "errors")
     rows = [place[time] for time in times]
     with np.errstate(all="ignore"):
         errors = np.abs(march(scene, chosen) - truth.omega[rows]).max(axis=(1, 2))

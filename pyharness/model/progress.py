@@ -1,0 +1,10 @@
+"""How a long computation reports its progress to whoever called it."""
+
+from collections.abc import Callable
+
+Progress = Callable[[int, int, str], None]
+"""Called with the number of completed parts, the number of all parts, and the current part."""
+
+
+def no_progress(done: int, total: int, what: str) -> None:
+    """Report nothing; the default of every computation."""

@@ -1,4 +1,4 @@
-"""README and reports: commands print what stands there, examples run, every link is whole."""
+"""README and documents: outputs are current, examples run, and all links resolve."""
 
 import json
 import re

@@ -216,11 +216,16 @@ def test_measure_judges_refuses_and_goes_on(right: Array) -> None:
         return End(right * [1.0, 1.0, 1.0 + setting], evaluations=11)
 
     told: list[str] = []
+
+    def progress(done: int, total: int, what: str) -> None:
+        assert (done, total) == (0, 1)
+        told.append(what)
+
     contenders = [
         SceneContender("exact", "tolerance", _fake(answer), (1e-3, 1e-6, 1e-12)),
         SceneContender("picky", "none", _refuses, (0.0,)),
     ]
-    found = measure([SHORT], contenders, told.append)
+    found = measure([SHORT], contenders, progress)
     stopped, good = found.rows
     assert stopped == Row(SHORT, "exact", "tolerance", 1e-3, None, None, None, "stopped")
     assert good.error == pytest.approx(1e-6, rel=1e-3)

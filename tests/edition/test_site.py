@@ -130,7 +130,7 @@ def test_every_claim_entry_and_sentence_is_there(built_site: dict[str, bytes]) -
 
 
 def test_the_ledger_has_the_verdicts(built_site: dict[str, bytes]) -> None:
-    """What is on the page is what is judged: a claim that turns, turns there."""
+    """The page shows the verdicts of the ledger, and a change of one of them."""
     text = built_site["claims.html"].decode()
     _, _, story = text.partition('id="vi-superior"')
     verdicts = re.findall(r'class="verdict [\w-]+">([\w ]+)<', story)[:2]

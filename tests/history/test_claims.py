@@ -1,4 +1,4 @@
-"""The ledger: complete, computed, and its verdicts turn when what they hang on is corrected."""
+"""The ledger of claims is complete and computed; a verdict changes with the defect behind it."""
 
 import csv
 import json
@@ -100,7 +100,7 @@ TURNS = [
     ("iv3-guard", FALSE, [*names_of("defect", "runge-kutta")], NOT_TESTABLE),
     ("v3-small-step-runge-kutta", REPRODUCED, BASES, NOT_REPRODUCED),
     ("vi-superior", REPRODUCED, BASES, FALSE),
-    # What does not hang on it.
+    # Verdicts that do not depend on it.
     ("v2-case-6-diverged", REPRODUCED, ["stage-base", "x3-reads-acl2"], REPRODUCED),
     ("v2-case-5-differences", REPRODUCED, ["stage-base", "x3-reads-acl2"], REPRODUCED),
 ]
@@ -122,7 +122,7 @@ def test_mending_everything_gives_the_verdict_of_the_methods(judged: dict[str, J
 
 
 def test_programs_and_methods_disagree_about_the_conclusion(judged: dict[str, Judgement]) -> None:
-    """What the thesis concluded is what its programs show, and is false."""
+    """The programs as printed show the conclusion of the thesis; corrected, they refute it."""
     for identity in ("abstract-superior", "vi-superior"):
         found = judged[identity]
         assert (found.original.verdict, found.corrected.verdict) == (REPRODUCED, FALSE)
@@ -408,6 +408,6 @@ def test_computer_error_is_judged_in_the_machines_words() -> None:
     apart = {name: x for name, x in numbers.items() if "apart from binary64" in name}
     assert len(apart) == 6
     assert all(1e-15 < x < 1e-11 for x in apart.values())
-    # A limit below what rounding does: the verdict hangs on it.
+    # With a limit below the rounding errors the verdict changes.
     low = {**entry, "parameters": {**entry["parameters"], "limit": 2e-13}}
     assert outcome(low, Laboratory(False)).verdict == REPRODUCED

@@ -191,7 +191,7 @@ function decoded(text) {
   }
 }
 
-// Return no more of a typed text than a line has room for.
+// Return the beginning of a typed text, short enough for a line.
 function shown(text) {
   return [...(text ?? "")].slice(0, 40).join("");
 }

@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from pyharness.compare.comparison import Comparison, compare_programs
     from pyharness.methods.many import Ensemble, solve_many
     from pyharness.methods.prepared import prepare
+    from pyharness.methods.prepared_attitude import AttitudeSolver
     from pyharness.methods.solve import solve
     from pyharness.methods.solver import Solver
     from pyharness.model.errors import InputError, NotBuiltError
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     _kernels: Any
 
 __all__ = [
+    "AttitudeSolver",
     "Comparison",
     "Ensemble",
     "ImpossibleBodyWarning",
@@ -63,6 +65,7 @@ _SUBMODULES = {
     "original.programs": ("run_program",),
     "methods.many": ("Ensemble", "solve_many"),
     "methods.prepared": ("prepare",),
+    "methods.prepared_attitude": ("AttitudeSolver",),
     "methods.solver": ("Solver",),
     "methods.solve": ("solve",),
 }

@@ -1,4 +1,4 @@
-"""How a long computation reports its progress to whoever called it."""
+"""The type of the functions to which a long computation reports its progress."""
 
 from collections.abc import Callable
 

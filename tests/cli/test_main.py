@@ -129,8 +129,8 @@ def test_run_tells_of_error_growth_and_digits(printed: Printed) -> None:
         "sensitive: rounding errors are amplified by 5.0e5; 10 digits left (2 "
     )
     assert lines[-1] == (
-        "estimated error 5.6e-11 of the largest |omega|; digits left 10.3; growth of a small "
-        "difference 5.0e5"
+        "estimated error 5.6e-11 of the largest |omega|; digits left 10.3; error "
+        "amplification 5.0e5"
     )
     assert max(map(len, lines)) <= 100
     assert printed("run --case 3 --method rk4 --times 1").splitlines()[-1].startswith("complete")

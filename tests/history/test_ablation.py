@@ -87,7 +87,7 @@ def test_defects_on_the_command_line(capsys: Capture) -> None:
     assert max(len(line) for page in (listed, *pages.values()) for line in page.splitlines()) <= 100
     for each in entries():
         assert f"\n{each['id']} " in listed
-        assert ("effect, measured now" in pages[each["id"]]) == ("flag" in each)
+        assert ("Effect, measured now" in pages[each["id"]]) == ("flag" in each)
     record = json.loads(told("--kind", "reading", "--format", "json"))
     assert [each["id"] for each in record["entries"]] == list(names_of("reading"))
     record = json.loads(told("dt-accumulates", "--format", "json"))

@@ -92,7 +92,11 @@ def near(mutation: Mutation, checks: list[Check]) -> list[Check]:
     else:
         # A module that is expanded for each instruction set has its library's name after its own.
         found = re.search(r"^\s*module (\w+?)_?(?:\$|$)", (ROOT / mutation.file).read_text(), re.M)
-        modules = {f"{found[1].lower()}{of}" for of in ("", "_bodies", "_hot", "_many")} if found else set()
+        modules = (
+            {f"{found[1].lower()}{of}" for of in ("", "_bodies", "_hot", "_many")}
+            if found
+            else set()
+        )
         ends = {f"{module}:{function}" for module in (*modules, "")}
         entered = [each for each in checks if not ends.isdisjoint(each.functions)]
         if not entered:
